@@ -1,0 +1,81 @@
+"""Statics of pneumatic soft manipulators with thread-reinforced chambers, as multiple-shooting nonlinear programs.
+
+The names below are the Python interface; they are imported where first used, so that `import softnlp` costs nothing.
+Numbers are SI: `BAR`, `MILLIMETRE`, `NEWTON_MILLIMETRE`, `DEGREE` convert.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from softnlp.conventions import AS_PRINTED as AS_PRINTED
+    from softnlp.conventions import COEFFICIENT_SETS as COEFFICIENT_SETS
+    from softnlp.conventions import REPRODUCTION as REPRODUCTION
+    from softnlp.conventions import Coefficients as Coefficients
+    from softnlp.conventions import Conventions as Conventions
+    from softnlp.errors import IllPosedError as IllPosedError
+    from softnlp.errors import InputError as InputError
+    from softnlp.errors import MaterialError as MaterialError
+    from softnlp.errors import RobotError as RobotError
+    from softnlp.errors import SoftnlpError as SoftnlpError
+    from softnlp.laws import formula_law as formula_law
+    from softnlp.laws import function_law as function_law
+    from softnlp.materials import Material as Material
+    from softnlp.materials import load_materials as load_materials
+    from softnlp.materials import material as material
+    from softnlp.numerics import Numerics as Numerics
+    from softnlp.results import save as save
+    from softnlp.results import to_dataset as to_dataset
+    from softnlp.results import to_json as to_json
+    from softnlp.robot import ROBOTS as ROBOTS
+    from softnlp.robot import Robot as Robot
+    from softnlp.robot import robot as robot
+    from softnlp.rod import Loads as Loads
+    from softnlp.runner import run_scenario as run_scenario
+    from softnlp.scenario import load_scenario as load_scenario
+    from softnlp.status import Status as Status
+    from softnlp.studies.forward import forward as forward
+    from softnlp.studies.step import Run as Run
+    from softnlp.studies.step import Step as Step
+    from softnlp.units import BAR as BAR
+    from softnlp.units import DEGREE as DEGREE
+    from softnlp.units import MILLIMETRE as MILLIMETRE
+    from softnlp.units import NEWTON_MILLIMETRE as NEWTON_MILLIMETRE
+
+_HOMES = {
+    "conventions": ("AS_PRINTED", "COEFFICIENT_SETS", "REPRODUCTION", "Coefficients", "Conventions"),
+    "errors": ("IllPosedError", "InputError", "MaterialError", "RobotError", "SoftnlpError"),
+    "laws": ("formula_law", "function_law"),
+    "materials": ("Material", "load_materials", "material"),
+    "numerics": ("Numerics",),
+    "results": ("save", "to_dataset", "to_json"),
+    "robot": ("ROBOTS", "Robot", "robot"),
+    "rod": ("Loads",),
+    "runner": ("run_scenario",),
+    "scenario": ("load_scenario",),
+    "status": ("Status",),
+    "studies.forward": ("forward",),
+    "studies.step": ("Run", "Step"),
+    "units": ("BAR", "DEGREE", "MILLIMETRE", "NEWTON_MILLIMETRE"),
+}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = sorted([*_HOME_OF, "__version__"])  # noqa: PLE0605
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("softnlp")
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'softnlp' has no attribute '{name}'")
+    value = getattr(import_module(f"softnlp.{_HOME_OF[name]}"), name)
+    globals()[name] = value  # over the submodule of the same name, if there is one
+    return value
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

@@ -1,0 +1,131 @@
+"""The stretch reached continuously from zero pressure, as a number: first guess of the NLP, and where the branch ends.
+
+Along proportional loading, pressures t P, the axial balance gives t as an explicit function of the stretch (the chambers'
+force is linear in pressure), so the branch is followed by evaluating, not by solving: Eqs. (10), (21), (23).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.conventions import Coefficients
+from softnlp.quantities import Model, section_function
+from softnlp.section import deform, stretch_balance
+from softnlp.status import Status
+from softnlp.units import BAR
+
+Array = NDArray[np.float64]
+
+_LARGEST_STRETCH = 10.0
+_GRID = 1500
+
+
+@dataclass(frozen=True)
+class BranchPoint:
+    """Where the branch from zero pressure stands at one pressure.
+
+    status : solved, no_equilibrium or unstable_material. stretch : lambda, or its value at the end of the branch.
+    fraction : the part of the pressure up to which the branch exists (1 when solved). message : one line for a person.
+    """
+
+    status: Status
+    stretch: float
+    fraction: float
+    message: str
+
+
+def branch_function(model: Model) -> ca.Function:
+    """Return (quantities, stretch) -> rows that `stretch_on_branch` needs, for symbols in place of the model's numbers.
+
+    Rows: A_0 sigma_e; what balances it at full pressure; then E_t, EA, EI_x, EI_y without pressure and at full pressure.
+    """
+
+    def stiffnesses(m: Model, pressures: Any, stretch: Any) -> tuple[Any, list[Any]]:
+        section = deform(m.robot, m.material, pressures, stretch, m.coefficients, m.conventions)
+        moduli = [section.tangent_modulus, section.axial_stiffness, *section.bending_stiffness]
+        return stretch_balance(section, m.coefficients, m.conventions), moduli
+
+    def build(m: Model, pressures: Any, gravity: Any, stretch: Any) -> Sequence[Any]:
+        zero = [0.0] * m.robot.chamber_sets
+        resistance, at_rest = stiffnesses(m, zero, stretch)
+        imbalance, at_pressure = stiffnesses(m, pressures, stretch)
+        return [ca.vertcat(resistance, resistance - imbalance, *at_rest, *at_pressure)]
+
+    return section_function(model, build)
+
+
+def stretch_on_branch(function: ca.Function, column: Array, pressures: Array) -> BranchPoint:
+    """Return the stretch on the branch from zero pressure, or where and why the branch ends before.
+
+    function : of `branch_function`. column : every quantity in its order, SI, with `pressures` [Pa] in it.
+    """
+    if not np.any(pressures):
+        return BranchPoint(Status.SOLVED, 1.0, 1.0, "no pressure")
+
+    def sample(stretch: Array) -> tuple[Array, Array]:
+        """Return the pressure fraction and the smallest stiffness, relative to rest, at each stretch."""
+        rows = np.asarray(function(column, stretch[None, :]))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = np.where(rows[1] > 0, rows[0] / rows[1], np.inf)
+        capped = np.minimum(t, 1.0)
+        k = rows[2:6] + capped * (rows[6:10] - rows[2:6])
+        return t, np.min(k / reference[:, None], axis=0)
+
+    reference = np.asarray(function(column, 1.0)).ravel()[2:6]
+    grid = np.linspace(1.0, _LARGEST_STRETCH, _GRID)
+    t, k = sample(grid)
+    falls = np.append(t[1:] < t[:-1] - 1e-13, False)
+    events = np.flatnonzero((t >= 1.0) | ~(k > 0) | falls)
+    if events.size == 0:
+        return _ended(Status.NO_EQUILIBRIUM, grid[-1], float(t[-1]), pressures, "goes beyond any stretch of use")
+    j = int(events[0])
+    low, high = grid[max(j - 1, 0)], grid[min(j + 1, _GRID - 1)]
+
+    def bisect(beyond: Callable[[float], bool], a: float, b: float) -> float:
+        while b - a > 4e-16 * b:
+            middle = (a + b) / 2
+            if middle in (a, b):
+                break
+            a, b = (a, middle) if beyond(middle) else (middle, b)
+        return b
+
+    if falls[j] and t[j] < 1.0 and k[j] > 0:
+        for _ in range(12):
+            fine = np.linspace(low, high, 41)
+            values = sample(fine)[0]
+            best = int(np.argmax(values))
+            low, high = fine[max(best - 1, 0)], fine[min(best + 1, 40)]
+        if float(values[best]) < 1.0:
+            return _ended(Status.NO_EQUILIBRIUM, fine[best], float(values[best]), pressures, "turns back")
+        high = fine[best]
+        low = grid[max(j - 1, 0)]
+    elif t[j] >= 1.0 or ~(k[j] > 0):
+        high = grid[j]
+
+    def at(stretch: float) -> tuple[float, float]:
+        values = sample(np.array([stretch]))
+        return float(values[0][0]), float(values[1][0])
+
+    root = bisect(lambda s: at(s)[0] >= 1.0, low, high) if at(high)[0] >= 1.0 else high
+    if at(root)[1] > 0:
+        return BranchPoint(Status.SOLVED, root, 1.0, "on the branch from zero pressure")
+    lost = bisect(lambda s: not at(s)[1] > 0, low, root)
+    return _ended(Status.UNSTABLE_MATERIAL, lost, at(lost)[0], pressures, "meets a tangent stiffness that loses its sign")
+
+
+def _ended(status: Status, stretch: float, fraction: float, pressures: Array, how: str) -> BranchPoint:
+    """Say where the branch ends, with the last pressures that have an equilibrium."""
+    last = ", ".join(f"{fraction * P / BAR:.6g}" for P in pressures)
+    return BranchPoint(
+        status,
+        float(stretch),
+        fraction,
+        f"{status.advice}: the branch from zero pressure {how} at a stretch of {stretch:.4g}; "
+        f"the last pressure with an equilibrium is {last} bar ({100 * fraction:.4g} % of this one)",
+    )

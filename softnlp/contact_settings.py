@@ -1,0 +1,39 @@
+"""What a scenario says about the wall of a blocked force (model section 5), as data in SI units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class ClosureWeights:
+    """Weights of the `weighted` closure; None leaves the choice to the study.
+
+    force : W_n [1/N]. moment : W_m [1/(N m)]. length : W_L [1/m]. position : W_h [1/m]; None holds e_h = 0 exactly.
+    """
+
+    force: float | None = None
+    moment: float | None = None
+    length: float | None = None
+    position: float | None = None
+
+
+@dataclass(frozen=True)
+class ContactSettings:
+    """Where the wall stands and how the pressurised chambers react to it.
+
+    offset : h, horizontal position at which the tip is held, along x [m]; unused when a wall is given.
+    tip_cap : L_t, length of the rigid cap on the tip [m]. closure : which equations close the problem.
+    wall_point, wall_normal : a wall anywhere, world frame, a point [m] and a unit vector; both or neither.
+    weights : of the `weighted` closure.
+    """
+
+    offset: float = 0.0
+    tip_cap: float = 0.0
+    closure: Literal["free", "compliant", "weighted", "rigid"] = "compliant"
+    wall_point: Vector | None = None
+    wall_normal: Vector | None = None
+    weights: ClosureWeights = field(default_factory=ClosureWeights)

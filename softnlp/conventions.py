@@ -1,0 +1,53 @@
+"""Choices the paper leaves open or misprints, and the semi-empirical coefficients, as named data (model section 7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Conventions:
+    """How ambiguous equations are read.
+
+    name : shown in every result.
+    stiffening_opposes_pressure : sign of the stiffening force in Eq. (10); the printed sign adds to the pressure.
+    fibre_thickness : t_f of (S3), (S4), (S6) [m].
+    mean_pressure : Eq. (12) with the mean pressure over all chambers, or with each chamber's own.
+    """
+
+    name: str
+    stiffening_opposes_pressure: bool
+    fibre_thickness: float
+    mean_pressure: bool
+
+
+REPRODUCTION = Conventions("reproduction", True, 0.0, True)
+AS_PRINTED = Conventions("as_printed", False, 0.1e-3, False)
+CONVENTIONS = {c.name: c for c in (REPRODUCTION, AS_PRINTED)}
+
+
+@dataclass(frozen=True, eq=False)
+class Coefficients:
+    """Dimensionless coefficients; each may be a number or a symbol.
+
+    elongation : k_e, axial stiffening, Eqs. (10), (11).
+    bending : k_b, bending stiffening, Eq. (12).
+    area : k_a, multiplies A_0.
+    inertia : k_i, multiplies the material's I.
+    bore_fraction : phi in 0..1, how far beyond the bore towards the thread the pressure acts.
+    chamber_reaction : k_c of the `compliant` closure of the blocked force.
+    """
+
+    elongation: Any = 0.41
+    bending: Any = 1.23
+    area: Any = 1.0
+    inertia: Any = 1.0
+    bore_fraction: Any = 0.0
+    chamber_reaction: Any = 1.45
+
+
+COEFFICIENT_SETS = {
+    "reproduction": Coefficients(),
+    "calibrated": Coefficients(elongation=0.427, bending=2.51, bore_fraction=0.369, chamber_reaction=0.943),
+}

@@ -1,0 +1,24 @@
+"""How a boundary value problem is solved, as data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+TRANSCRIPTIONS = ("multiple-shooting", "collocation")
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """Numerical choices of a run.
+
+    transcription : multiple shooting with RK4, or Legendre collocation.
+    intervals : number of intervals on the rod, or None to refine until `accuracy` is met.
+    accuracy : largest estimated tip position error, as a fraction of the robot's length L_0.
+    tolerance : largest scaled residual of a step that counts as solved.
+    """
+
+    transcription: Literal["multiple-shooting", "collocation"] = "multiple-shooting"
+    intervals: int | None = None
+    accuracy: float = 1e-6
+    tolerance: float = 1e-8

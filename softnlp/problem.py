@@ -1,0 +1,238 @@
+"""Problems: which quantities are free, what else must hold, what is best; compiled once, solved for many values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.errors import IllPosedError, nearest
+from softnlp.loadcase import Equation, LoadCase
+from softnlp.quantities import Quantity
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Constraint:
+    """A condition lower <= expression <= upper, entry by entry; equality where they agree. `scale` is in `unit`."""
+
+    name: str
+    expression: ca.MX
+    lower: float = 0.0
+    upper: float = 0.0
+    unit: str = "1"
+    scale: Any = 1.0
+
+    @property
+    def is_equality(self) -> bool:
+        """Whether every entry is an equation."""
+        return self.lower == self.upper
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledProblem:
+    """A problem as functions of its unknowns x (scaled) and its fixed values p (SI).
+
+    x stacks the free quantities, then each case's unknowns; p stacks the fixed quantities. residual(x, p) stacks each case's
+    equations, then the constraints over their scales. solver_arguments holds bounds and the NLP for IPOPT.
+    """
+
+    cases: tuple[LoadCase, ...]
+    free: tuple[Quantity, ...]
+    fixed: tuple[Quantity, ...]
+    constraints: tuple[Constraint, ...]
+    equations: tuple[Equation, ...]
+    nlp: Mapping[str, ca.MX]
+    residual: ca.Function
+    fine_residual: ca.Function
+    jacobian: ca.Function
+    si_scales: ca.Function
+    outputs: ca.Function
+    case_constants: ca.Function
+    units: ca.Function
+    lower_x: Array
+    upper_x: Array
+    lower_g: Array
+    upper_g: Array
+    is_square: bool
+
+    @property
+    def free_size(self) -> int:
+        """The number of entries of x that are free quantities."""
+        return sum(q.size for q in self.free)
+
+    def pack(self, values: Mapping[str, Any]) -> Array:
+        """Return p from values by quantity name; what is not named keeps its nominal value.
+
+        Raises KeyError-like `IllPosedError` for a name that is not a fixed quantity of this problem.
+        """
+        known = {q.name for q in self.fixed}
+        for name in values:
+            if name not in known:
+                raise IllPosedError(f"'{name}' is not a fixed quantity of this problem{nearest(name, known)}")
+        parts = [np.broadcast_to(np.asarray(values.get(q.name, q.nominal), float).ravel(), q.size) for q in self.fixed]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def free_values(self, x: Array) -> dict[str, Array]:
+        """Return the free quantities in x by name, SI."""
+        found, start = {}, 0
+        for q in self.free:
+            found[q.name] = x[start : start + q.size] * q.scale
+            start += q.size
+        return found
+
+    def pack_free(self, values: Mapping[str, Any]) -> Array:
+        """Return the head of x from SI values of the free quantities; nominal where not named."""
+        parts = [np.asarray(values.get(q.name, q.nominal), float).ravel() / q.scale for q in self.free]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def compile_problem(
+    given: Sequence[Quantity],
+    cases: Sequence[LoadCase],
+    *,
+    free: Sequence[str] = (),
+    constraints: Sequence[Constraint] = (),
+    objective: ca.MX | None = None,
+) -> CompiledProblem:
+    """Fix or free the quantities and compile the problem.
+
+    given : every quantity that the cases, constraints and objective use. free : names of those that are unknown.
+    Raises `IllPosedError`, naming quantities and constraints, when the equations cannot determine the free quantities
+    or when an objective has nothing left to choose.
+    """
+    by_name = {q.name: q for q in given}
+    for name in free:
+        if name not in by_name:
+            raise IllPosedError(f"'{name}' cannot be freed: no such quantity{nearest(name, by_name)}")
+    freed = tuple(by_name[name] for name in dict.fromkeys(free))
+    fixed = tuple(q for q in given if q.name not in set(free))
+
+    unknowns = [symbol for case in cases for symbol in case.symbols]
+    free_size = sum(q.size for q in freed)
+    x = ca.MX.sym("x", free_size + sum(symbol.numel() for symbol in unknowns))
+    p = ca.MX.sym("p", sum(q.size for q in fixed))
+    originals = [*(q.symbol for q in freed), *unknowns, *(q.symbol for q in fixed)]
+    heads = [q.scale for q in freed] + [1.0] * len(unknowns)
+    pieces = [scale * part for scale, part in zip(heads, _split(x, originals[: len(heads)]), strict=True)]
+    pieces += _split(p, originals[len(heads) :])
+
+    def function(name: str, expressions: Sequence[ca.MX], names: Sequence[str] | None = None) -> ca.Function:
+        inner = ca.Function(name, originals, [ca.densify(ca.MX(e)) for e in expressions])
+        results = inner.call(pieces, True, False)
+        return ca.Function(name, [x, p], results, ["x", "p"], list(names)) if names else ca.Function(name, [x, p], results)
+
+    rows = [c.expression / c.scale for c in constraints]
+    residual = function("residual", [ca.vertcat(*(case.residuals for case in cases), *map(ca.vec, rows))])
+    fine = function("fine", [ca.vertcat(*(case.fine_residuals for case in cases), *map(ca.vec, rows))])
+    cost = function("cost", [objective])(x, p) if objective is not None else ca.MX(0)
+    g = residual(x, p)
+    jacobian = ca.Function("jacobian", [x, p], [ca.jacobian(g, x)])
+
+    equations = _all_equations(cases, constraints)
+    lower_g, upper_g = np.zeros(g.numel()), np.zeros(g.numel())
+    start = sum(case.residuals.numel() for case in cases)
+    for c in constraints:
+        stop = start + c.expression.numel()
+        lower_g[start:stop], upper_g[start:stop] = c.lower, c.upper
+        start = stop
+    states = x.numel() - free_size
+    compiled = CompiledProblem(
+        cases=tuple(cases),
+        free=freed,
+        fixed=fixed,
+        constraints=tuple(constraints),
+        equations=equations,
+        nlp={"x": x, "p": p, "f": cost, "g": g},
+        residual=residual,
+        fine_residual=fine,
+        jacobian=jacobian,
+        si_scales=function("si_scales", [ca.vertcat(*(e.si_scale for e in equations))]),
+        outputs=_outputs(function, cases),
+        case_constants=function("constants", [ca.vertcat(*(case.constants for case in cases))]),
+        units=function("units", [ca.vertcat(*(ca.vertcat(case.length_unit, case.force_unit) for case in cases))]),
+        lower_x=np.concatenate([*(np.full(q.size, q.lower / q.scale) for q in freed), np.full(states, -np.inf)]),
+        upper_x=np.concatenate([*(np.full(q.size, q.upper / q.scale) for q in freed), np.full(states, np.inf)]),
+        lower_g=lower_g,
+        upper_g=upper_g,
+        is_square=objective is None and g.numel() == x.numel() and all(c.is_equality for c in constraints),
+    )
+    _refuse_ill_posed(compiled, objective is not None)
+    return compiled
+
+
+def _split(column: ca.MX, like: Sequence[ca.MX]) -> list[ca.MX]:
+    """Cut a column into pieces of the sizes of `like`."""
+    if not like:
+        return []
+    return list(ca.vertsplit(column, np.cumsum([0, *(s.numel() for s in like)]).tolist()))
+
+
+def _outputs(function: Any, cases: Sequence[LoadCase]) -> ca.Function:
+    """Return the outputs of every case; names are prefixed by the case's name when there are several."""
+    names = [key if len(cases) == 1 else f"{case.name}_{key}" for case in cases for key in case.outputs]
+    made: ca.Function = function("outputs", [e for case in cases for e in case.outputs.values()], names)
+    return made
+
+
+def _all_equations(cases: Sequence[LoadCase], constraints: Sequence[Constraint]) -> tuple[Equation, ...]:
+    """Stack the equations of the cases and constraints, with rows counted in the whole residual."""
+    every: list[Equation] = []
+    start = 0
+    for case in cases:
+        prefix = "" if len(cases) == 1 else f"{case.name}: "
+        every += [replace(e, name=prefix + e.name, rows=e.rows + start) for e in case.equations]
+        start += case.residuals.numel()
+    for c in constraints:
+        every.append(Equation(c.name, start + np.arange(c.expression.numel()), c.unit, ca.MX(c.scale)))
+        start += c.expression.numel()
+    return tuple(every)
+
+
+def _refuse_ill_posed(problem: CompiledProblem, has_objective: bool) -> None:
+    """Raise `IllPosedError` where counting or the structure of the Jacobian shows that there is no isolated answer."""
+    equal = problem.lower_g == problem.upper_g
+    J = problem.jacobian.sparsity_out(0)
+    added = sum(c.expression.numel() for c in problem.constraints if c.is_equality)
+    freed = problem.free_size
+    free_text = ", ".join(f"{q.name} ({q.size})" for q in problem.free) or "nothing"
+    added_text = ", ".join(f"{c.name} ({c.expression.numel()})" for c in problem.constraints if c.is_equality) or "none"
+
+    r, c = (np.asarray(index, dtype=int) for index in J.get_triplet())
+    entries_in_row = np.bincount(r, minlength=J.size1())
+    entries_in_column = np.bincount(c, minlength=J.size2())
+    for equation in problem.equations[-len(problem.constraints) :] if problem.constraints else ():
+        if not np.all(entries_in_row[equation.rows]):
+            raise IllPosedError(
+                f"constraint '{equation.name}' does not depend on anything unknown; free a quantity that moves it"
+            )
+    if added > freed:
+        raise IllPosedError(
+            f"too many equations: free are {free_text}, and the constraints add {added} equations: {added_text}; "
+            "free more quantities, or make a constraint an objective"
+        )
+    if added < freed and not has_objective:
+        raise IllPosedError(
+            f"too few equations: free are {free_text}, and the constraints add {added} equations: {added_text}; "
+            "fix a quantity, add a constraint or give an objective"
+        )
+    rows = np.flatnonzero(equal).tolist()
+    equalities = J.sub(rows, list(range(J.size2())))[0]
+    rank = ca.sprank(ca.DM(equalities, 1))
+    if rank < len(rows):
+        raise IllPosedError(
+            f"the constraints {added_text} cannot all be met by freeing {free_text}: they move {len(rows) - rank} "
+            "combination(s) of unknowns too few; free a quantity that enters them"
+        )
+    start = 0
+    for q in problem.free:
+        columns = list(range(start, start + q.size))
+        start += q.size
+        idle = [k for k in columns if not entries_in_column[k]]
+        if idle and (not has_objective or len(idle) == q.size):
+            raise IllPosedError(f"'{q.name}' is free but enters no equation, so nothing determines it; fix it")

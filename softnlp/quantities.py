@@ -1,0 +1,127 @@
+"""Physical quantities as named symbols: one model whose numbers may be fixed, swept or unknown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.materials import Material
+from softnlp.robot import DIMENSIONS, Robot
+from softnlp.section import deform
+
+Array = NDArray[np.float64]
+_INF = float("inf")
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """A named physical quantity.
+
+    symbol : MX column of `size` entries, SI. nominal : its value when fixed and its first guess when free.
+    scale : typical size, which makes the unknown of order one. lower, upper : bounds when free.
+    """
+
+    name: str
+    unit: str
+    symbol: ca.MX
+    nominal: Array
+    scale: float = 1.0
+    lower: float = -_INF
+    upper: float = _INF
+
+    @property
+    def size(self) -> int:
+        """The number of entries."""
+        return int(self.nominal.size)
+
+
+def quantity(
+    name: str, unit: str, nominal: Any, *, scale: float = 1.0, lower: float = -_INF, upper: float = _INF
+) -> Quantity:
+    """Declare a quantity; `nominal` is a number or a flat sequence in SI units."""
+    value = np.atleast_1d(np.asarray(nominal, dtype=float)).ravel()
+    return Quantity(name, unit, ca.MX.sym(name, value.size), value, scale, lower, upper)
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A robot, its silicone, and how the equations are read. Numbers here are the nominal values of quantities."""
+
+    robot: Robot
+    material: Material
+    coefficients: Coefficients = Coefficients()
+    conventions: Conventions = REPRODUCTION
+
+
+_SIZES = tuple(d.field for d in DIMENSIONS if d.scale is not None)
+_COEFFICIENT_NAMES = {
+    "elongation": "stiffening.elongation",
+    "bending": "stiffening.bending",
+    "area": "corrections.area",
+    "inertia": "corrections.inertia",
+    "bore_fraction": "corrections.bore_fraction",
+}
+
+
+def quantities(model: Model) -> dict[str, Quantity]:
+    """Return every quantity of the model by name, with the model's values as nominal ones.
+
+    "pressure" (one entry a set, Pa), "tip_force" (N), "tip_moment" (N m), "gravity" (m/s^2), "robot.<dimension>" (m or rad),
+    "material.<constant>", "material.density", "stiffening.elongation", "stiffening.bending", "corrections.area",
+    "corrections.inertia", "corrections.bore_fraction".
+    """
+    robot, material = model.robot, model.material
+    declared = [
+        quantity("pressure", "Pa", np.zeros(robot.chamber_sets), scale=1e5, lower=0.0),
+        quantity("tip_force", "N", np.zeros(3)),
+        quantity("tip_moment", "N m", np.zeros(3), scale=1e-2),
+        quantity("gravity", "m/s^2", np.zeros(3), scale=10.0),
+    ]
+    for name in _SIZES:
+        value = float(getattr(robot, name))
+        unit = "rad" if name == "chamber_angle" else "m"
+        declared.append(quantity(f"robot.{name}", unit, value, scale=max(abs(value), 1e-4), lower=0.0))
+    for constant in material.law.constants:
+        value = float(material.constants[constant.name])
+        unit = "Pa" if constant.unit == "MPa" else constant.unit
+        declared.append(quantity(f"material.{constant.name}", unit, value, scale=abs(value) or 1.0))
+    declared.append(quantity("material.density", "kg/m^3", float(material.density), scale=1e3, lower=0.0))
+    for field_name, name in _COEFFICIENT_NAMES.items():
+        declared.append(quantity(name, "1", float(getattr(model.coefficients, field_name)), lower=0.0))
+    return {q.name: q for q in declared}
+
+
+def with_symbols(model: Model, values: Mapping[str, Any]) -> Model:
+    """Return the model with the named quantities (see `quantities`) in place of its numbers."""
+    robot = replace(model.robot, **{name: values[f"robot.{name}"] for name in _SIZES})
+    constants = {c.name: values[f"material.{c.name}"] for c in model.material.law.constants}
+    material = replace(model.material, constants=constants, density=values["material.density"])
+    coefficients = replace(model.coefficients, **{k: values[name] for k, name in _COEFFICIENT_NAMES.items()})
+    return Model(robot, material, coefficients, model.conventions)
+
+
+def section_function(model: Model, build: Callable[[Model, Any, Any, Any], Sequence[Any]]) -> ca.Function:
+    """Compile `build(model, pressures, gravity, stretch)` for symbols in place of the model's numbers.
+
+    Returns a function of (every quantity of `quantities(model)` in that order as one column, stretch) with the expressions
+    that `build` returns, made of scalar operations so that it costs one call in a larger graph.
+    """
+    declared = quantities(model)
+    symbols = {name: ca.SX.sym(name, q.size) for name, q in declared.items()}
+    stretch = ca.SX.sym("stretch")
+    results = build(with_symbols(model, symbols), symbols["pressure"], symbols["gravity"], stretch)
+    return ca.Function("section", [ca.vertcat(*symbols.values()), stretch], list(results), {"cse": True})
+
+
+def force_unit(model: Model) -> Any:
+    """Return EI / L_0^2 [N], with EI the mean bending stiffness of the section without pressure."""
+    rest = deform(
+        model.robot, model.material, [0.0] * model.robot.chamber_sets, 1.0, model.coefficients, model.conventions
+    )
+    return (rest.bending_stiffness[0] + rest.bending_stiffness[1]) / 2 / model.robot.length**2

@@ -1,0 +1,29 @@
+"""What a run leaves behind: JSON, netCDF, CSV, a table for the terminal, and a view that figures are drawn from.
+
+Files carry the unit in the name of a number; the package itself stays in SI.
+"""
+
+from softnlp.results.csv_table import table_text, write_table
+from softnlp.results.dataset import netcdf_bytes, to_dataset
+from softnlp.results.document import json_text, to_json
+from softnlp.results.files import write_whole
+from softnlp.results.folder import load_run, save
+from softnlp.results.terminal import table_lines
+from softnlp.results.view import Body, RunView, view_of_dataset, view_of_run
+
+__all__ = [
+    "Body",
+    "RunView",
+    "json_text",
+    "load_run",
+    "netcdf_bytes",
+    "save",
+    "table_lines",
+    "table_text",
+    "to_dataset",
+    "to_json",
+    "view_of_dataset",
+    "view_of_run",
+    "write_table",
+    "write_whole",
+]

@@ -1,0 +1,187 @@
+"""A run as a self-describing netCDF dataset, with the shape of every step."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.results.fields import (
+    DOCUMENT_FIELDS,
+    SECTION_FIELDS,
+    SHAPE_FIELDS,
+    STABLE,
+    Field,
+    solved_pose,
+)
+from softnlp.results.inputs import (
+    coefficients_table,
+    conventions_table,
+    loads_table,
+    material_table,
+    pressure_bar,
+    robot_table,
+    versions,
+)
+from softnlp.studies.step import Run, Step
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+Variable = tuple[tuple[str, ...], Any, dict[str, Any]]
+
+AXES = ("x", "y", "z")
+STABLE_FLAGS = {"not_solved": -1, "unstable": 0, "stable": 1}
+
+
+def to_dataset(run: Run) -> xr.Dataset:
+    """Return a run as a dataset; every variable has `units` and `long_name`, every name its unit.
+
+    Dimensions: `step`, `set` and `chamber` count from 1; `axis`, `row` (world) and `col` (body) are x, y, z; `s` runs
+    along the rod, with the coordinate `s` = s/L where all solved steps share it (else see `arc`); `equation` names the
+    lines of the certificate. Numbers of a step without a solution are NaN (`stable` is -1).
+    """
+    import xarray as xr
+
+    steps = run.steps
+    sizes = {
+        "axis": 3,
+        "row": 3,
+        "col": 3,
+        "chamber": run.robot.chambers,
+        "s": max((p.shape.arc.size for step in steps if (p := solved_pose(step))), default=0),
+    }
+    variables: dict[str, Variable] = {
+        "pressure_bar": (
+            ("step", "set"),
+            [pressure_bar(step.pressure) for step in steps],
+            _attributes("bar", "gauge pressure of each chamber set"),
+        ),
+        "status": (("step",), _text([s.status.value for s in steps]), _attributes("1", "how the step ended")),
+        "message": (("step",), _text([s.message for s in steps]), _attributes("1", "the same in words")),
+        "residual": (
+            ("step",),
+            [_number(s.residual) for s in steps],
+            _attributes("1", "largest equation error: force by EI/L^2, moment by EI/L, length by L"),
+        ),
+        "warnings": (
+            ("step",),
+            _text(["; ".join(s.warnings) for s in steps]),
+            _attributes("1", "warnings of the step"),
+        ),
+    }
+    for field in (*DOCUMENT_FIELDS, *SECTION_FIELDS, *SHAPE_FIELDS):
+        variables[field.name] = _variable(field, steps, sizes)
+    variables |= _certificate(steps)
+    return xr.Dataset(variables, coords=_coordinates(run, variables["arc"][1]), attrs=_global_attributes(run))
+
+
+def netcdf_bytes(run: Run) -> bytes:
+    """Return the netCDF file of a run.
+
+    It is made in memory: HDF5 writing to a full disk ends the interpreter instead of raising.
+    """
+    content = to_dataset(run).to_netcdf(engine="h5netcdf")
+    return bytes(content)
+
+
+def _attributes(unit: str, meaning: str, **more: Any) -> dict[str, Any]:
+    return {"units": unit, "long_name": meaning, **more}
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else float(value)
+
+
+def _text(values: Sequence[str]) -> NDArray[np.object_]:
+    return np.array(values, dtype=object)
+
+
+def _variable(field: Field, steps: Sequence[Step], sizes: dict[str, int]) -> Variable:
+    """Return a field over the steps; a shape with fewer points than another is filled up with NaN at the tip."""
+    dims = ("step", *field.dims)
+    if field.name == STABLE:
+        flags = [STABLE_FLAGS["not_solved"] if (p := solved_pose(s)) is None else int(field.of(s, p)) for s in steps]
+        values = np.array(flags, dtype=np.int8)
+        meanings = {
+            "flag_values": np.array(list(STABLE_FLAGS.values()), np.int8),
+            "flag_meanings": " ".join(STABLE_FLAGS),
+        }
+        return dims, values, _attributes(field.unit, field.meaning, **meanings)
+    array = np.full((len(steps), *(sizes[d] for d in field.dims)), np.nan)
+    for k, step in enumerate(steps):
+        pose = solved_pose(step)
+        value = None if pose is None else field.of(step, pose)
+        if value is not None:
+            value = np.asarray(value, dtype=float)
+            array[k, ...][tuple(slice(n) for n in value.shape)] = value
+    return dims, array, _attributes(field.unit, field.meaning)
+
+
+def _certificate(steps: Sequence[Step]) -> dict[str, Variable]:
+    """Return the certificates as (step, equation), the equations in order of first appearance."""
+    units = {line.equation: line.unit for step in steps for line in step.certificate}
+    column = {equation: k for k, equation in enumerate(units)}
+    values = np.full((2, len(steps), len(units)), np.nan)
+    for k, step in enumerate(steps):
+        for line in step.certificate:
+            values[:, k, column[line.equation]] = line.value, line.scaled
+    dims = ("step", "equation")
+    return {
+        "certificate": (dims, values[0], _attributes("see equation_unit", "largest error of each equation")),
+        "certificate_scaled": (
+            dims,
+            values[1],
+            _attributes("1", "the same: force by EI/L^2, moment by EI/L, length by L"),
+        ),
+        "equation_unit": (("equation",), _text(list(units.values())), _attributes("1", "unit of the certificate")),
+        "equation": (("equation",), _text(list(units)), _attributes("1", "equation of the certificate")),
+    }
+
+
+def _coordinates(run: Run, arc: Array) -> dict[str, Variable]:
+    robot = run.robot
+    axes = {"axis": "axis", "row": "world axis", "col": "body axis"}
+    coordinates: dict[str, Variable] = {
+        "step": (("step",), np.arange(1, len(run.steps) + 1), _attributes("1", "step of the run, from 1")),
+        "set": (("set",), np.arange(1, robot.chamber_sets + 1), _attributes("1", "chamber set, from 1")),
+        "chamber": (("chamber",), np.arange(1, robot.chambers + 1), _attributes("1", "chamber, set by set, from 1")),
+        "chamber_set": (
+            ("chamber",),
+            np.array(robot.set_of_chamber) + 1,
+            _attributes("1", "set of each chamber, from 1"),
+        ),
+        **{name: ((name,), list(AXES), _attributes("1", meaning)) for name, meaning in axes.items()},
+    }
+    if any(step.time is not None for step in run.steps):
+        times = [_number(step.time) for step in run.steps]
+        coordinates["t_s"] = (("step",), times, _attributes("s", "time of the step"))
+    solved = arc[~np.isnan(arc[:, :1]).all(axis=1)]
+    if len(solved) and (solved == solved[0]).all():
+        coordinates["s"] = (("s",), solved[0], _attributes("1", "position along the rod s/L, from base to tip"))
+    return coordinates
+
+
+def _global_attributes(run: Run) -> dict[str, str]:
+    tables = {
+        "robot": robot_table(run.robot),
+        "material": material_table(run.material),
+        "coefficients": coefficients_table(run.coefficients),
+        "loads": loads_table(run.loads),
+        "versions": versions(),
+        "conventions_in_full": conventions_table(run.conventions),
+        "warnings": list(run.warnings),
+    }
+    return {
+        "title": run.title,
+        "study": run.study,
+        "conventions": run.conventions.name,
+        "softnlp": versions()["softnlp"],
+        **{name: json.dumps(table, ensure_ascii=False, allow_nan=False) for name, table in tables.items()},
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+    }

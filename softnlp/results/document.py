@@ -1,0 +1,78 @@
+"""A run as one JSON document: the names and units that people's scripts rely on."""
+
+from __future__ import annotations
+
+import json
+import re
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from softnlp.results.fields import DOCUMENT_FIELDS, solved_pose
+from softnlp.results.inputs import (
+    coefficients_table,
+    loads_table,
+    material_table,
+    package_version,
+    pressure_bar,
+    robot_table,
+    tidy,
+)
+from softnlp.studies.step import Run, Step
+
+
+def to_json(run: Run) -> dict[str, Any]:
+    """Return a run as plain dicts, lists, strings, numbers and None; no NaN or infinity.
+
+    A step without a solution keeps pressure, time, status, message, residual, certificate and warnings; its other
+    numbers are None.
+    """
+    return {
+        "softnlp": package_version(),
+        "title": run.title,
+        "study": run.study,
+        "conventions": run.conventions.name,
+        "robot": robot_table(run.robot),
+        "material": material_table(run.material),
+        "coefficients": coefficients_table(run.coefficients),
+        "loads": loads_table(run.loads),
+        "warnings": list(run.warnings),
+        "steps": [_step(step) for step in run.steps],
+    }
+
+
+def json_text(run: Run) -> str:
+    """Return the document of `to_json` as text, ending in a newline."""
+    text = json.dumps(to_json(run), indent=2, ensure_ascii=False, allow_nan=False)
+    # A list of numbers goes on one line; strings hold no bare newline, so none is touched.
+    return re.sub(r"\[\n\s+([^\[\]{}\"]*?)\n\s+\]", lambda m: f"[{' '.join(m[1].split())}]", text) + "\n"
+
+
+def _step(step: Step) -> dict[str, Any]:
+    pose = solved_pose(step)
+    table: dict[str, Any] = {"pressure_bar": pressure_bar(step.pressure)}
+    if step.time is not None:
+        table["t_s"] = tidy(step.time)
+    table["status"] = step.status.value
+    table["message"] = step.message
+    for field in DOCUMENT_FIELDS:
+        table[field.name] = None if pose is None else _plain(field.of(step, pose))
+    table["residual"] = _plain(step.residual)
+    table["certificate"] = [
+        {"equation": line.equation, "value": _plain(line.value), "unit": line.unit, "scaled": _plain(line.scaled)}
+        for line in step.certificate
+    ]
+    table["warnings"] = list(step.warnings)
+    return table
+
+
+def _plain(value: Any) -> Any:
+    """Return numbers and arrays as JSON has them: Python's own types, None for what is not finite."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not isfinite(value):
+        return None
+    return value

@@ -1,0 +1,124 @@
+"""A run as a table for the terminal."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+from softnlp.results.fields import solved_pose
+from softnlp.studies.step import Run, Step
+from softnlp.units import BAR, DEGREE, MILLIMETRE
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+NONE = "-"
+
+
+def table_lines(run: Run) -> Group:
+    """Return a table of the steps and, below it, why steps failed and what to be warned of; print it with rich.
+
+    With three chamber sets it fits 100 columns; colours are added to words, never instead of them.
+    """
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+    steps, sets = run.steps, run.robot.chamber_sets
+    timed = any(step.time is not None for step in steps)
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=0, show_edge=False)
+    table.add_column("step", justify="right", no_wrap=True)
+    headers = ["t\n[s]"] * timed + [f"p{k + 1}\n[bar]" for k in range(sets)]
+    for header in headers:
+        table.add_column(Text(header), justify="right", no_wrap=True)
+    table.add_column("status", overflow="fold", min_width=6)
+    numbers = [
+        "bending\n[deg]",
+        "tip x\n[mm]",
+        "y\n[mm]",
+        "z\n[mm]",
+        "stretch",
+        "stable",
+        "resid.",
+        "error",
+        "time\n[s]",
+    ]
+    for header in numbers:
+        table.add_column(Text(header), justify="right", no_wrap=True)
+
+    pressures = _alike([p / BAR for step in steps for p in step.pressure], most=3)
+    times = _alike([step.time for step in steps if step.time is not None], most=2)
+    for k, step in enumerate(steps):
+        cells = [str(k + 1)]
+        if timed:
+            cells.append(NONE if step.time is None else format(step.time, times))
+        cells += [format(p / BAR, pressures) for p in step.pressure]
+        style = "" if step.status.has_solution else "red"
+        table.add_row(*cells, Text(step.status.value, style), *_numbers(step))
+
+    lines = [Text(line, style) for line, style in _notes(run)]
+    return Group(table, *lines)
+
+
+def _numbers(step: Step) -> list[str]:
+    """Return what follows the status; residual and time are known of failed steps as well."""
+    pose = solved_pose(step)
+    residual = _short(step.residual)
+    if pose is None:
+        return [*[NONE] * 6, residual, NONE, f"{step.solve_time:.3g}"]
+    return [
+        f"{pose.bending_angle / DEGREE:.2f}",
+        *(_millimetres(v) for v in pose.tip_position),
+        f"{pose.stretch:.3f}",
+        "yes" if pose.stable else "no",
+        residual,
+        _short(step.discretisation_error),
+        f"{step.solve_time:.3f}",
+    ]
+
+
+def _notes(run: Run) -> Iterator[tuple[str, str]]:
+    """Yield (line, style) of failures and warnings, neighbouring steps with the same words on one line."""
+    failed = [(k, f"{s.status.value}: {s.message}") for k, s in enumerate(run.steps, start=1) if s in run.failed]
+    warned = [(k, f"warning: {text}") for k, s in enumerate(run.steps, start=1) for text in s.warnings]
+    yield from ((line, "red") for line in _grouped(failed))
+    yield from ((f"warning: {text}", "yellow") for text in run.warnings)
+    yield from ((line, "yellow") for line in _grouped(warned))
+
+
+def _grouped(notes: Sequence[tuple[int, str]]) -> Iterator[str]:
+    """Yield "steps 3-5 …" for neighbouring steps whose words differ in numbers only; those of the first are shown."""
+    alike: dict[str, list[tuple[int, str]]] = {}
+    for number, text in notes:
+        alike.setdefault(re.sub(r"\d[\d.]*(e[+-]?\d+)?", "#", text), []).append((number, text))
+    found = []
+    for group in alike.values():
+        # Steps that count up together share the difference to their place in the list.
+        for _, pairs in groupby(enumerate(group), key=lambda pair: pair[1][0] - pair[0]):
+            found.append([note for _, note in pairs])
+    for members in sorted(found):
+        (first, text), (last, last_text) = members[0], members[-1]
+        if first == last:
+            yield f"step {first} {text}"
+        else:
+            yield f"steps {first}-{last} {text}" + (f" (numbers of step {first})" if last_text != text else "")
+
+
+def _millimetres(value: float) -> str:
+    text = f"{value / MILLIMETRE:.2f}"
+    return text.removeprefix("-") if float(text) == 0 else text
+
+
+def _short(value: float | None) -> str:
+    return NONE if value is None or value != value else f"{value:.0e}"
+
+
+def _alike(values: Sequence[float], most: int) -> str:
+    """Return one format for all values: as many decimals as they need, at most `most`."""
+    for decimals in range(most):
+        if all(abs(value - round(value, decimals)) < 1e-9 for value in values):
+            return f".{decimals}f"
+    return f".{most}f"

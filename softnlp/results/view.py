@@ -1,0 +1,139 @@
+"""What a figure of a run needs, as arrays in SI: the same from a run just solved and from its netCDF file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.results.dataset import STABLE_FLAGS
+from softnlp.results.fields import solved_pose
+from softnlp.results.inputs import loads_of_table, robot_of_table
+from softnlp.robot import Robot
+from softnlp.rod import Loads
+from softnlp.status import Status
+from softnlp.studies.step import Run, SectionRadii
+from softnlp.units import BAR, DEGREE, MILLIMETRE
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """The body of one solved step.
+
+    position : (M, 3) p [m]. rotation : (M, 3, 3) R, columns are the body axes. radii : of the deformed section.
+    """
+
+    position: Array
+    rotation: Array
+    radii: SectionRadii
+
+
+@dataclass(frozen=True, eq=False)
+class RunView:
+    """A run as figures see it; S steps, NaN and None where a step has no solution.
+
+    material : its name and law. pressure : (S, sets) [Pa]. time : (S,) [s] or None.
+    stable : (S,), False where unsolved. stretch : (S,). bending_angle : (S,) [rad]. backbone_length : (S,) [m].
+    bodies : S entries.
+    """
+
+    title: str
+    study: str
+    material: str
+    conventions: str
+    robot: Robot
+    loads: Loads
+    status: tuple[Status, ...]
+    pressure: Array
+    time: Array | None
+    stable: NDArray[np.bool_]
+    stretch: Array
+    bending_angle: Array
+    backbone_length: Array
+    bodies: tuple[Body | None, ...]
+
+    @property
+    def solved(self) -> tuple[int, ...]:
+        """Indices of the steps that carry a solution."""
+        return tuple(k for k, body in enumerate(self.bodies) if body is not None)
+
+
+def view_of_run(run: Run) -> RunView:
+    """Return the view of a run."""
+    poses = [solved_pose(step) for step in run.steps]
+    times = [float("nan") if step.time is None else step.time for step in run.steps]
+
+    def series(name: str) -> Array:
+        return np.array([float("nan") if pose is None else getattr(pose, name) for pose in poses], dtype=float)
+
+    return RunView(
+        title=run.title,
+        study=run.study,
+        material=_material_label(run.material.name, run.material.law.name),
+        conventions=run.conventions.name,
+        robot=run.robot,
+        loads=run.loads,
+        status=tuple(step.status for step in run.steps),
+        pressure=np.array([step.pressure for step in run.steps], dtype=float),
+        time=None if np.all(np.isnan(times)) else np.array(times),
+        stable=np.array([pose is not None and pose.stable for pose in poses]),
+        stretch=series("stretch"),
+        bending_angle=series("bending_angle"),
+        backbone_length=series("backbone_length"),
+        bodies=tuple(None if p is None else Body(p.shape.position, p.shape.rotation, p.radii) for p in poses),
+    )
+
+
+def view_of_dataset(dataset: xr.Dataset) -> RunView:
+    """Return the view of a dataset of `to_dataset`, as it is in memory or read back.
+
+    Raises
+    ------
+    KeyError, ValueError, TypeError
+        When a variable or an attribute is missing or not what `to_dataset` writes.
+    """
+    attributes = dataset.attrs
+    material = json.loads(attributes["material"])
+    values = {str(name): variable.values for name, variable in dataset.variables.items()}
+    steps = range(dataset.sizes["step"])
+    status = tuple(Status(str(word)) for word in values["status"])
+    return RunView(
+        title=str(attributes["title"]),
+        study=str(attributes["study"]),
+        material=_material_label(material["name"], material["model"]),
+        conventions=str(attributes["conventions"]),
+        robot=robot_of_table(json.loads(attributes["robot"])),
+        loads=loads_of_table(json.loads(attributes["loads"])),
+        status=status,
+        pressure=values["pressure_bar"] * BAR,
+        time=values.get("t_s"),
+        stable=values["stable"] == STABLE_FLAGS["stable"],
+        stretch=values["stretch"],
+        bending_angle=values["bending_angle_deg"] * DEGREE,
+        backbone_length=values["backbone_length_mm"] * MILLIMETRE,
+        bodies=tuple(_body(values, k) if status[k].has_solution else None for k in steps),
+    )
+
+
+def _body(values: Mapping[str, Any], k: int) -> Body | None:
+    points = np.isfinite(values["arc"][k])
+    if not points.any():
+        return None
+    radii = {
+        name: float(values[f"{name}_radius_mm"][k]) * MILLIMETRE
+        for name in ("outer", "lumen", "chamber_circle", "chamber", "bore")
+    }
+    return Body(values["position_mm"][k][points] * MILLIMETRE, values["rotation"][k][points], SectionRadii(**radii))
+
+
+def _material_label(name: str, law: str) -> str:
+    return f"{name}, {law}"

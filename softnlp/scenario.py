@@ -1,0 +1,263 @@
+"""A scenario file, read and checked, as plain data in SI units."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.contact_settings import ClosureWeights, ContactSettings
+from softnlp.conventions import COEFFICIENT_SETS, CONVENTIONS, Coefficients, Conventions
+from softnlp.errors import InputError, nearest
+from softnlp.materials import Material, material_from_table
+from softnlp.numerics import Numerics
+from softnlp.pressures import pressure_path
+from softnlp.reading import LONGEST_NAME, one_line, read_text, shown
+from softnlp.robot import DIMENSIONS, ROBOTS, Robot, Violation, check, violations
+from softnlp.rod import Loads
+from softnlp.scenario_check import first_of, parse
+from softnlp.scenario_schema import BlockedForceFile, ContactTable, ForwardFile, RobotTable
+from softnlp.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """Everything that a scenario file asks for, in SI units.
+
+    path : the file as it was named. text : its content. title : the file's stem when it gives none.
+    pressures : (steps, sets) gauge [Pa]. times : (steps,) [s], or None when the pressures have none.
+    contact : of a blocked force, else None. warnings : rules of manufacture that the robot breaks with leave.
+    """
+
+    path: Path
+    text: str
+    title: str
+    study: str
+    robot: Robot
+    material: Material
+    coefficients: Coefficients
+    conventions: Conventions
+    loads: Loads
+    pressures: Array
+    times: Array | None
+    numerics: Numerics
+    contact: ContactSettings | None
+    warnings: tuple[str, ...]
+
+
+def load_scenario(path: str | PathLike[str]) -> Scenario:
+    """Read and check a scenario file; files that it names are looked for in its folder.
+
+    Raises
+    ------
+    InputError
+        On one line, naming the file, the table and the key of the first error and counting the others.
+    """
+    try:
+        text = read_text(Path(path))
+    except InputError as error:
+        raise _placed(error, fspath(path)) from None
+    return scenario_from_text(text, path)
+
+
+def scenario_from_text(text: str, path: str | PathLike[str]) -> Scenario:
+    """Check the text of a scenario; `path` names it in errors, and its folder holds the files that it names.
+
+    Raises
+    ------
+    InputError
+        As `load_scenario`.
+    """
+    try:
+        return _scenario(text, Path(path))
+    except InputError as error:
+        raise _placed(error, fspath(path)) from None
+
+
+def robot_of_scenario(path: str | PathLike[str]) -> tuple[Robot, tuple[Violation, ...]]:
+    """Return the robot of a scenario file and the rules of manufacture that it breaks, whether allowed or not.
+
+    Raises
+    ------
+    InputError
+        As `load_scenario`, for everything but those rules.
+    """
+    try:
+        file = parse(_toml(read_text(Path(path))))
+        robot = _dimensions(file.robot)
+        return robot, violations(robot, file.robot.minimum_wall_mm * MILLIMETRE)
+    except InputError as error:
+        raise _placed(error.located(table="robot"), fspath(path)) from None
+
+
+def _scenario(text: str, path: Path) -> Scenario:
+    """Build a scenario; errors do not name the file yet."""
+    data = _toml(text)
+    file = parse(data)
+    errors: list[InputError] = []
+    made = _attempt(errors, "robot", lambda: _robot(file.robot))
+    chosen = _attempt(errors, "material", lambda: material_from_table(data["material"], folder=path.parent))
+    steps = made and _attempt(
+        errors, "pressure", lambda: pressure_path(file.pressure, made[0].chamber_sets, path.parent)
+    )
+    contact = None
+    if isinstance(file, BlockedForceFile):
+        contact = _attempt(errors, "contact", lambda: _contact(file.contact))
+    if errors or made is None or chosen is None or steps is None:
+        raise first_of(errors)
+    robot, warnings = made
+    return Scenario(
+        path=path,
+        text=text,
+        title=file.title or path.stem,
+        study=file.study,
+        robot=robot,
+        material=chosen,
+        coefficients=_coefficients(file),
+        conventions=CONVENTIONS[file.corrections.conventions],
+        loads=_loads(file),
+        pressures=steps.pressures,
+        times=steps.times,
+        numerics=Numerics(**dict(file.solver)),
+        contact=contact,
+        warnings=warnings,
+    )
+
+
+def _attempt(errors: list[InputError], table: str, build: Callable[[], T]) -> T | None:
+    """Return what is built, or None with the error added to the others."""
+    try:
+        return build()
+    except InputError as error:
+        errors.append(error.located(table=table) if error.source is None else _quoted(error, table))
+        return None
+
+
+def _quoted(error: InputError, table: str) -> InputError:
+    """Quote an error that names another file, as one of the key that names that file."""
+    return type(error)(str(error), table=table, key="file")
+
+
+def _placed(error: InputError, source: str) -> InputError:
+    """Name the file; whatever it quotes stays printable and on the same line."""
+    table = error.table and one_line(error.table, LONGEST_NAME)
+    key = error.key and one_line(error.key, LONGEST_NAME)
+    return type(error)(one_line(error.message), source=one_line(source), table=table, key=key)
+
+
+def _toml(text: str) -> dict[str, Any]:
+    """Parse TOML 1.0."""
+    if not text.strip():
+        raise InputError("expected a scenario, got an empty file")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise InputError("not valid TOML: nested too deeply") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"not valid TOML: {error}") from None
+    except ValueError:  # of int
+        raise InputError("not valid TOML: a number has thousands of digits") from None
+
+
+def _robot(table: RobotTable) -> tuple[Robot, tuple[str, ...]]:
+    """Return the robot and its warnings."""
+    robot = _dimensions(table)
+    try:
+        return robot, check(robot, allow=table.allow, minimum_wall=table.minimum_wall_mm * MILLIMETRE)
+    except InputError as error:
+        file_keys = {d.field: d.file_key for d in DIMENSIONS}
+        raise type(error)(error.message, key=file_keys.get(error.key or "", error.key)) from None
+
+
+def _dimensions(table: RobotTable) -> Robot:
+    """Return the robot of the table, whether it can be made or not."""
+    given: dict[str, Any] = {}
+    for dimension in DIMENSIONS:
+        value = getattr(table, dimension.file_key)
+        if value is not None:
+            given[dimension.field] = value if dimension.scale is None else value * dimension.scale
+    missing = [d.file_key for d in DIMENSIONS if d.field not in given]
+    if table.name is not None and table.name in ROBOTS:
+        changed = any(getattr(ROBOTS[table.name], key) != value for key, value in given.items())
+        return replace(ROBOTS[table.name], **given, name=f"{table.name} (modified)" if changed else table.name)
+    if not missing:
+        return Robot(name=table.name or "robot", **given)
+    if table.name is not None:
+        full = f" (missing: {', '.join(missing)})" if given else ""
+        raise InputError(
+            f"expected a robot of the library, or every dimension in full{full}, got {shown(table.name)}"
+            f"{nearest(table.name, ROBOTS)}",
+            key="name",
+        )
+    if given:
+        raise InputError("missing; without a name every dimension is needed", key=", ".join(missing))
+    raise InputError("missing; expected a robot of the library, or every dimension in full", key="name")
+
+
+def _coefficients(file: ForwardFile) -> Coefficients:
+    """Take the coefficients of the named set, and the file's own where it gives them."""
+    given = {
+        "elongation": file.stiffening.elongation,
+        "bending": file.stiffening.bending,
+        "area": file.corrections.area,
+        "inertia": file.corrections.inertia,
+        "bore_fraction": file.corrections.bore_fraction,
+    }
+    if isinstance(file, BlockedForceFile):
+        given["chamber_reaction"] = file.contact.chamber_reaction
+    own: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
+    return replace(COEFFICIENT_SETS[file.stiffening.set], **own)
+
+
+def _loads(file: ForwardFile) -> Loads:
+    """Return tip load and gravity."""
+    f_x, f_y, f_z = file.tip_load.force_N
+    m_x, m_y, m_z = (component * NEWTON_MILLIMETRE for component in file.tip_load.moment_Nmm)
+    g_x, g_y, g_z = (component * STANDARD_GRAVITY for component in file.gravity.direction)
+    return Loads(tip_force=(float(f_x), float(f_y), float(f_z)), tip_moment=(m_x, m_y, m_z), gravity=(g_x, g_y, g_z))
+
+
+def _contact(table: ContactTable) -> ContactSettings:
+    """Return where the wall stands and how the problem is closed."""
+    if (table.wall_point_mm is None) != (table.wall_normal is None):
+        there, absent = "wall_point_mm", "wall_normal"
+        if table.wall_point_mm is None:
+            there, absent = absent, there
+        raise InputError(f"missing; expected together with {there}", key=absent)
+    if table.wall_point_mm is not None and table.offset_mm is not None:
+        raise InputError("expected either offset_mm or wall_point_mm and wall_normal, got both", key="offset_mm")
+    if table.closure != "weighted":
+        for key in ContactTable.model_fields:
+            if key.startswith("weight_") and getattr(table, key) is not None:
+                raise InputError(f"expected only with closure = 'weighted', got closure = {table.closure!r}", key=key)
+    point = None
+    if table.wall_point_mm is not None:
+        x, y, z = (component * MILLIMETRE for component in table.wall_point_mm)
+        point = (x, y, z)
+    return ContactSettings(
+        offset=(table.offset_mm or 0.0) * MILLIMETRE,
+        tip_cap=table.tip_cap_mm * MILLIMETRE,
+        closure=table.closure,
+        wall_point=point,
+        wall_normal=table.wall_normal,
+        weights=ClosureWeights(
+            force=table.weight_force_per_N,
+            moment=_per(table.weight_moment_per_Nmm, NEWTON_MILLIMETRE),
+            length=_per(table.weight_length_per_mm, MILLIMETRE),
+            position=_per(table.weight_position_per_mm, MILLIMETRE),
+        ),
+    )
+
+
+def _per(weight: float | None, unit: float) -> float | None:
+    """Convert a weight given per unit of the file."""
+    return None if weight is None else weight / unit

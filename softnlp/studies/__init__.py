@@ -1,0 +1,1 @@
+"""The tasks: one file each, on the same load cases."""

@@ -1,0 +1,113 @@
+"""Forward and loaded kinematics: the pose at each pressure of a sequence, each started from the last."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.errors import InputError
+from softnlp.materials import Material
+from softnlp.numerics import Numerics
+from softnlp.quantities import Model
+from softnlp.robot import LOWERABLE_RULES, Robot, check
+from softnlp.rod import Loads
+from softnlp.studies.statics import PoseSolver
+from softnlp.studies.step import Run, Step
+
+
+def forward(
+    robot: Robot,
+    material: Material,
+    pressures: Any,
+    *,
+    loads: Loads = Loads(),
+    coefficients: Coefficients = Coefficients(),
+    conventions: Conventions = REPRODUCTION,
+    numerics: Numerics = Numerics(),
+    times: Sequence[float] | None = None,
+    title: str = "",
+    progress: Callable[[int, Step], None] | None = None,
+) -> Run:
+    """Solve the pose at each pressure in order, warm-started along the sequence.
+
+    Parameters
+    ----------
+    robot, material
+        From `softnlp.robot` and `softnlp.material`, or built in full.
+    pressures
+        (steps, sets) or (sets,) gauge pressures [Pa], not negative.
+    loads
+        Dead tip force [N], tip moment [N m] and gravity [m/s^2], world frame; the same at every step.
+    coefficients, conventions
+        Stiffening and corrections; how ambiguous equations are read.
+    numerics
+        Transcription, intervals, accuracy, tolerance.
+    times
+        (steps,) [s], kept with the steps.
+    progress
+        Called with the index and the step as each is done.
+
+    Returns
+    -------
+    Run
+        Its steps carry a pose, or a named status where there is none.
+
+    Raises
+    ------
+    RobotError
+        For a robot that is geometrically impossible; the rules that a scenario may lower are warnings here.
+    InputError
+        For pressures or loads of the wrong shape, not finite, or negative.
+
+    """
+    warnings = check(robot, allow=LOWERABLE_RULES)
+    P = pressure_table(pressures, robot.chamber_sets)
+    loads = checked_loads(loads)
+    if times is not None and len(times) != len(P):
+        raise InputError(f"expected one time a step, got {len(times)} times for {len(P)} steps", key="times")
+    solver = PoseSolver(Model(robot, material, coefficients, conventions), numerics)
+    steps: list[Step] = []
+    near = None
+    for k, pressure in enumerate(P):
+        step, solved = solver.solve(pressure, loads, near)
+        near = solved or near
+        if times is not None:
+            step = replace(step, time=float(times[k]))
+        steps.append(step)
+        if progress is not None:
+            progress(k, step)
+    return Run("forward", robot, material, coefficients, conventions, loads, tuple(steps), title, warnings)
+
+
+def pressure_table(pressures: Any, sets: int) -> NDArray[np.float64]:
+    """Return pressures as (steps, sets) floats, or raise `InputError`."""
+    try:
+        table = np.atleast_2d(np.asarray(pressures, dtype=float))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"expected numbers, one column a chamber set: {error}", key="pressures") from error
+    if table.ndim != 2 or table.shape[1] != sets or table.shape[0] == 0:
+        raise InputError(f"expected (steps, {sets}), one column a chamber set, got {table.shape}", key="pressures")
+    if not np.all(np.isfinite(table)):
+        raise InputError("expected finite pressures", key="pressures")
+    if np.any(table < 0):
+        raise InputError(f"expected gauge pressures that are not negative, got {table.min():g} Pa", key="pressures")
+    return table
+
+
+def checked_loads(loads: Loads) -> Loads:
+    """Return loads as arrays of three finite numbers, or raise `InputError` naming the one that is not."""
+    checked = {}
+    for name in ("tip_force", "tip_moment", "gravity"):
+        try:
+            value = np.asarray(getattr(loads, name), dtype=float)
+        except (TypeError, ValueError) as error:
+            raise InputError("expected three numbers", key=name) from error
+        if value.shape != (3,) or not np.all(np.isfinite(value)):
+            raise InputError(f"expected three finite numbers, got {value.tolist()}", key=name)
+        checked[name] = value
+    return Loads(**checked)

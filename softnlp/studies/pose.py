@@ -1,0 +1,105 @@
+"""From a solution of a load case to a pose in SI units: shape, strains, internal force and moment, stability, warnings."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp import rod
+from softnlp.quantities import Model
+from softnlp.robot import touching_stretch
+from softnlp.section import deform
+from softnlp.studies.step import Pose, SectionRadii, Shape
+from softnlp.transcription import RK4, rk_step
+
+Array = NDArray[np.float64]
+
+SHAPE_POINTS = 61
+_SUBSTEPS = 4
+
+
+def shape_function(field: ca.Function) -> ca.Function:
+    """Return (state, c, h) -> [state a step h further, strains (v, u)] in scaled units, for the field of a load case."""
+    x, c, h = ca.SX.sym("x", rod.STATE_SIZE), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("h")
+    step = rk_step(field, RK4)
+    end = x
+    for _ in range(_SUBSTEPS):
+        end = step(end, c, h / _SUBSTEPS)
+    v, u = rod.strains(end, rod.RodSection(*(c[k] for k in range(len(rod.RodSection._fields)))))
+    return ca.Function("shape", [x, c, h], [ca.vertcat(end, v, u)], {"cse": True})
+
+
+def between_nodes(function: ca.Function, nodes: Array, constants: Array, s: Array) -> Array:
+    """Evaluate `shape_function` at any s in 0..1 from the node to its left; (24, len(s))."""
+    K = nodes.shape[1] - 1
+    left = np.minimum(np.floor(s * K + 1e-9).astype(int), K)
+    return np.asarray(function.map(s.size)(nodes[:, left], constants, (s - left / K)[None, :]))
+
+
+def shape_of(values: Array, s: Array, length_unit: float, force_unit: float) -> Shape:
+    """Return the shape in SI units from scaled states and strains (24, M)."""
+    return Shape(
+        arc=s,
+        position=values[0:3].T * length_unit,
+        rotation=values[3:12].T.reshape(-1, 3, 3).transpose(0, 2, 1),
+        force=values[12:15].T * force_unit,
+        moment=values[15:18].T * force_unit * length_unit,
+        shear_extension=values[18:21].T,
+        curvature=values[21:24].T / length_unit,
+    )
+
+
+def section_radii(model: Model, stretch: float) -> SectionRadii:
+    """Return the deformed radii at a stretch, for drawing."""
+    section = deform(
+        model.robot, model.material, [0.0] * model.robot.chamber_sets, stretch, model.coefficients, model.conventions
+    )
+    return SectionRadii(
+        outer=float(section.outer_radius),
+        lumen=float(section.lumen_radius),
+        chamber_circle=float(section.chamber_circle_radius),
+        chamber=float(section.chamber_radius),
+        bore=float(section.bore_radius),
+    )
+
+
+def pose_of(
+    model: Model, outputs: dict[str, Array], shape: Shape, unloaded_tip: Array, stable: bool
+) -> Pose:
+    """Assemble a pose. outputs : of the load case, SI. unloaded_tip : tip at this pressure without loads [m]."""
+    stretch = float(outputs["stretch"][0])
+    R = np.asarray(outputs["tip_rotation"])
+    tip = np.asarray(outputs["tip_position"])
+    axis = R[:, 2]
+    return Pose(
+        stretch=stretch,
+        stable=stable,
+        tip_position=tip,
+        tip_displacement=tip - unloaded_tip,
+        tip_rotation=R,
+        bending_angle=float(outputs["bending_angle"][0]),
+        tilt=float(np.arctan2(np.hypot(axis[0], axis[1]), axis[2])),
+        backbone_length=float(outputs["backbone_length"][0]),
+        chamber_length=np.atleast_1d(outputs["chamber_lengths"]),
+        radii=section_radii(model, stretch),
+        shape=shape,
+    )
+
+
+def pose_warnings(model: Model, pose: Pose) -> tuple[str, ...]:
+    """Return what a designer should know of a solved pose: fitted range, touching chambers, stability."""
+    found = []
+    low, high = model.material.fitted_stretch
+    if not low <= pose.stretch <= high:
+        found.append(
+            f"stretch {pose.stretch:.3f} is outside {low:g} to {high:g}, where {model.material.name} was fitted"
+        )
+    limit = touching_stretch(model.robot)
+    if pose.stretch > limit:
+        found.append(f"stretch {pose.stretch:.3f} is above {limit:.3f}, where neighbouring reinforced chambers touch")
+    if np.min(pose.shape.shear_extension[:, 2]) <= 0:
+        found.append("the load compresses the rod to nothing somewhere (v_z <= 0); the model does not hold there")
+    if not pose.stable:
+        found.append("this equilibrium is not stable: the real robot buckles away from it")
+    return tuple(found)

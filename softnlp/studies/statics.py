@@ -1,0 +1,331 @@
+"""Solving one pose after another for one robot and silicone: guesses, refinement, and what to try when a solve fails."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.branch import BranchPoint, branch_function, stretch_on_branch
+from softnlp.loadcase import LoadCase, arc_function, load_case, rod_field
+from softnlp.numerics import Numerics
+from softnlp.problem import CompiledProblem, compile_problem
+from softnlp.quantities import Model, quantities
+from softnlp.rod import STATE_SIZE, Loads
+from softnlp.solver import (
+    Engine,
+    Solution,
+    certificate,
+    discretisation_correction,
+    follow,
+    outputs,
+    straight_path,
+)
+from softnlp.stability import conjugate_points, transition_functions
+from softnlp.status import Status
+from softnlp.studies.pose import SHAPE_POINTS, between_nodes, pose_of, pose_warnings, shape_function, shape_of
+from softnlp.studies.step import Step
+from softnlp.transcription import method_named
+
+Array = NDArray[np.float64]
+
+FIRST_INTERVALS = {"multiple-shooting": 10, "collocation": 5}
+MOST_INTERVALS = 1810
+_TURN = 0.25  # largest angle [rad] of the unloaded arc within one RK4 interval of a first grid
+_FINER = 4  # how much finer a grid is tried where a coarse one finds no solution
+_LOADS = ("tip_force", "tip_moment", "gravity")
+# Without loads the exact answer is a circular arc; a solution is good enough to show it.
+UNLOADED_ACCURACY = 5e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Everything compiled for one number of intervals."""
+
+    case: LoadCase
+    engine: Engine
+    stepper: Engine
+    transition: ca.Function
+
+    @property
+    def problem(self) -> CompiledProblem:
+        """The compiled problem, with every quantity fixed."""
+        return self.engine.problem
+
+    def nodes(self, x: Array) -> Array:
+        """Return the scaled node states (18, K + 1) in x."""
+        states = x[1:].reshape(-1, STATE_SIZE).T
+        return np.ascontiguousarray(states[:, self.case.transcribed.node_index])
+
+    def constants(self, solution: Solution) -> Array:
+        """Return what the field takes beside the state."""
+        return np.asarray(self.problem.case_constants(solution.x, solution.p)).ravel()
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A solution on a grid and what was found of it.
+
+    nodes : (18, K + 1) scaled states. constants : what the field takes beside them. error : estimated tip position error
+    over L_0. rotation_error : the same for the tip's orientation [rad]. stable : no conjugate point.
+    """
+
+    grid: Grid
+    solution: Solution
+    nodes: Array
+    constants: Array
+    error: float
+    rotation_error: float
+    stable: bool
+
+    @property
+    def intervals(self) -> int:
+        """The number of intervals."""
+        return self.nodes.shape[1] - 1
+
+    @property
+    def refinement_error(self) -> float:
+        """What refinement holds against the accuracy: a rotation is allowed five times as much as a position."""
+        return max(self.error, self.rotation_error / 5)
+
+
+def next_size(wanted: float) -> int:
+    """Return the first grid size of at least `wanted`; sizes grow by the square root of 2, so that few are compiled."""
+    k = 0
+    while (size := 5 * round(2 ** (k / 2))) < wanted:
+        k += 1
+    return size
+
+
+def pose_distance(change: Array) -> float:
+    """Return the largest change of a scaled position or of a direction cosine between two x."""
+    states = change[1:].reshape(-1, STATE_SIZE)
+    return float(np.max(np.abs(states[:, :12])))
+
+
+class PoseSolver:
+    """Solves poses of one model; compiled grids are kept between poses, so a sequence pays for each once.
+
+    model : robot, silicone, coefficients, conventions, all numbers.
+    """
+
+    def __init__(self, model: Model, numerics: Numerics) -> None:
+        self.model = model
+        self.numerics = numerics
+        self._quantities = quantities(model)
+        self._branch = branch_function(model)
+        self._arc = arc_function(model)
+        field = rod_field(model.robot.chambers)[0]
+        self._shape = shape_function(field)
+        self._transition, self._tip_variation = transition_functions(field)
+        self._grids: dict[int, Grid] = {}
+
+    def grid(self, intervals: int) -> Grid:
+        """Return the compiled problem on a grid, building it at first use."""
+        if intervals not in self._grids:
+            method = method_named(self.numerics.transcription, intervals)
+            case = load_case("pose", self.model, self._quantities, method)
+            problem = compile_problem(list(self._quantities.values()), [case])
+            self._grids[intervals] = Grid(case, Engine(problem), Engine(problem, max_iterations=8, tolerance=1e-7), self._transition.map(intervals))
+        return self._grids[intervals]
+
+    def values(self, pressure: Array, loads: Loads) -> dict[str, Any]:
+        """Return the quantities that a step sets."""
+        return {
+            "pressure": pressure,
+            "tip_force": loads.tip_force,
+            "tip_moment": loads.tip_moment,
+            "gravity": loads.gravity,
+        }
+
+    def solve(self, pressure: Array, loads: Loads, warm: Solved | None = None) -> tuple[Step, Solved | None]:
+        """Solve one pose, from a neighbouring solution where there is one; the step says how it ended.
+
+        pressure : (sets,) [Pa], not negative. Never raises for a pose that cannot be solved.
+        """
+        began = time.perf_counter()
+        pressure = np.asarray(pressure, dtype=float)
+        values = self.values(pressure, loads)
+        column = np.concatenate([np.ravel(values.get(name, q.nominal)) for name, q in self._quantities.items()])
+        branch = stretch_on_branch(self._branch, column, pressure)
+        if branch.status is not Status.SOLVED:
+            return Step(pressure, branch.status, branch.message, solve_time=time.perf_counter() - began), None
+
+        first = self.numerics.intervals or self._first_intervals(column, branch.stretch)
+        intervals = warm.intervals if warm else first
+        target = self._target_accuracy(loads)
+        iterations = 0
+        found: Solved | None = warm
+        while True:
+            attempt, spent, reached = self._solve_on(intervals, values, branch, found)
+            iterations += spent
+            if attempt is None and self.numerics.intervals is None and intervals < _FINER * first:
+                intervals, found = _FINER * intervals, None
+                continue
+            if attempt is None:
+                step = Step(
+                    pressure,
+                    Status.DIVERGED,
+                    f"{Status.DIVERGED.advice}; continuation reached {100 * reached:.3g} % of the way from the unloaded robot",
+                    iterations=iterations,
+                    solve_time=time.perf_counter() - began,
+                )
+                return step, None
+            found = attempt
+            wanted = self._next_intervals(found, target)
+            if wanted is None:
+                break
+            if intervals >= MOST_INTERVALS:
+                step = Step(
+                    pressure,
+                    Status.INACCURATE,
+                    f"{Status.INACCURATE.advice}; the estimate with {intervals} intervals is {found.error:.2g} of the length",
+                    residual=found.solution.residual,
+                    iterations=iterations,
+                    solve_time=time.perf_counter() - began,
+                )
+                return step, None
+            intervals = min(wanted, MOST_INTERVALS)
+        return self._finished(pressure, loads, found, iterations, began), found
+
+    def _first_intervals(self, column: Array, stretch: float) -> int:
+        """Return a grid coarse enough to be quick and fine enough for the curl of the unloaded robot."""
+        first = FIRST_INTERVALS[self.numerics.transcription]
+        straight = np.asarray(self._arc(column, stretch, 0.01)).ravel()
+        curl = 100 * float(np.hypot(straight[9], straight[10]))  # of the axis, R e3, over the first hundredth
+        turn = _TURN * FIRST_INTERVALS["multiple-shooting"] / first
+        return min(next_size(max(first, curl / turn)), MOST_INTERVALS)
+
+    def _target_accuracy(self, loads: Loads) -> float:
+        """Return the estimate to aim for: a third of the accuracy asked for, since estimates are good to a factor of 3."""
+        accuracy = self.numerics.accuracy
+        if not np.any([loads.tip_force, loads.tip_moment, loads.gravity]):
+            accuracy = min(accuracy, UNLOADED_ACCURACY * 3)
+        return accuracy / 3
+
+    def _next_intervals(self, solved: Solved, target: float) -> int | None:
+        """Return the finer grid that should meet the target, or None where this one does or the grid is given."""
+        if self.numerics.intervals is not None or solved.refinement_error <= target:
+            return None
+        order = method_named(self.numerics.transcription, 1).order
+        factor = 1.1 * (solved.refinement_error / target) ** (1 / order)
+        return next_size(max(factor, 1.3) * solved.intervals)
+
+    def _solve_on(
+        self, intervals: int, values: dict[str, Any], branch: BranchPoint, near: Solved | None
+    ) -> tuple[Solved | None, int, float]:
+        """Try, in order: the neighbour, the unloaded arc, loads applied after the pressure, and before it.
+
+        The first stable solution wins; an unstable one is kept in case there is no other. Returns it, the iterations spent
+        and how far continuation came.
+        """
+        grid = self.grid(intervals)
+        p = grid.problem.pack(values)
+        unloaded = values | {name: np.zeros(3) for name in _LOADS}
+        at_rest = values | {"pressure": np.zeros_like(values["pressure"])}
+        spent, reached = 0, 0.0
+        unstable: Solved | None = None
+
+        def attempts() -> Iterator[Callable[[], tuple[Solution, float]]]:
+            if near is not None:
+                yield lambda: (grid.engine.solve(p, self._transfer(near, grid, p, branch.stretch)), 1.0)
+            yield lambda: (grid.engine.solve(p, self._arc_guess(grid, p, branch.stretch)), 1.0)
+            yield lambda: self._along(grid, [unloaded, values], branch.stretch)
+            yield lambda: self._along(grid, [at_rest | {k: unloaded[k] for k in _LOADS}, at_rest, values], 1.0)
+
+        for attempt in attempts():
+            solution, fraction = attempt()
+            spent += solution.iterations
+            reached = max(reached, fraction) if fraction < 1.0 else reached
+            if fraction >= 1.0 and solution.holds(self.numerics.tolerance):
+                solved = self._examine(grid, solution)
+                if solved.stable:
+                    return solved, spent, 1.0
+                unstable = solved
+        return unstable, spent, reached
+
+    def _along(self, grid: Grid, waypoints: list[dict[str, Any]], stretch: float) -> tuple[Solution, float]:
+        """Follow the solution along straight lines between values; return the last one and the fraction of the way."""
+        problem = grid.problem
+        x = self._arc_guess(grid, problem.pack(waypoints[0]), stretch)
+        legs = len(waypoints) - 1
+        iterations = 0
+        for k in range(legs):
+            path = straight_path(problem, waypoints[k], waypoints[k + 1])
+            followed = follow(grid.stepper, path, x, distance=pose_distance)
+            iterations += followed.iterations
+            if not followed.arrived:
+                return replace(followed.solution, iterations=iterations), (k + followed.fraction) / legs
+            x = followed.solution.x
+        final = grid.engine.solve(problem.pack(waypoints[-1]), x)
+        return replace(final, iterations=iterations + final.iterations), 1.0
+
+    def _arc_guess(self, grid: Grid, p: Array, stretch: float) -> Array:
+        """Return x of the unloaded circular arc at this pressure."""
+        s = grid.case.transcribed.points
+        states = np.asarray(self._arc(p, stretch, s[None, :]))
+        return np.concatenate([[stretch], states.T.ravel()])
+
+    def _transfer(self, solved: Solved, grid: Grid, p: Array, stretch: float) -> Array:
+        """Return a solution's states on a grid, moved by what the unloaded arc moves between the two poses."""
+        s = grid.case.transcribed.points
+        if solved.grid is grid:
+            states = solved.solution.x[1:]
+        else:
+            states = between_nodes(self._shape, solved.nodes, solved.constants, s)[:STATE_SIZE].T.ravel()
+        x_old, p_old = solved.solution.x, solved.solution.p
+        moved = self._arc_guess(grid, p, stretch) - self._arc_guess(grid, p_old, x_old[0])
+        return np.concatenate([[x_old[0]], states]) + moved
+
+    def _examine(self, grid: Grid, solution: Solution) -> Solved:
+        """Estimate the discretisation error of a solution and test its stability."""
+        correction = discretisation_correction(grid.problem, solution)
+        order = method_named(self.numerics.transcription, 1).order
+        richardson = 2**order / (2**order - 1)
+        tip = correction[-STATE_SIZE:] * richardson
+        nodes = grid.nodes(solution.x)
+        constants = grid.constants(solution)
+        return Solved(
+            grid=grid,
+            solution=solution,
+            nodes=nodes,
+            constants=constants,
+            error=float(np.linalg.norm(tip[:3])),
+            rotation_error=float(np.linalg.norm(tip[3:12]) / np.sqrt(2)),
+            stable=conjugate_points(grid.transition, self._tip_variation, nodes, constants) == 0,
+        )
+
+    def _finished(self, pressure: Array, loads: Loads, solved: Solved, iterations: int, began: float) -> Step:
+        """Turn the solution of a pose into a step in SI units, with its certificate."""
+        grid, solution = solved.grid, solved.solution
+        problem = grid.problem
+        result = outputs(problem, solution)
+        L_0, F_0 = (float(v) for v in np.asarray(grid.problem.units(solution.x, solution.p)).ravel())
+        s = np.linspace(0, 1, SHAPE_POINTS)
+        shape = shape_of(between_nodes(self._shape, solved.nodes, solved.constants, s), s, L_0, F_0)
+        unloaded_tip = np.asarray(self._arc(solution.p, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
+        pose = pose_of(self.model, result, shape, unloaded_tip, solved.stable)
+        warnings = list(pose_warnings(self.model, pose))
+        if solved.error > self.numerics.accuracy:
+            warnings.append(
+                f"estimated discretisation error {solved.error:.2g} of the length is above the accuracy asked for with "
+                f'{solved.intervals} intervals; set [solver] intervals = "auto" or a larger number'
+            )
+        return Step(
+            pressure=pressure,
+            status=Status.SOLVED,
+            message=Status.SOLVED.advice,
+            pose=pose,
+            residual=solution.residual,
+            certificate=certificate(problem, solution),
+            discretisation_error=solved.error,
+            intervals=solved.intervals,
+            iterations=iterations,
+            solve_time=time.perf_counter() - began,
+            warnings=tuple(warnings),
+        )

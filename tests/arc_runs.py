@@ -1,0 +1,130 @@
+"""Runs made of circular arcs, in closed form: what results and figures are tested on without a solve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from softnlp.conventions import REPRODUCTION, Coefficients
+from softnlp.materials import material
+from softnlp.robot import Robot, robot
+from softnlp.rod import Loads
+from softnlp.solver import EquationResidual
+from softnlp.status import Status
+from softnlp.studies.step import Pose, Run, SectionRadii, Shape, Step
+
+POINTS = 31
+BENDING_STIFFNESS = 7.1e-4  # [N m^2], of the order of a D25 robot's
+STRETCH_PER_PASCAL = 1.2e-6  # for each set
+
+
+def arc_pose(body: Robot, pressure: np.ndarray, points: int = POINTS) -> Pose:
+    """Return the arc whose constant curvature the pressures [Pa] of a section of fixed stiffness give."""
+    stretch = 1.0 + STRETCH_PER_PASCAL * float(pressure.sum())
+    length = stretch * body.length
+    shrink = stretch**-0.5
+    centres = np.array(body.chamber_centres(), dtype=float) * shrink
+    bore = np.sqrt(body.chamber_radius**2 - (body.chamber_radius**2 - body.bore_radius**2) / stretch)
+    forces = np.pi * bore**2 * pressure[list(body.set_of_chamber)]
+    pressure_moment = np.array([forces @ centres[:, 1], -forces @ centres[:, 0], 0.0])
+    u = pressure_moment / BENDING_STIFFNESS
+    kappa = float(np.hypot(u[0], u[1]))
+    arc = np.linspace(0.0, 1.0, points)
+    angle = kappa * length * arc
+    across = np.array([u[1], -u[0]]) / kappa if kappa else np.array([1.0, 0.0])
+    # The axis turns towards `across` = u x e3 / |u|.
+    sideways = (1 - np.cos(angle)) / kappa if kappa else 0 * arc
+    upwards = np.sin(angle) / kappa if kappa else length * arc
+    position = np.column_stack([sideways * across[0], sideways * across[1], upwards])
+    rotation = np.stack([_rotation(u / kappa if kappa else np.array([0.0, 1.0, 0.0]), a) for a in angle])
+    force = forces.sum() * rotation[:, :, 2]
+    offsets = np.column_stack([centres, np.zeros(len(centres))])
+    chamber_length = length * np.linalg.norm(np.array([0, 0, 1.0]) + np.cross(u, offsets), axis=1)
+    return Pose(
+        stretch=stretch,
+        stable=True,
+        tip_position=position[-1],
+        tip_displacement=np.zeros(3),
+        tip_rotation=rotation[-1],
+        bending_angle=kappa * length,
+        tilt=float(np.arccos(np.clip(rotation[-1, 2, 2], -1, 1))),
+        backbone_length=length,
+        chamber_length=chamber_length,
+        radii=SectionRadii(
+            outer=body.outer_radius * shrink,
+            lumen=body.lumen_radius * shrink,
+            chamber_circle=body.chamber_circle_radius * shrink,
+            chamber=body.chamber_radius,
+            bore=float(bore),
+        ),
+        shape=Shape(
+            arc=arc,
+            position=position,
+            rotation=rotation,
+            force=force,
+            moment=rotation @ pressure_moment,
+            shear_extension=np.tile([0.0, 0.0, 1.0], (points, 1)),
+            curvature=np.tile(u, (points, 1)),
+        ),
+    )
+
+
+def _rotation(axis: np.ndarray, angle: float) -> np.ndarray:
+    K = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+
+
+def arc_step(body: Robot, pressure: Sequence[float], **changes: Any) -> Step:
+    """Return a solved step at pressures [Pa]."""
+    values = np.array(pressure, dtype=float)
+    step = Step(
+        values,
+        Status.SOLVED,
+        "",
+        pose=arc_pose(body, values),
+        residual=1.3e-12,
+        certificate=(
+            EquationResidual("tip force", 2e-13, "N", 4e-13),
+            EquationResidual("tip moment", 1e-15, "N m", 1.3e-12),
+        ),
+        discretisation_error=3e-8,
+        intervals=10,
+        iterations=4,
+        solve_time=0.0123,
+    )
+    return replace(step, **changes)
+
+
+def failed_step(pressure: Sequence[float], **changes: Any) -> Step:
+    """Return a step at pressures [Pa] with no equilibrium."""
+    message = "the stretch balance has no root on the branch from zero pressure; the last equilibrium is at 1.31 bar"
+    step = Step(np.array(pressure, dtype=float), Status.NO_EQUILIBRIUM, message, residual=0.25, solve_time=0.2)
+    return replace(step, **changes)
+
+
+def run_of(steps: Sequence[Step], name: str = "D25L60", **changes: Any) -> Run:
+    """Return a run of the given steps."""
+    run = Run(
+        "forward", robot(name), material("Ecoflex 00-50"), Coefficients(), REPRODUCTION, Loads(), tuple(steps), "a test"
+    )
+    return replace(run, **changes)
+
+
+def ramp_run(
+    steps: int = 11,
+    to: float = 1.5e5,
+    sets: Sequence[int] = (0,),
+    name: str = "D25L60",
+    failed: Sequence[int] = (),
+    **changes: Any,
+) -> Run:
+    """Return a run whose chosen sets (from 0) go from 0 to a pressure [Pa] together; the steps in `failed` fail."""
+    body = robot(name)
+    made = []
+    for k, level in enumerate(np.linspace(0, to, steps)):
+        pressure = [level if n in sets else 0.0 for n in range(body.chamber_sets)]
+        made.append(failed_step(pressure) if k in failed else arc_step(body, pressure))
+    return run_of(made, name, **changes)
