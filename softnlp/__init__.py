@@ -6,7 +6,9 @@ Numbers are SI: `BAR`, `MILLIMETRE`, `NEWTON_MILLIMETRE`, `DEGREE` convert.
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -62,7 +64,18 @@ _HOMES = {
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
-__all__ = sorted([*_HOME_OF, "__version__"])  # noqa: PLE0605
+__all__ = sorted([*_HOME_OF, "__version__"])
+
+
+class _Package(ModuleType):
+    """This package: `robot` stays the function when the submodule of that name is imported, in whatever order."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name not in _HOME_OF or not isinstance(value, ModuleType):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package
 
 
 def __getattr__(name: str) -> Any:
@@ -73,7 +86,7 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME_OF:
         raise AttributeError(f"module 'softnlp' has no attribute '{name}'")
     value = getattr(import_module(f"softnlp.{_HOME_OF[name]}"), name)
-    globals()[name] = value  # over the submodule of the same name, if there is one
+    globals()[name] = value
     return value
 
 

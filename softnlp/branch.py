@@ -1,20 +1,20 @@
 """The stretch reached continuously from zero pressure, as a number: first guess of the NLP, and where the branch ends.
 
-Along proportional loading, pressures t P, the axial balance gives t as an explicit function of the stretch (the chambers'
-force is linear in pressure), so the branch is followed by evaluating, not by solving: Eqs. (10), (21), (23).
+Along proportional loading, pressures t P, the axial balance gives t as an explicit function of the stretch (the
+chambers' force is linear in pressure), so the branch is followed by evaluating, not by solving: Eqs. (10), (21), (23).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from decimal import ROUND_FLOOR, Context
 from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.conventions import Coefficients
 from softnlp.quantities import Model, section_function
 from softnlp.section import deform, stretch_balance
 from softnlp.status import Status
@@ -43,7 +43,7 @@ class BranchPoint:
 def branch_function(model: Model) -> ca.Function:
     """Return (quantities, stretch) -> rows that `stretch_on_branch` needs, for symbols in place of the model's numbers.
 
-    Rows: A_0 sigma_e; what balances it at full pressure; then E_t, EA, EI_x, EI_y without pressure and at full pressure.
+    Rows: A_0 sigma_e; what balances it at full pressure; E_t, EA, EI_x, EI_y without pressure, then at full pressure.
     """
 
     def stiffnesses(m: Model, pressures: Any, stretch: Any) -> tuple[Any, list[Any]]:
@@ -116,12 +116,14 @@ def stretch_on_branch(function: ca.Function, column: Array, pressures: Array) ->
     if at(root)[1] > 0:
         return BranchPoint(Status.SOLVED, root, 1.0, "on the branch from zero pressure")
     lost = bisect(lambda s: not at(s)[1] > 0, low, root)
-    return _ended(Status.UNSTABLE_MATERIAL, lost, at(lost)[0], pressures, "meets a tangent stiffness that loses its sign")
+    how = "meets a tangent stiffness that loses its sign"
+    return _ended(Status.UNSTABLE_MATERIAL, lost, at(lost)[0], pressures, how)
 
 
 def _ended(status: Status, stretch: float, fraction: float, pressures: Array, how: str) -> BranchPoint:
     """Say where the branch ends, with the last pressures that have an equilibrium."""
-    last = ", ".join(f"{fraction * P / BAR:.6g}" for P in pressures)
+    down = Context(prec=6, rounding=ROUND_FLOOR)  # rounded up, the pressure would not have an equilibrium
+    last = ", ".join(f"{float(down.create_decimal_from_float(fraction * P / BAR)):.6g}" for P in pressures)
     return BranchPoint(
         status,
         float(stretch),

@@ -30,30 +30,6 @@ class Equation:
     si_scale: ca.MX
 
 
-@dataclass(frozen=True, eq=False)
-class LoadCase:
-    """One robot in one state of loading, as equations in scaled units.
-
-    symbols : its unknowns, the stretch and the column of all states. residuals : as many equations.
-    fine_residuals : the same at half the step. outputs : by name, SI and world frame: "stretch", "tip_position" (3),
-    "tip_rotation" (3x3), "chamber_lengths" (N), "bending_angle", "backbone_length".
-    constants : what the field takes beside the state. length_unit, force_unit : of the scaled states [m, N].
-    """
-
-    name: str
-    model: Model
-    transcribed: Transcribed
-    field: ca.Function
-    symbols: tuple[ca.MX, ...]
-    constants: ca.MX
-    residuals: ca.MX
-    fine_residuals: ca.MX
-    equations: tuple[Equation, ...]
-    outputs: Mapping[str, ca.MX]
-    length_unit: ca.MX
-    force_unit: ca.MX
-
-
 _SECTION_SIZE = len(rod.RodSection._fields)
 
 
@@ -67,22 +43,30 @@ def _pack(model: Model, pressures: Any, gravity: Any, stretch: Any) -> list[Any]
     return [ca.vertcat(*scaled, stretch, *centres), balance, ca.vertcat(L_0, F_0)]
 
 
-def arc_function(model: Model) -> ca.Function:
-    """Return (quantities, stretch, s in 0..1) -> scaled state of the rod without gravity or tip load, model section 4.
+@dataclass(frozen=True, eq=False)
+class RodFunctions:
+    """The rod of a model as functions, in scaled units; c are its constants at one stretch and pressure.
 
-    It is the exact solution there and the first guess elsewhere.
+    section : (quantities, stretch) -> c, scaled stretch imbalance, units (L_0, EI / L_0^2). field : (x, c) -> dx/ds on
+    s in 0..1. lengths : (x, c) -> rates of the chamber lengths, the bending angle and the backbone length.
+    tip : (x, c, force, moment) -> the 6 tip residuals. arc : (quantities, stretch, s) -> state without gravity or tip load,
+    exact there and the first guess elsewhere.
     """
-    column = ca.SX.sym("quantities", sum(q.size for q in quantities(model).values()))
-    stretch, s = ca.SX.sym("stretch"), ca.SX.sym("s")
-    c = section_function(model, _pack)(column, stretch)[0]
-    state = rod.arc_state(s * c[_SECTION_SIZE], rod.RodSection(*(c[k] for k in range(_SECTION_SIZE))))
-    return ca.Function("arc", [column, stretch, s], [state])
+
+    model: Model
+    section: ca.Function
+    field: ca.Function
+    lengths: ca.Function
+    tip: ca.Function
+    arc: ca.Function
 
 
-def rod_field(chambers: int) -> tuple[ca.Function, ca.Function]:
-    """Return the rod's field and its quadratures (chamber lengths, bending angle, backbone length) on s in 0..1."""
+def rod_functions(model: Model) -> RodFunctions:
+    """Compile the rod of a model for symbols in place of its numbers."""
+    chambers = model.robot.chambers
     x, c = ca.SX.sym("x", rod.STATE_SIZE), ca.SX.sym("c", _SECTION_SIZE + 1 + 2 * chambers)
-    section = rod.RodSection(*(c[k] for k in range(_SECTION_SIZE)))
+    force, moment = ca.SX.sym("force", 3), ca.SX.sym("moment", 3)
+    section = unpack_section(c)
     L = c[_SECTION_SIZE]
     v, u = rod.strains(x, section)
     rates = []
@@ -90,33 +74,69 @@ def rod_field(chambers: int) -> tuple[ca.Function, ca.Function]:
         d_i = ca.vertcat(c[_SECTION_SIZE + 1 + 2 * i], c[_SECTION_SIZE + 2 + 2 * i], 0)
         rates.append(ca.norm_2(v + ca.cross(u, d_i)))
     rates += [ca.norm_2(u[:2]), ca.norm_2(v)]
-    return (
-        ca.Function("field", [x, c], [L * rod.field(x, section)], {"cse": True}),
-        ca.Function("lengths", [x, c], [L * ca.vertcat(*rates)], {"cse": True}),
+
+    packed = section_function(model, _pack)
+    column = ca.SX.sym("quantities", packed.size1_in(0))
+    stretch, s = ca.SX.sym("stretch"), ca.SX.sym("s")
+    at_rest = packed(column, stretch)[0]
+    arc = rod.arc_state(s * at_rest[_SECTION_SIZE], unpack_section(at_rest))
+    return RodFunctions(
+        model=model,
+        section=packed,
+        field=ca.Function("field", [x, c], [L * rod.field(x, section)], {"cse": True}),
+        lengths=ca.Function("lengths", [x, c], [L * ca.vertcat(*rates)], {"cse": True}),
+        tip=ca.Function("tip", [x, c, force, moment], [rod.tip_balance(x, section, force, moment)]),
+        arc=ca.Function("arc", [column, stretch, s], [arc]),
     )
 
 
-def load_case(name: str, model: Model, given: Mapping[str, Quantity], method: Transcription) -> LoadCase:
+def unpack_section(c: Any) -> rod.RodSection:
+    """Return the rod's section from the constants of a load case."""
+    return rod.RodSection(*(c[k] for k in range(_SECTION_SIZE)))
+
+
+@dataclass(frozen=True, eq=False)
+class LoadCase:
+    """One robot in one state of loading, as equations in scaled units.
+
+    symbols : its unknowns, the stretch and the column of all states. residuals : as many equations.
+    fine_residuals : the same at half the step. outputs : by name, SI and world frame: "stretch", "tip_position" (3),
+    "tip_rotation" (3x3), "chamber_lengths" (N), "bending_angle", "backbone_length".
+    constants : what the field takes beside the state. length_unit, force_unit : of the scaled states [m, N].
+    """
+
+    name: str
+    transcribed: Transcribed
+    functions: RodFunctions
+    symbols: tuple[ca.MX, ...]
+    constants: ca.MX
+    residuals: ca.MX
+    fine_residuals: ca.MX
+    equations: tuple[Equation, ...]
+    outputs: Mapping[str, ca.MX]
+    length_unit: ca.MX
+    force_unit: ca.MX
+
+
+def load_case(
+    name: str, functions: RodFunctions, given: Mapping[str, Quantity], method: Transcription
+) -> LoadCase:
     """Transcribe the rod of a model in the state of loading that the quantities `given` describe.
 
-    `given` holds every name of `quantities(model)`; a case of its own pressure takes a quantity of its own under "pressure".
+    functions : of `rod_functions(model)`, which every grid and case of the model shares. given : every name of
+    `quantities(model)`; a case of its own pressure takes a quantity of its own under "pressure".
     """
+    model = functions.model
     column = ca.vertcat(*(given[key].symbol for key in quantities(model)))
     stretch = ca.MX.sym("stretch")
-    constants, balance, units = section_function(model, _pack)(column, stretch)
+    constants, balance, units = functions.section(column, stretch)
     L_0, F_0 = units[0], units[1]
 
-    field, lengths = rod_field(model.robot.chambers)
-    transcribed = method.transcribe(field, constants)
+    transcribed = method.transcribe(functions.field, constants)
     first, last = transcribed.nodes[:, 0], transcribed.nodes[:, -1]
-    integrals = transcribed.integrate(lengths)
-
-    x, c, f, l = ca.SX.sym("x", rod.STATE_SIZE), ca.SX.sym("c", _SECTION_SIZE), ca.SX.sym("f", 3), ca.SX.sym("l", 3)  # noqa: E741
-    tip = ca.Function("tip", [x, c, f, l], [rod.tip_balance(x, rod.RodSection(*ca.vertsplit(c)), f, l)])
-    ends = ca.vertcat(
-        rod.base_balance(first),
-        tip(last, constants[:_SECTION_SIZE], given["tip_force"].symbol / F_0, given["tip_moment"].symbol / (F_0 * L_0)),
-    )
+    integrals = transcribed.integrate(functions.lengths)
+    force, moment = given["tip_force"].symbol / F_0, given["tip_moment"].symbol / (F_0 * L_0)
+    ends = ca.vertcat(rod.base_balance(first), functions.tip(last, constants, force, moment))
 
     def residuals(interior: ca.MX) -> ca.MX:
         return ca.vertcat(balance, ends[:12], interior, ends[12:])
@@ -124,9 +144,8 @@ def load_case(name: str, model: Model, given: Mapping[str, Quantity], method: Tr
     N = model.robot.chambers
     return LoadCase(
         name=name,
-        model=model,
         transcribed=transcribed,
-        field=field,
+        functions=functions,
         symbols=(stretch, transcribed.unknowns),
         constants=constants,
         residuals=residuals(transcribed.residuals),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from softnlp.errors import InputError
+from softnlp.reading import choices
 from softnlp.scenario import Scenario
 from softnlp.studies.forward import forward
 from softnlp.studies.step import Run, Step
@@ -13,8 +15,40 @@ Progress = Callable[[int, Step], None]
 
 
 def run_scenario(scenario: Scenario, progress: Progress | None = None) -> Run:
-    """Run the study of a scenario, every step in order; `progress` is called with each step as it is done."""
-    run = forward(
+    """Run the study of a scenario, every step in order; `progress` is called with each step as it is done.
+
+    Raises
+    ------
+    InputError
+        For a study that can be described but not yet run.
+    """
+    if scenario.study not in _STUDIES:
+        raise InputError(
+            f"expected {choices(_STUDIES)}: this version reads {scenario.study!r} but does not run it yet",
+            source=str(scenario.path),
+            key="study",
+        )
+    return replace(_STUDIES[scenario.study](scenario, progress), warnings=scenario.warnings)
+
+
+def partial_run(scenario: Scenario, steps: Sequence[Step]) -> Run:
+    """Return the run of a scenario that was stopped after some steps; a warning says so."""
+    note = f"stopped by the user after {len(steps)} of {len(scenario.pressures)} steps"
+    return Run(
+        study=scenario.study,
+        robot=scenario.robot,
+        material=scenario.material,
+        coefficients=scenario.coefficients,
+        conventions=scenario.conventions,
+        loads=scenario.loads,
+        steps=tuple(steps),
+        title=scenario.title,
+        warnings=(*scenario.warnings, note),
+    )
+
+
+def _forward(scenario: Scenario, progress: Progress | None) -> Run:
+    return forward(
         scenario.robot,
         scenario.material,
         scenario.pressures,
@@ -22,8 +56,10 @@ def run_scenario(scenario: Scenario, progress: Progress | None = None) -> Run:
         coefficients=scenario.coefficients,
         conventions=scenario.conventions,
         numerics=scenario.numerics,
-        times=scenario.times,
+        times=None if scenario.times is None else scenario.times.tolist(),
         title=scenario.title,
         progress=progress,
     )
-    return replace(run, warnings=scenario.warnings)
+
+
+_STUDIES: Mapping[str, Callable[[Scenario, Progress | None], Run]] = {"forward": _forward}

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
@@ -15,6 +14,10 @@ from numpy.typing import NDArray
 from softnlp.problem import CompiledProblem
 
 Array = NDArray[np.float64]
+
+_NEWTON_STEPS = 12
+_DIVERGED = 1e4  # scaled residual past which Newton steps are not worth following
+_SLACK = 100.0  # round-off may leave a residual this much above the tolerance asked of an engine
 
 
 @dataclass(frozen=True)
@@ -49,16 +52,33 @@ class Solution:
         return self.residual <= tolerance
 
 
-class Engine:
-    """IPOPT on one compiled problem. Safe to share between threads: calls wait for each other.
+class LinearSolver(Protocol):
+    """Solves J(x, p) dx = -g where a problem's structure allows better than a sparse factorisation."""
 
-    A square problem needs no Hessian: with a zero one IPOPT's step is Newton's.
+    def solve(self, x: Array, p: Array, g: Array) -> Array:
+        """Return dx; raises `numpy.linalg.LinAlgError` where J is singular."""
+        ...
+
+
+class Engine:
+    """Newton's method where a structured linear solver is given, and IPOPT, on one compiled problem.
+
+    IPOPT is the reference: it solves what Newton does not, unless `newton_only`. A square problem needs no Hessian: with a
+    zero one IPOPT's step is Newton's too. Safe to share between threads: calls wait for each other.
     """
 
     def __init__(
-        self, problem: CompiledProblem, *, max_iterations: int | None = None, tolerance: float = 1e-11
+        self,
+        problem: CompiledProblem,
+        *,
+        linear: LinearSolver | None = None,
+        newton_only: bool = False,
+        max_iterations: int | None = None,
+        tolerance: float = 1e-11,
     ) -> None:
         self.problem = problem
+        self.linear = linear
+        self.newton_only = newton_only
         self.tolerance = tolerance
         self._lock = threading.Lock()
         # Newton on a square problem either converges soon or has left the basin of the first guess.
@@ -91,6 +111,40 @@ class Engine:
 
     def solve(self, p: Array, x_start: Array) -> Solution:
         """Solve at fixed values p from a first guess; judge the result by the residual, evaluated again."""
+        x_start = np.asarray(x_start, dtype=float)
+        spent = 0
+        if self.linear is not None:
+            quick = self._newton(self.linear, p, x_start)
+            if self.newton_only or quick.holds(self.tolerance * _SLACK):
+                return quick
+            spent = quick.iterations
+        reference = self._ipopt(p, x_start)
+        return replace(reference, iterations=reference.iterations + spent)
+
+    def _newton(self, linear: LinearSolver, p: Array, x_start: Array) -> Solution:
+        """Take full Newton steps while they help; the equations are stated, so there is nothing to trade them against."""
+        problem = self.problem
+        x, best, worst_allowed = x_start, np.inf, _DIVERGED
+        with self._lock:
+            g = np.asarray(problem.residual(x, p)).ravel()
+            size = _size(g)
+            for k in range(_NEWTON_STEPS):
+                if size <= self.tolerance:
+                    return Solution(x, p, size, k, "Newton converged")
+                try:
+                    trial = x + linear.solve(x, p, g)
+                except np.linalg.LinAlgError:
+                    return Solution(x, p, size, k, "Newton met a singular Jacobian")
+                g = np.asarray(problem.residual(trial, p)).ravel()
+                new_size = _size(g)
+                if not new_size < worst_allowed:
+                    return Solution(x, p, size, k, "Newton diverged")
+                if new_size >= best and best < self.tolerance * _SLACK:
+                    return Solution(x, p, size, k, "Newton converged to round-off")
+                x, size, best = trial, new_size, min(best, new_size)
+        return Solution(x, p, size, _NEWTON_STEPS, "Newton reached its iteration limit")
+
+    def _ipopt(self, p: Array, x_start: Array) -> Solution:
         problem = self.problem
         with self._lock:
             try:
@@ -103,10 +157,16 @@ class Engine:
                     ubg=problem.upper_g,
                 )
             except RuntimeError as error:  # the engine gave up on a number that is not finite
-                return Solution(np.asarray(x_start, float), p, float("inf"), 0, str(error).splitlines()[-1])
+                return Solution(x_start, p, float("inf"), 0, str(error).splitlines()[-1])
             stats = self._solver.stats()
         x = np.asarray(result["x"], dtype=float).ravel()
         return Solution(x, p, violation(problem, x, p), int(stats["iter_count"]), str(stats["return_status"]))
+
+
+def _size(g: Array) -> float:
+    """Return the largest entry of a residual; inf where it is not a number."""
+    worst = float(np.max(np.abs(g), initial=0.0))
+    return worst if np.isfinite(worst) else float("inf")
 
 
 def violation(problem: CompiledProblem, x: Array, p: Array) -> float:
@@ -139,13 +199,17 @@ def outputs(problem: CompiledProblem, solution: Solution) -> dict[str, Array]:
     }
 
 
-def discretisation_correction(problem: CompiledProblem, solution: Solution) -> Array:
+def discretisation_correction(
+    problem: CompiledProblem, solution: Solution, linear: LinearSolver | None = None
+) -> Array:
     """Return the first-order change of x from halving every step: one Newton step on the fine equations.
 
     The fine equations reuse the coarse Jacobian, which differs from theirs by the discretisation error itself. Where the
     problem is not square, the free quantities are held.
     """
     fine = np.asarray(problem.fine_residual(solution.x, solution.p)).ravel()
+    if linear is not None:
+        return linear.solve(solution.x, solution.p, fine)
     J = problem.jacobian(solution.x, solution.p)
     n = J.size2()
     skip = 0 if problem.is_square else problem.free_size
@@ -153,67 +217,3 @@ def discretisation_correction(problem: CompiledProblem, solution: Solution) -> A
     J = J[:size, skip:]
     step = np.asarray(ca.solve(J, ca.DM(-fine[:size]), "qr")).ravel()
     return np.concatenate([np.zeros(skip), step])
-
-
-@dataclass(frozen=True, eq=False)
-class Followed:
-    """How far a path was followed: the last solution, the fraction 0..1 it belongs to, and all iterations spent."""
-
-    solution: Solution
-    fraction: float
-    iterations: int
-
-    @property
-    def arrived(self) -> bool:
-        """Whether the end of the path was reached."""
-        return self.fraction >= 1.0
-
-
-def follow(
-    engine: Engine,
-    path: Callable[[float], Array],
-    start: Array,
-    *,
-    distance: Callable[[Array], float],
-    first_step: float = 0.125,
-    smallest_step: float = 1 / 1024,
-    largest_jump: float = 0.6,
-    most_solves: int = 400,
-) -> Followed:
-    """Follow a solution along p = path(t) from t = 0, where `start` is a solution or close to one, to t = 1.
-
-    The step is halved when a solve fails or lands further than `largest_jump` (scaled) from its prediction, which is how
-    another branch shows, and grows again after success. The predictor is the secant. `distance` measures a change of x. A
-    solve counts when it meets ten times the engine's own tolerance, so an engine for a path may be a loose one.
-    """
-    tolerance = 10 * engine.tolerance
-    current = engine.solve(path(0.0), start)
-    iterations = current.iterations
-    if not current.holds(tolerance):
-        return Followed(current, 0.0, iterations)
-    done, step = 0.0, first_step
-    previous: tuple[float, Array] | None = None
-    for _ in range(most_solves):
-        target = min(1.0, done + step)
-        guess = current.x
-        if previous is not None:
-            guess = guess + (current.x - previous[1]) * (target - done) / (done - previous[0])
-        trial = engine.solve(path(target), guess)
-        iterations += trial.iterations
-        jump = distance(trial.x - guess)
-        if trial.holds(tolerance) and jump <= largest_jump:
-            previous, current, done = (done, current.x), trial, target
-            if done >= 1.0:
-                break
-            step *= 1.6 if trial.iterations <= 4 else 1.0
-        else:
-            step /= 2
-            if step < smallest_step:
-                break
-    return Followed(current, done, iterations)
-
-
-def straight_path(problem: CompiledProblem, start: Mapping[str, Any], end: Mapping[str, Any]) -> Callable[[float], Array]:
-    """Return p(t) along the straight line between two sets of values of the fixed quantities."""
-    a, b = problem.pack(start), problem.pack(end)
-    return lambda t: b if t >= 1.0 else a + t * (b - a)

@@ -1,9 +1,10 @@
-"""Whether an equilibrium is a minimum of the potential energy: conjugate points of the second variation.
+"""Whether an equilibrium is a minimum of the potential energy: the index of its second variation.
 
-The loads are dead and the pressures fixed, so the rod has an energy. With a clamped base and a free tip its equilibrium is
-stable when no variation that keeps the tip balance linearised vanishes (as a pose) anywhere between base and tip: the 6x6
-determinant of the pose part of the six such solutions, started at the tip, keeps its sign down to the base. At the base
-this is the determinant of the map from base unknowns to tip residual.
+The loads are dead and the pressures fixed, so the rod has an energy. Its second variation is summed from tip to base: the
+part of the rod beyond a node answers a small pose of the node with a stiffness, the interval before the node with its own,
+and their sum, symmetric at an equilibrium, has as many negative eigenvalues as the node adds directions in which the
+energy falls. The total is the number of conjugate points (Morse); it is exact for points that coincide, as the two of a
+round column that buckles in both planes at once, where a determinant keeps its sign.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp import rod
+from softnlp.loadcase import unpack_section
 from softnlp.transcription import RK4, rk_step
 
 Array = NDArray[np.float64]
@@ -21,9 +23,9 @@ _SUBSTEPS = 2
 
 
 def _perturbed(x: ca.SX, delta: ca.SX) -> ca.SX:
-    """Move a state along 12 independent directions: p, a rotation about the body axes, n, m."""
+    """Move a state along 12 independent directions: p, a rotation about the world axes, n, m."""
     p, R, n, m = rod.unpack(x)
-    R_moved = R @ (ca.SX.eye(3) + rod.hat(delta[3:6]))
+    R_moved = (ca.SX.eye(3) + rod.hat(delta[3:6])) @ R
     return ca.vertcat(p + delta[0:3], ca.reshape(R_moved, 9, 1), n + delta[6:9], m + delta[9:12])
 
 
@@ -44,13 +46,12 @@ def transition_functions(field: ca.Function) -> tuple[ca.Function, ca.Function]:
     moved = ca.jacobian(end, delta)
     rows = []
     for j in range(12):
-        W = R.T @ ca.reshape(moved[3:12, j], 3, 3)
+        W = ca.reshape(moved[3:12, j], 3, 3) @ R.T
         turn = ca.vertcat(W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]) / 2
         rows.append(ca.vertcat(moved[0:3, j], turn, moved[12:18, j]))
     transition = ca.substitute(ca.horzcat(*rows), delta, ca.SX.zeros(12))
 
-    section = rod.RodSection(*(c[k] for k in range(len(rod.RodSection._fields))))
-    balance = rod.tip_balance(_perturbed(x, delta), section, ca.SX.zeros(3), ca.SX.zeros(3))
+    balance = rod.tip_balance(_perturbed(x, delta), unpack_section(c), ca.SX.zeros(3), ca.SX.zeros(3))
     tip = ca.substitute(ca.jacobian(balance, delta[:6]), delta, ca.SX.zeros(12))
     return (
         ca.Function("transition", [x, c, h], [transition], {"cse": True}),
@@ -59,19 +60,19 @@ def transition_functions(field: ca.Function) -> tuple[ca.Function, ca.Function]:
 
 
 def conjugate_points(transition: ca.Function, tip_variation: ca.Function, nodes: Array, constants: Array) -> int:
-    """Count the sign changes of the pose determinant from tip to base; 0 means stable.
+    """Count the directions in which the energy falls, from tip to base; 0 means stable.
 
-    transition : of `transition_functions`, mapped over the intervals. nodes : (18, K + 1) states of a solution. Two conjugate points within one interval cancel.
+    transition : of `transition_functions`, mapped over the intervals. nodes : (18, K + 1) states of a solution.
     """
     K = nodes.shape[1] - 1
     Phi = np.asarray(transition(nodes[:, :K], constants, 1 / K)).reshape(12, K, 12).transpose(1, 0, 2)
-    A = np.asarray(tip_variation(nodes[:, K], constants))
-    Y = np.vstack([np.eye(6), -A])
-    sign, count = 1.0, 0
+    A, B, C, D = Phi[:, :6, :6], Phi[:, :6, 6:], Phi[:, 6:, :6], Phi[:, 6:, 6:]
+    before = D @ np.linalg.inv(B)  # force at a node by its pose, with the node before it held
+    beyond = -np.asarray(tip_variation(nodes[:, K], constants))  # and by the part of the rod beyond it
+    count = 0
     for k in range(K - 1, -1, -1):
-        Y = np.linalg.solve(Phi[k], Y)
-        Y /= np.max(np.abs(Y))
-        now = float(np.sign(np.linalg.det(Y[:6])))
-        count += now != sign
-        sign = now
+        H = before[k] - beyond
+        count += int(np.sum(np.linalg.eigvalsh((H + H.T) / 2) < 0))
+        # Carry the stiffness of the rod beyond over the interval: f_left as a function of the pose at its left.
+        beyond = np.linalg.solve(D[k] - beyond @ B[k], beyond @ A[k] - C[k])
     return count

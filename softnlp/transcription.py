@@ -1,7 +1,8 @@
 """From an ordinary differential equation on 0..1 to algebraic equations: multiple shooting and collocation.
 
-Knows no rod. A *field* is a `casadi.Function` (x, c) -> dx/ds, with the state x (nx) and constants c (nc), posed on s in 0..1.
-Both methods give the same thing, a `Transcribed`: unknowns in the order of the intervals, so that the Jacobian is banded,
+Knows no rod. A *field* is a `casadi.Function` (x, c) -> dx/ds, with the state x (nx) and constants c (nc), posed on
+s in 0..1. Both methods give the same thing, a `Transcribed`: unknowns in the order of the intervals, so that the Jacobian
+is banded,
 
     [x_0 | (stages) x_1 | (stages) x_2 | ... | x_K]
 
@@ -149,7 +150,7 @@ class MultipleShooting:
 
 @dataclass(frozen=True)
 class Collocation:
-    """Orthogonal collocation: in each interval the state is a polynomial of `degree` that obeys the field at its points.
+    """Orthogonal collocation: in each interval the state is a polynomial of `degree` that obeys the field at points.
 
     Legendre points give order 2 degree at the nodes, Radau points 2 degree - 1.
     """
@@ -199,7 +200,8 @@ class Collocation:
         fine_gap = flow(flow(left, constants), constants) - right
         fine = ca.vertcat(ca.DM.zeros(nx * d, K), fine_gap)
 
-        B = ca.collocation_coeff(tau)[2]
+        # Not collocation_coeff's weights, which give s = 0 a share: with one Radau point they sum to a half.
+        B = ca.DM(np.linalg.solve(np.vander(tau, increasing=True).T, 1 / np.arange(1, d + 1)))
 
         def integrate(quadrature: ca.Function) -> ca.MX:
             rates = quadrature.map(K * d)(states[:, inner], constants)

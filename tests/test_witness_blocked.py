@@ -31,7 +31,7 @@ def curve(robot: str, closure: str, calibrated: bool = False) -> tuple[Blocked, 
     wall = Wall(closure, k_c=k_c)
     return tuple(
         follow(
-            BODIES[robot], ECOFLEX_50, [1.5e5, 0, 0], FRACTIONS, wall, choices=choices, first_step=0.2, tolerance=1e-7
+            BODIES[robot], ECOFLEX_50, [1.5e5, 0, 0], FRACTIONS, wall, choices=choices, first_step=0.2, tolerance=1e-5
         )
     )
 
@@ -73,7 +73,11 @@ def test_mean_errors_over_the_eight_robots() -> None:
 
 
 def test_free_closure_underestimates_every_robot() -> None:
-    ratios = [one(1.5, Wall("free"), name).force / force for name, force in MEASURED.items()]
+    ratios = [
+        follow(BODIES[name], ECOFLEX_50, [1.5e5, 0, 0], [1.0], Wall("free"), first_step=0.34, tolerance=1e-5)[0].force
+        / f
+        for name, f in MEASURED.items()
+    ]
     assert np.abs(np.array(ratios) - 1).mean() == pytest.approx(0.43, abs=0.005)
     assert max(ratios) < 0.8
     assert min(ratios) == pytest.approx(0.39, abs=0.01)
@@ -89,10 +93,11 @@ def test_rigid_closure_overestimates_and_folds() -> None:
 def test_compliant_lies_between_free_and_rigid() -> None:
     bar = 0.6
     free, rigid = one(bar, Wall("free")), one(bar, Wall("rigid"))
-    soft, hard = one(bar, Wall(k_c=1e-6)), one(bar, Wall(k_c=1e6))
-    assert soft.force == pytest.approx(free.force, rel=1e-5)
-    # a symmetric pair shares one length error, so stiff chambers are rigid ones
-    assert hard.force == pytest.approx(rigid.force, rel=1e-4)
+    assert one(bar, Wall(k_c=1e-6)).force == pytest.approx(free.force, rel=1e-5)
+    # a symmetric pair shares one length error, so stiff chambers tend to rigid ones, as 1 / k_c
+    stiff, stiffer = (rigid.force - one(bar, Wall(k_c=k)).force for k in (1e3, 1e4))
+    assert 0 < stiffer < 2e-3 * rigid.force
+    assert stiff / stiffer == pytest.approx(10, rel=0.05)
     assert free.force < one(bar, Wall()).force < rigid.force
     assert abs(rigid.e_L) < 1e-12
 
@@ -119,6 +124,13 @@ def test_the_wall_is_one_sided() -> None:
     assert reached.contact
     assert 0 < reached.force < curve("D25L60", "compliant")[-1].force
     assert reached.x_contact == pytest.approx(-30e-3, abs=1e-10)
+
+
+def test_at_zero_pressure_the_wall_carries_nothing() -> None:
+    start = follow(BODIES["D25L60"], ECOFLEX_50, [1.5e5, 0, 0], [0.0], Wall("rigid"))[0]
+    assert start.force == 0
+    assert not start.reaction.any()
+    np.testing.assert_allclose(start.tip_position, [0, 0, 60e-3], atol=1e-12)
 
 
 def test_the_wall_force_vanishes_where_contact_begins() -> None:

@@ -98,8 +98,8 @@ class Blocked:
 class _Contact:
     """The equations at one pressure, dimensionless; columns are n(0), m(0), F_b (signed, along +x), T."""
 
-    def __init__(self, problem: Scaled, wall: Wall, base: Array, free_tip: Array) -> None:
-        self.problem, self.wall, self.base = problem, wall, base
+    def __init__(self, sec: Section, problem: Scaled, wall: Wall, base: Array, free_tip: Array) -> None:
+        self.sec, self.problem, self.wall, self.base = sec, problem, wall, base
         self.h, self.L_t = wall.h / problem.length, wall.L_t / problem.length
         self.free = free_tip[20:, 0]
         self.pressed = problem.sec.PA > 0
@@ -120,9 +120,8 @@ class _Contact:
             return np.where(mask, stiffness * (free - tip[20:]) / free, 0.0)
         return np.zeros_like(tip[20:])
 
-    def errors(self, columns: Array, rtol: float) -> tuple[Array, Array, Array, Array]:
-        """e_n (3, K), e_m (3, K), e_L (K,), e_h (K,)."""
-        tip = integrate(self.problem, columns[:6], rtol=rtol)
+    def errors(self, columns: Array, tip: Array) -> tuple[Array, Array, Array, Array]:
+        """e_n (3, K), e_m (3, K), e_L (K,), e_h (K,) of the unknowns and the tip states they lead to."""
         F_b = columns[6]
         T = columns[7] if len(columns) > 7 else np.zeros_like(F_b)
         r = tip_imbalance(self.problem, tip, 1.0, self.reaction(tip, T))
@@ -137,7 +136,7 @@ class _Contact:
 
     def residual(self, columns: Array, rtol: float) -> Array:
         """Return the square system of `free`, `compliant` and `rigid`."""
-        e_n, e_m, e_L, e_h = self.errors(columns, rtol)
+        e_n, e_m, e_L, e_h = self.errors(columns, integrate(self.problem, columns[:6], rtol=rtol))
         rows = [e_n, e_m, e_h[None]]
         if self.wall.closure == "rigid":
             rows.append(e_L[None])
@@ -156,7 +155,7 @@ class _Contact:
         def stacked(columns: Array) -> Array:
             full = np.zeros((7, columns.shape[1]))
             full[inside] = columns
-            e_n, e_m, e_L, e_h = self.errors(full, rtol)
+            e_n, e_m, e_L, e_h = self.errors(full, integrate(self.problem, full[:6], rtol=rtol))
             return np.vstack([W_n * e_n, W_m * e_m, W_L * e_L[None], W_h * e_h[None]])
 
         def slopes(x: Array) -> Array:
@@ -204,19 +203,27 @@ def follow(
     P = np.asarray(pressures, float)
     if not planar(body, rubber, P, choices, loads):
         raise ValueError("not planar")
-    side = np.sign(_at(body, rubber, P, wall, choices, loads, fractions[-1]).x_free)  # where the free shape goes
+
+    def at(fraction: float) -> _Contact:
+        return _at(body, rubber, fraction * P, wall, choices, loads, rtol=tolerance / 100)
+
+    contact = at(fractions[-1])
+    side = float(np.sign(contact.x_free))  # where the free shape goes
 
     def unilateral(contact: _Contact) -> bool:
         return bool(side * (contact.x_free - contact.h) > 0)
 
+    # every target ends a step, so `contact` is the target's when its result is made
     results: list[Blocked] = []
     # path points in SI: n(0), m(0), F_b, T
     done, before = (0.0, None), None
     step = first_step
     for target in fractions:
+        if target == done[0]:
+            contact = at(target)
         while done[0] < target:
             now = min(target, done[0] + step)
-            contact = _at(body, rubber, P, wall, choices, loads, now, rtol=1e-8)
+            contact = at(now)
             scale = _scale(contact)
             if not unilateral(contact):
                 before, done = None, (now, None)
@@ -239,26 +246,17 @@ def follow(
                 continue
             before, done = done, (now, y * scale)
             step = min(step * 1.4, first_step)
-        results.append(_result(_at(body, rubber, P, wall, choices, loads, target), done[1], float(side), tolerance))
+        results.append(_result(contact, done[1], side, tolerance))
     return results
 
 
-def _at(
-    body: Body,
-    rubber: Rubber,
-    P: Array,
-    wall: Wall,
-    choices: Choices,
-    loads: Loads,
-    fraction: float,
-    rtol: float = 1e-12,
-) -> _Contact:
-    sec = section(body, rubber, fraction * P, choices)
+def _at(body: Body, rubber: Rubber, P: Array, wall: Wall, choices: Choices, loads: Loads, *, rtol: float) -> _Contact:
+    sec = section(body, rubber, P, choices)
     problem = scaled(sec, loads.tip_force, loads.tip_moment, loads.gravity, loads.density)
     base = arc_start(problem)
     if np.any(problem.f_e) or np.any(problem.F_e) or np.any(problem.M_e):
         base, _ = solve_base(problem)
-    return _Contact(problem, wall, base, integrate(problem, base[:, None], rtol=rtol))
+    return _Contact(sec, problem, wall, base, integrate(problem, base[:, None], rtol=rtol))
 
 
 def _scale(contact: _Contact) -> Array:
@@ -286,9 +284,9 @@ def _result(contact: _Contact, point: Array | None, side: float, tolerance: floa
         x, determinants = _solve(contact, point / scale, tolerance=tolerance, rtol=tolerance / 100, most=8)
         if side * x[6] > 0:  # the wall would have to pull
             x, point, determinants = np.concatenate([contact.base, [0.0, 0.0]])[: len(scale)], None, _UNKNOWN
-    tip = integrate(problem, x[:6, None])
+    tip = integrate(problem, x[:6, None], rtol=tolerance / 100)
     T = contact.reaction(tip, x[7:8] if len(x) > 7 else np.zeros(1))[:, 0]
-    e_n, e_m, e_L, e_h = (e[..., 0] for e in contact.errors(x[:, None], 1e-12))
+    e_n, e_m, e_L, e_h = (e[..., 0] for e in contact.errors(x[:, None], tip))
     length, force = problem.length, problem.force
     return Blocked(
         force=float(-side * x[6] * force) if point is not None else 0.0,
@@ -306,7 +304,7 @@ def _result(contact: _Contact, point: Array | None, side: float, tolerance: floa
         x_free=contact.x_free * length,
         base=x[:6] * scale[:6],
         determinants=determinants,
-        section=problem.sec,
+        section=contact.sec,
     )
 
 

@@ -225,7 +225,8 @@ def _frame(axes: Any, points: Array) -> None:
     low, high = points.min(axis=0), points.max(axis=0)
     widest = float((high - low).max())
     low, high = low - 0.03 * widest, high + 0.03 * widest
-    distance = next(d for d in (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, widest) if widest / d <= 6.0)
+    decade = 10.0 ** np.floor(np.log10(widest / 6))
+    distance = next(d for d in decade * np.array([1.0, 2.0, 5.0, 10.0]) if d >= widest / 6)
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_zlim(low[2], high[2])

@@ -9,7 +9,7 @@ import numpy as np
 
 from softnlp.errors import InputError
 from softnlp.materials import Material
-from softnlp.plots.style import GREY, INK, SMALL, colour, listed, new_figure, plain
+from softnlp.plots.style import GREY, INK, SMALL, colour, new_figure, plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,6 +24,7 @@ LINE_STYLES = {
     "linear": (0, (6, 1.5, 1, 1.5, 1, 1.5)),
 }
 OWN_LINE_STYLES = ((0, (10, 2)), (0, (1, 4)), (0, (3, 4)))
+_COLUMNS, _LINE = 6, 0.25  # of the legends: entries a line, height of a line [inch]
 CLIP = 1.25  # panels reach this far beyond the fitted range's values
 
 
@@ -48,14 +49,18 @@ def material_figure(materials: Sequence[Material], stretch_range: tuple[float, f
     styles = line_styles(materials)
     fitted = (max(m.fitted_stretch[0] for m in materials), min(m.fitted_stretch[1] for m in materials))
 
-    figure = new_figure(11.0, 4.6, "Silicones in uniaxial tension", listed(names) + "  ·  " + listed(list(styles)))
+    lines = -(-len(names) // _COLUMNS) + -(-len(styles) // _COLUMNS)
+    bottom = 0.2 + _LINE * lines
+    height = 3.75 + bottom
+    shaded = "  ·  shaded where the constants were fitted" if fitted[0] < fitted[1] else ""
+    figure = new_figure(11.0, height, "Silicones in uniaxial tension", f"incompressible{shaded}")
     quantities = (
         ("engineering stress [kPa]", "engineering_stress"),
         ("true stress [kPa]", "true_stress"),
         ("tangent modulus [kPa]", "tangent_modulus"),
     )
     for k, (label, method) in enumerate(quantities):
-        axes = figure.add_axes((0.065 + 0.327 * k, 0.27, 0.26, 0.57))
+        axes = figure.add_axes((0.065 + 0.327 * k, (bottom + 0.5) / height, 0.26, 2.5 / height))
         plain(axes, "stretch [-]", label)
         if fitted[0] < fitted[1]:
             axes.axvspan(*fitted, color="#F0F0F0", zorder=0, label="fitted range")
@@ -77,7 +82,7 @@ def material_figure(materials: Sequence[Material], stretch_range: tuple[float, f
         axes.set_xlim(low, high)
         axes.set_ylim(min(0.0, CLIP * reached.min()), CLIP * reached.max())
         axes.axhline(0.0, color=GREY, linewidth=0.8, zorder=1)
-    _legends(figure, names, styles, fitted)
+    _legends(figure, names, styles, bottom / height)
     return figure
 
 
@@ -90,22 +95,18 @@ def line_styles(materials: Sequence[Material]) -> dict[str, Any]:
     return styles
 
 
-def _legends(figure: Figure, names: list[str], laws: dict[str, Any], fitted: tuple[float, float]) -> None:
+def _legends(figure: Figure, names: list[str], laws: dict[str, Any], top: float) -> None:
     from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
 
     colours = [Line2D([], [], color=colour(k), linewidth=3, label=name) for k, name in enumerate(names)]
     styles = [Line2D([], [], color=INK, linestyle=style, label=law) for law, style in laws.items()]
-    shade = [Patch(color="#F0F0F0", label="fitted range")] if fitted[0] < fitted[1] else []
-    figure.legend(
-        handles=colours, loc="lower left", bbox_to_anchor=(0.045, 0.07), ncols=5, fontsize=SMALL, frameon=False
-    )
-    figure.legend(
-        handles=styles + shade,
-        loc="lower left",
-        bbox_to_anchor=(0.045, 0.01),
-        ncols=7,
-        fontsize=SMALL,
-        frameon=False,
-        handlelength=3.2,
-    )
+    look: dict[str, Any] = {
+        "loc": "upper left",
+        "fontsize": SMALL,
+        "frameon": False,
+        "labelcolor": INK,
+        "handlelength": 3.2,
+    }
+    figure.legend(handles=colours, ncols=_COLUMNS, bbox_to_anchor=(0.045, top), **look)
+    below = top - _LINE * -(-len(names) // _COLUMNS) / figure.get_figheight()
+    figure.legend(handles=styles, ncols=_COLUMNS, bbox_to_anchor=(0.045, below), **look)

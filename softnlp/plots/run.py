@@ -58,9 +58,8 @@ def run_figure(view: RunView) -> Figure:
     from matplotlib.ticker import MaxNLocator
 
     total, solved = len(view.status), len(view.solved)
-    title = view.title or view.robot.name
     parts = [view.robot.name, view.material, view.conventions, f"{solved} of {total} steps solved"]
-    figure = new_figure(10.0, 5.4, title if len(title) <= 80 else f"{title[:79]}…", "  ·  ".join(parts))
+    figure = new_figure(10.0, 5.4, view.title or view.robot.name, "  ·  ".join(parts))
     body_panel(figure, (2.85, 2.55), view)
     _set_legend(figure, view)
 
@@ -122,7 +121,7 @@ def _set_legend(figure: Figure, view: RunView) -> None:
 
     style = {"fontsize": SMALL, "frameon": False, "labelcolor": INK, "handlelength": 1.2, "columnspacing": 1.4}
     sets = [Patch(color=colour(k), label=f"set {k + 1}") for k in range(view.robot.chamber_sets)]
-    figure.legend(handles=sets, loc="upper left", bbox_to_anchor=(0.01, 0.885), ncols=len(sets), **style)
+    figure.legend(handles=sets, loc="upper left", bbox_to_anchor=(0.01, 0.885), ncols=min(len(sets), 6), **style)
 
     marks = []
     if len(view.solved) < len(view.status):

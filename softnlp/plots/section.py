@@ -9,7 +9,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from softnlp.errors import InputError
-from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, colour, new_figure
+from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, colour, ink_on, new_figure
 from softnlp.robot import Robot, Violation, touching_stretch
 from softnlp.studies.step import SectionRadii
 from softnlp.units import MILLIMETRE
@@ -25,6 +25,7 @@ PANEL = (5.0, 4.45)  # width and height of a drawing [inch]
 _WINDOW = (-1.25, 2.17, -1.8, 1.25)  # left, right, bottom, top of a drawing, in outer radii of the undeformed body
 _LEADER_ANGLE = radians(35)  # where the labelled chamber is looked for
 _COLUMN = 1.3  # left edge of the labels beside a drawing, in outer radii
+_LEGEND_COLUMNS = 3  # a drawing
 _LINE = 0.19  # height of a line of text below the drawings [inch]
 
 
@@ -68,12 +69,14 @@ def section_figure(robot: Robot, violations: Sequence[Violation] = (), stretch: 
         notes.append(f"at stretch {stretch:g}: neighbouring reinforced chambers touch above stretch {touching:.3g}")
     lines = [line for note in notes for line in wrap(note, 62 * len(states), subsequent_indent="    ")]
 
-    width, height = PANEL[0] * len(states), PANEL[1] + 0.85 + _LINE * len(lines) + 0.1 * bool(lines)
+    columns = _LEGEND_COLUMNS * len(states)
+    header = 0.85 + _LINE * ((robot.chamber_sets - 1) // columns)
+    width, height = PANEL[0] * len(states), PANEL[1] + header + _LINE * len(lines) + 0.1 * bool(lines)
     subtitle = f"length {_number(robot.length / MILLIMETRE)} mm  ·  dimensions in mm"
     figure = new_figure(width, height, robot.name, subtitle)
     broken = {n for v in violations for n in v.chambers}
     for k, (title, _) in enumerate(states):
-        bottom = height - 0.85 - PANEL[1]
+        bottom = height - header - PANEL[1]
         axes = figure.add_axes((k / len(states), bottom / height, 1 / len(states), PANEL[1] / height))
         red = broken if k == 0 else set(range(robot.chambers)) if touching < stretch else set()
         _draw(axes, robot, radii[k], title, red, made=k == 0)
@@ -82,7 +85,7 @@ def section_figure(robot: Robot, violations: Sequence[Violation] = (), stretch: 
     for j, line in enumerate(lines):
         y = (0.12 + _LINE * (len(lines) - 1 - j)) / height
         figure.text(0.18 / width, y, line, size=SMALL, color=WRONG, va="bottom", parse_math=False)
-    _legend(figure, robot, height)
+    _legend(figure, robot, height, columns)
     return figure
 
 
@@ -118,7 +121,7 @@ def _draw(axes: Axes, robot: Robot, radii: SectionRadii, title: str, red: Collec
                 axes, centre, radii.chamber, fill=False, edgecolor=WRONG, linewidth=2.2, zorder=6, label="broken rule"
             )
         axes.text(
-            centre[0] / MILLIMETRE, centre[1] / MILLIMETRE, str(n + 1), color="white",
+            centre[0] / MILLIMETRE, centre[1] / MILLIMETRE, str(n + 1), color=ink_on(colour(chamber_set)),
             size=min(TEXT, 0.55 * bore_points), weight="bold", ha="center", va="center_baseline", zorder=7,
         )  # fmt: skip
     _axes_cross(axes, R)
@@ -217,17 +220,16 @@ def _angle(axes: Axes, first: float, second: float, radius: float) -> None:
         axes.plot([0, end * cos(angle)], [0, end * sin(angle)], color=GREY, linewidth=0.5, zorder=2.5)
 
 
-def _legend(figure: Figure, robot: Robot, height: float) -> None:
+def _legend(figure: Figure, robot: Robot, height: float, columns: int) -> None:
     from matplotlib.patches import Patch
 
     handles = []
     for k in range(robot.chamber_sets):
-        members = [str(n + 1) for n, chamber_set in enumerate(robot.set_of_chamber) if chamber_set == k]
-        handles.append(
-            Patch(color=colour(k), label=f"set {k + 1}: chamber{'s' * (len(members) > 1)} {', '.join(members)}")
-        )
+        first, last = k * robot.chambers_per_set + 1, (k + 1) * robot.chambers_per_set
+        members = f"chamber {first}" if first == last else f"chambers {first} to {last}"
+        handles.append(Patch(color=colour(k), label=f"set {k + 1}: {members}"))
     figure.legend(
-        handles=handles, loc="upper left", bbox_to_anchor=(0.01, 1 - 0.56 / height), ncols=len(handles), fontsize=SMALL,
+        handles=handles, loc="upper left", bbox_to_anchor=(0.01, 1 - 0.56 / height), ncols=columns, fontsize=SMALL,
         frameon=False, labelcolor=INK, handlelength=1.2, columnspacing=1.4,
     )  # fmt: skip
 

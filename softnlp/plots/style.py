@@ -31,6 +31,11 @@ def colour(index: int) -> str:
     return COLOURS[index % len(COLOURS)]
 
 
+def ink_on(background: str) -> str:
+    """Return the colour of text on a background: dark on the palette's light colours, else white."""
+    return INK if background in COLOURS[4:] else "white"
+
+
 def step_colours(steps: int) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Return (steps, 4) colours from first (dark) to last; the palest end of the map is left out."""
     from matplotlib import colormaps
@@ -39,16 +44,22 @@ def step_colours(steps: int) -> np.ndarray[Any, np.dtype[np.float64]]:
 
 
 def new_figure(width: float, height: float, title: str, subtitle: str) -> Figure:
-    """Return an empty figure [inch] with a heading; the text is shown as it is, `$` included."""
+    """Return an empty figure [inch] with a heading on two lines, cut to its width; `$` is shown as it is."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
     left = 0.18 / width
+    title, subtitle = (_cut(text, int(width * n)) for text, n in ((title, 8.0), (subtitle, 12.5)))
     figure.text(left, 1 - 0.12 / height, title, size=12, weight="bold", color=INK, va="top", parse_math=False)
     figure.text(left, 1 - 0.37 / height, subtitle, size=TEXT, color=GREY, va="top", parse_math=False)
     return figure
+
+
+def _cut(text: str, longest: int) -> str:
+    text = "  ".join(" ".join(part.split()) for part in text.split("  "))
+    return text if len(text) <= longest else f"{text[: longest - 1]}…"
 
 
 def plain(axes: Axes, x_label: str, y_label: str) -> None:

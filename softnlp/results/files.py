@@ -24,10 +24,10 @@ def write_whole(path: str | PathLike[str], content: bytes) -> Path:
     try:
         part.write_bytes(content)
         os.replace(part, target)
-    except OSError as error:
-        with suppress(OSError):  # the folder may refuse this too; the first error says why
+    except (OSError, ValueError) as error:  # ValueError: a NUL character in the name
+        with suppress(OSError, ValueError):  # the folder may refuse this too; the first error says why
             part.unlink(missing_ok=True)
-        raise InputError(f"cannot be written: {error.strerror or error}", source=str(target)) from None
+        raise InputError(f"cannot be written: {_reason(error)}", source=str(target)) from None
     return target
 
 
@@ -44,6 +44,10 @@ def make_folder(path: str | PathLike[str]) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
         raise InputError("expected a folder, got a file", source=str(folder)) from None
-    except OSError as error:
-        raise InputError(f"cannot make this folder: {error.strerror or error}", source=str(folder)) from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot make this folder: {_reason(error)}", source=str(folder)) from None
     return folder
+
+
+def _reason(error: OSError | ValueError) -> str:
+    return getattr(error, "strerror", None) or str(error)

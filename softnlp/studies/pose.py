@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp import rod
+from softnlp.loadcase import unpack_section
 from softnlp.quantities import Model
 from softnlp.robot import touching_stretch
 from softnlp.section import deform
@@ -26,7 +27,7 @@ def shape_function(field: ca.Function) -> ca.Function:
     end = x
     for _ in range(_SUBSTEPS):
         end = step(end, c, h / _SUBSTEPS)
-    v, u = rod.strains(end, rod.RodSection(*(c[k] for k in range(len(rod.RodSection._fields)))))
+    v, u = rod.strains(end, unpack_section(c))
     return ca.Function("shape", [x, c, h], [ca.vertcat(end, v, u)], {"cse": True})
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.branch import BranchPoint, branch_function, stretch_on_branch
-from softnlp.loadcase import LoadCase, arc_function, load_case, rod_field
+from softnlp.continuation import around_folds, follow, straight_path
+from softnlp.condensed import CondensedSolver
+from softnlp.loadcase import LoadCase, load_case, rod_functions
 from softnlp.numerics import Numerics
 from softnlp.problem import CompiledProblem, compile_problem
 from softnlp.quantities import Model, quantities
@@ -22,15 +24,13 @@ from softnlp.solver import (
     Solution,
     certificate,
     discretisation_correction,
-    follow,
     outputs,
-    straight_path,
 )
 from softnlp.stability import conjugate_points, transition_functions
 from softnlp.status import Status
 from softnlp.studies.pose import SHAPE_POINTS, between_nodes, pose_of, pose_warnings, shape_function, shape_of
 from softnlp.studies.step import Step
-from softnlp.transcription import method_named
+from softnlp.transcription import MultipleShooting, method_named
 
 Array = NDArray[np.float64]
 
@@ -38,6 +38,7 @@ FIRST_INTERVALS = {"multiple-shooting": 10, "collocation": 5}
 MOST_INTERVALS = 1810
 _TURN = 0.25  # largest angle [rad] of the unloaded arc within one RK4 interval of a first grid
 _FINER = 4  # how much finer a grid is tried where a coarse one finds no solution
+_PRESSURE_PARTS = (0.0, 0.5, 0.25, 0.75)
 _LOADS = ("tip_force", "tip_moment", "gravity")
 # Without loads the exact answer is a circular arc; a solution is good enough to show it.
 UNLOADED_ACCURACY = 5e-9
@@ -102,6 +103,13 @@ def next_size(wanted: float) -> int:
     return size
 
 
+def pose_weight(x: Array) -> Array:
+    """Return the weight of each entry of x in an arc length that is the mean over the nodes of the change of pose."""
+    states = np.zeros((x.size // STATE_SIZE, STATE_SIZE))
+    states[:, :12] = 1.0 / len(states)
+    return np.concatenate([[0.0], states.ravel()])
+
+
 def pose_distance(change: Array) -> float:
     """Return the largest change of a scaled position or of a direction cosine between two x."""
     states = change[1:].reshape(-1, STATE_SIZE)
@@ -119,19 +127,26 @@ class PoseSolver:
         self.numerics = numerics
         self._quantities = quantities(model)
         self._branch = branch_function(model)
-        self._arc = arc_function(model)
-        field = rod_field(model.robot.chambers)[0]
-        self._shape = shape_function(field)
-        self._transition, self._tip_variation = transition_functions(field)
+        self._functions = rod_functions(model)
+        self._shape = shape_function(self._functions.field)
+        self._transition, self._tip_variation = transition_functions(self._functions.field)
         self._grids: dict[int, Grid] = {}
 
     def grid(self, intervals: int) -> Grid:
         """Return the compiled problem on a grid, building it at first use."""
         if intervals not in self._grids:
             method = method_named(self.numerics.transcription, intervals)
-            case = load_case("pose", self.model, self._quantities, method)
+            case = load_case("pose", self._functions, self._quantities, method)
             problem = compile_problem(list(self._quantities.values()), [case])
-            self._grids[intervals] = Grid(case, Engine(problem), Engine(problem, max_iterations=8, tolerance=1e-7), self._transition.map(intervals))
+            linear = CondensedSolver(self._functions, method) if isinstance(method, MultipleShooting) else None
+            self._grids[intervals] = Grid(
+                case=case,
+                engine=Engine(problem, linear=linear),
+                stepper=Engine(
+                    problem, linear=linear, newton_only=linear is not None, max_iterations=8, tolerance=1e-7
+                ),
+                transition=self._transition.map(intervals),
+            )
         return self._grids[intervals]
 
     def values(self, pressure: Array, loads: Loads) -> dict[str, Any]:
@@ -151,7 +166,7 @@ class PoseSolver:
         began = time.perf_counter()
         pressure = np.asarray(pressure, dtype=float)
         values = self.values(pressure, loads)
-        column = np.concatenate([np.ravel(values.get(name, q.nominal)) for name, q in self._quantities.items()])
+        column = self._column(values)
         branch = stretch_on_branch(self._branch, column, pressure)
         if branch.status is not Status.SOLVED:
             return Step(pressure, branch.status, branch.message, solve_time=time.perf_counter() - began), None
@@ -196,7 +211,7 @@ class PoseSolver:
     def _first_intervals(self, column: Array, stretch: float) -> int:
         """Return a grid coarse enough to be quick and fine enough for the curl of the unloaded robot."""
         first = FIRST_INTERVALS[self.numerics.transcription]
-        straight = np.asarray(self._arc(column, stretch, 0.01)).ravel()
+        straight = np.asarray(self._functions.arc(column, stretch, 0.01)).ravel()
         curl = 100 * float(np.hypot(straight[9], straight[10]))  # of the axis, R e3, over the first hundredth
         turn = _TURN * FIRST_INTERVALS["multiple-shooting"] / first
         return min(next_size(max(first, curl / turn)), MOST_INTERVALS)
@@ -219,27 +234,28 @@ class PoseSolver:
     def _solve_on(
         self, intervals: int, values: dict[str, Any], branch: BranchPoint, near: Solved | None
     ) -> tuple[Solved | None, int, float]:
-        """Try, in order: the neighbour, the unloaded arc, loads applied after the pressure, and before it.
+        """Try, in order: the neighbour, the unloaded arc, loads applied after the pressure, and after part of it.
 
         The first stable solution wins; an unstable one is kept in case there is no other. Returns it, the iterations spent
         and how far continuation came.
         """
         grid = self.grid(intervals)
         p = grid.problem.pack(values)
-        unloaded = values | {name: np.zeros(3) for name in _LOADS}
-        at_rest = values | {"pressure": np.zeros_like(values["pressure"])}
+        no_loads = {name: np.zeros(3) for name in _LOADS}
+        unloaded = values | no_loads
         spent, reached = 0, 0.0
         unstable: Solved | None = None
 
-        def attempts() -> Iterator[Callable[[], tuple[Solution, float]]]:
+        def attempts() -> Iterator[tuple[Solution, float]]:
             if near is not None:
-                yield lambda: (grid.engine.solve(p, self._transfer(near, grid, p, branch.stretch)), 1.0)
-            yield lambda: (grid.engine.solve(p, self._arc_guess(grid, p, branch.stretch)), 1.0)
-            yield lambda: self._along(grid, [unloaded, values], branch.stretch)
-            yield lambda: self._along(grid, [at_rest | {k: unloaded[k] for k in _LOADS}, at_rest, values], 1.0)
+                yield grid.engine.solve(p, self._transfer(near, grid, p, branch.stretch)), 1.0
+            yield grid.engine.solve(p, self._arc_guess(grid, p, branch.stretch)), 1.0
+            yield from self._along(grid, [unloaded, values])
+            for part in _PRESSURE_PARTS:
+                partly = values | {"pressure": part * values["pressure"]}
+                yield from self._along(grid, [partly | no_loads, partly, values])
 
-        for attempt in attempts():
-            solution, fraction = attempt()
+        for solution, fraction in attempts():
             spent += solution.iterations
             reached = max(reached, fraction) if fraction < 1.0 else reached
             if fraction >= 1.0 and solution.holds(self.numerics.tolerance):
@@ -249,26 +265,48 @@ class PoseSolver:
                 unstable = solved
         return unstable, spent, reached
 
-    def _along(self, grid: Grid, waypoints: list[dict[str, Any]], stretch: float) -> tuple[Solution, float]:
-        """Follow the solution along straight lines between values; return the last one and the fraction of the way."""
+    def _along(self, grid: Grid, waypoints: list[dict[str, Any]]) -> Iterator[tuple[Solution, float]]:
+        """Follow the solution along straight lines between values; yield solutions at the end and the fraction reached.
+
+        Where the branch turns back before the end the robot snaps through: the curve is followed around its folds, and
+        every equilibrium at the end that it passes is offered.
+        """
         problem = grid.problem
-        x = self._arc_guess(grid, problem.pack(waypoints[0]), stretch)
+        x = self._arc_guess(grid, problem.pack(waypoints[0]), self._stretch(waypoints[0]))
+        p_end = problem.pack(waypoints[-1])
         legs = len(waypoints) - 1
-        iterations = 0
+        spent = 0
         for k in range(legs):
             path = straight_path(problem, waypoints[k], waypoints[k + 1])
             followed = follow(grid.stepper, path, x, distance=pose_distance)
-            iterations += followed.iterations
-            if not followed.arrived:
-                return replace(followed.solution, iterations=iterations), (k + followed.fraction) / legs
+            spent += followed.iterations
             x = followed.solution.x
-        final = grid.engine.solve(problem.pack(waypoints[-1]), x)
-        return replace(final, iterations=iterations + final.iterations), 1.0
+            if not followed.arrived:
+                yield replace(followed.solution, iterations=spent), (k + followed.fraction) / legs
+                if k == legs - 1 and grid.engine.linear is not None:
+                    weight = pose_weight(x)
+                    passages = around_folds(
+                        grid.stepper, grid.engine.linear, path, followed.solution, followed.fraction, weight=weight
+                    )
+                    for x_end, iterations in passages:
+                        final = grid.engine.solve(p_end, x_end)
+                        yield replace(final, iterations=final.iterations + iterations), 1.0
+                return
+        final = grid.engine.solve(p_end, x)
+        yield replace(final, iterations=spent + final.iterations), 1.0
+
+    def _column(self, values: dict[str, Any]) -> Array:
+        """Return every quantity in its order, SI."""
+        return np.concatenate([np.ravel(values.get(name, q.nominal)) for name, q in self._quantities.items()])
+
+    def _stretch(self, values: dict[str, Any]) -> float:
+        """Return the stretch on the branch from zero pressure at the pressure in `values`."""
+        return stretch_on_branch(self._branch, self._column(values), values["pressure"]).stretch
 
     def _arc_guess(self, grid: Grid, p: Array, stretch: float) -> Array:
         """Return x of the unloaded circular arc at this pressure."""
         s = grid.case.transcribed.points
-        states = np.asarray(self._arc(p, stretch, s[None, :]))
+        states = np.asarray(self._functions.arc(p, stretch, s[None, :]))
         return np.concatenate([[stretch], states.T.ravel()])
 
     def _transfer(self, solved: Solved, grid: Grid, p: Array, stretch: float) -> Array:
@@ -284,7 +322,7 @@ class PoseSolver:
 
     def _examine(self, grid: Grid, solution: Solution) -> Solved:
         """Estimate the discretisation error of a solution and test its stability."""
-        correction = discretisation_correction(grid.problem, solution)
+        correction = discretisation_correction(grid.problem, solution, grid.engine.linear)
         order = method_named(self.numerics.transcription, 1).order
         richardson = 2**order / (2**order - 1)
         tip = correction[-STATE_SIZE:] * richardson
@@ -308,7 +346,7 @@ class PoseSolver:
         L_0, F_0 = (float(v) for v in np.asarray(grid.problem.units(solution.x, solution.p)).ravel())
         s = np.linspace(0, 1, SHAPE_POINTS)
         shape = shape_of(between_nodes(self._shape, solved.nodes, solved.constants, s), s, L_0, F_0)
-        unloaded_tip = np.asarray(self._arc(solution.p, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
+        unloaded_tip = np.asarray(self._functions.arc(solution.p, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
         pose = pose_of(self.model, result, shape, unloaded_tip, solved.stable)
         warnings = list(pose_warnings(self.model, pose))
         if solved.error > self.numerics.accuracy:

@@ -1,0 +1,171 @@
+"""How fast poses are beside the paper's method on the same equations, and how fast the commands are.
+
+    python -m benchmarks.statics
+
+The paper's method is single shooting with 20 RK4 steps in NumPy and Levenberg-Marquardt with finite differences
+(`benchmarks.paper_method`). It gets the stretch and the stiffnesses for nothing, and computes no error estimate,
+stability or shape. A pose of this package includes all of these. "cold" starts from the closed form of the unloaded
+shape in both, and "from zeros" from n(0) = m(0) = 0; a sequence is started cold and then warm, each pose from the last.
+
+Ours, "compiled": by a solver that has met these poses before, so that its grids exist. "as run": each solver is new.
+"auto" refines the grid until the estimated error is met (1e-6 of the length with loads, 5e-9 without); "20 intervals"
+fixes it, as the paper's is. The error is the tip's distance to a solution with 320 intervals.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+from benchmarks.paper_method import Array, Rod, solve_pose
+from softnlp import BAR, Loads, Numerics, material, robot
+from softnlp.branch import branch_function, stretch_on_branch
+from softnlp.quantities import Model, quantities
+from softnlp.section import deform
+from softnlp.studies.statics import PoseSolver
+from softnlp.units import STANDARD_GRAVITY
+
+MODEL = Model(robot("D25L60"), material("Ecoflex 00-50"))
+PRESSURES = np.linspace(0, 1.5 * BAR, 11)[:, None] * np.array([1.0, 0.0, 0.0])
+CASES = {
+    "no load": Loads(),
+    "tip force and gravity": Loads(tip_force=(0.02, 0.01, -0.03), gravity=(0.0, 0.0, -STANDARD_GRAVITY)),
+}
+FIXED, FINE = Numerics(intervals=20), Numerics(intervals=320)
+REPEATS = 7
+SCENARIO = Path(__file__).parents[1] / "scenarios" / "D25L60_one_set.toml"
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of the table. seconds : median. error : of the tip position, largest of the poses [L_0]."""
+
+    what: str
+    method: str
+    seconds: float
+    error: float
+
+
+def main() -> None:
+    """Print both tables."""
+    for case, loads in CASES.items():
+        print(f"\n{MODEL.robot.name}, {MODEL.material.name}, set 1 to 1.5 bar, {case}\n")
+        print_poses(poses(loads))
+    print(f"\nWhole processes, median of 5, on {os.cpu_count()} processors\n")
+    for what, seconds in processes().items():
+        print(f"  {what:45s} {seconds:7.3f} s")
+
+
+def poses(loads: Loads) -> list[Line]:
+    """Time a cold pose at 1.5 bar and the whole sequence, by both methods."""
+    rods = [rod_at(P, loads) for P in PRESSURES]
+    exact = our_sequence(PoseSolver(MODEL, FINE), loads, PRESSURES)
+    lines = []
+
+    def add(what: str, method: str, work: Callable[[], Array]) -> None:
+        tips = work()
+        error = np.linalg.norm(tips - exact[-len(tips) :], axis=1).max() / MODEL.robot.length
+        lines.append(Line(what, method, timed(work), float(error)))
+
+    for what, chosen in (("cold pose", slice(-1, None)), ("sequence of 11", slice(None))):
+        P, R = PRESSURES[chosen], rods[chosen]
+        add(what, "paper, from the arc", lambda R=R: paper_sequence(R, loads, "arc"))
+        add(what, "paper, from zeros", lambda R=R: paper_sequence(R, loads, "zeros"))
+        for name, numerics in (("auto", Numerics()), ("20 intervals", FIXED)):
+            solver = PoseSolver(MODEL, numerics)
+            add(what, f"ours, {name}, compiled", lambda P=P, s=solver: our_sequence(s, loads, P))
+            add(what, f"ours, {name}, as run", lambda P=P, n=numerics: our_sequence(PoseSolver(MODEL, n), loads, P))
+    return lines
+
+
+def print_poses(lines: list[Line]) -> None:
+    """Print the lines with ratios to the paper's two starts; above 1 is faster than the paper's method."""
+    print(f"  {'':15s} {'method':26s} {'time':>10s} {'from arc':>9s} {'from zeros':>10s} {'tip error':>10s}")
+    for line in lines:
+        paper = {k: next(b.seconds for b in lines if b.what == line.what and k in b.method) for k in ("arc", "zeros")}
+        ratios = f"{paper['arc'] / line.seconds:8.2f}x {paper['zeros'] / line.seconds:9.2f}x"
+        print(f"  {line.what:15s} {line.method:26s} {1e3 * line.seconds:7.1f} ms {ratios} {line.error:10.0e}")
+
+
+def paper_sequence(rods: list[Rod], loads: Loads, start: str) -> Array:
+    """Solve poses by the paper's method, each from the last, the first from `start`; return the tips (steps, 3)."""
+    near: str | Array = start
+    tips = []
+    for rod in rods:
+        answer = solve_pose(rod, loads.tip_force, loads.tip_moment, start=near)
+        if not answer.residual < 1e-6:
+            raise RuntimeError(f"the paper's method ended at a residual of {answer.residual:.1e}")
+        near = answer.base
+        tips.append(answer.tip.p)
+    return np.array(tips)
+
+
+def our_sequence(solver: PoseSolver, loads: Loads, pressures: Array) -> Array:
+    """Solve poses by the package, each from the last, the first cold; return the tips (steps, 3)."""
+    near = None
+    tips = []
+    for P in pressures:
+        step, near = solver.solve(P, loads, near)
+        if step.pose is None:
+            raise RuntimeError(step.message)
+        tips.append(step.pose.tip_position)
+    return np.array(tips)
+
+
+def rod_at(pressure: Array, loads: Loads) -> Rod:
+    """Return the rod at a pressure [Pa], as plain numbers for the paper's method."""
+    nominal = [q.nominal for name, q in quantities(MODEL).items() if name != "pressure"]
+    stretch = stretch_on_branch(branch_function(MODEL), np.concatenate([pressure, *nominal]), pressure).stretch
+    section = deform(MODEL.robot, MODEL.material, pressure, stretch, MODEL.coefficients, MODEL.conventions)
+    EI_x, EI_y = section.bending_stiffness
+    w_x, w_y, w_z = (MODEL.material.density * section.area * g for g in loads.gravity)
+    return Rod(
+        length=float(stretch * MODEL.robot.length),
+        EA=float(section.axial_stiffness),
+        GA=float(section.shear_stiffness),
+        EI=(float(EI_x), float(EI_y)),
+        GJ=float(section.torsional_stiffness),
+        PA=float(section.pressure_area) * pressure[list(MODEL.robot.set_of_chamber)],
+        d=np.array(section.centres, dtype=float),
+        weight=(float(w_x), float(w_y), float(w_z)),
+    )
+
+
+def processes() -> dict[str, float]:
+    """Time the commands as whole processes, the interpreter's start included."""
+    python = [sys.executable, "-c"]
+    with tempfile.TemporaryDirectory() as folder:
+        commands = {
+            f"softnlp run scenarios/{SCENARIO.name}": [sys.executable, "-m", "softnlp", "run", str(SCENARIO)],
+            "import softnlp": [*python, "import softnlp"],
+            "from softnlp import forward, material, robot": [*python, "from softnlp import forward, material, robot"],
+            "softnlp --version": [sys.executable, "-m", "softnlp", "--version"],
+            "python -c pass, for comparison": [*python, "pass"],
+        }
+        return {
+            what: timed(lambda c=command: subprocess.run(c, cwd=folder, capture_output=True, check=True), repeats=5)
+            for what, command in commands.items()
+        }
+
+
+def timed(work: Callable[[], object], repeats: int = REPEATS) -> float:
+    """Return the median time of a piece of work [s]."""
+    times = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - began)
+    return median(times)
+
+
+if __name__ == "__main__":
+    main()

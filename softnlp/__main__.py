@@ -1,0 +1,7 @@
+"""`python -m softnlp` is the command `softnlp`."""
+
+import sys
+
+from softnlp.cli import main
+
+sys.exit(main())

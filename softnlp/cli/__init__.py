@@ -1,0 +1,78 @@
+"""The command `softnlp`.
+
+Exit status: 0 when every step solved, 3 when some did not (the others' results are kept), 2 for bad input, 130 when
+stopped by Ctrl-C (the finished steps are kept).
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from softnlp.cli.console import BAD_INPUT, SOLVED, STOPPED, complain, say
+
+if TYPE_CHECKING:
+    from cyclopts import App
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line (that of the process by default) and return its exit status."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        return _version() if words == ["--version"] else _run(words)
+    except KeyboardInterrupt:
+        complain("stopped")
+        return STOPPED
+
+
+def _version() -> int:
+    """Print the version without the imports that every other command needs."""
+    from softnlp import __version__
+
+    say(__version__)
+    return SOLVED
+
+
+def _run(words: list[str]) -> int:
+    """Run one command; what is wrong with its input is one line on standard error."""
+    from cyclopts import CycloptsError
+
+    from softnlp.errors import SoftnlpError
+
+    try:
+        return int(_app()(words, exit_on_error=False, print_error=False) or SOLVED)
+    except CycloptsError as error:
+        complain(f"{' '.join(str(error).split())} (--help after any command lists what it takes)")
+    except SoftnlpError as error:
+        complain(str(error))
+    return BAD_INPUT
+
+
+def _app() -> App:
+    """Return the commands."""
+    from cyclopts import App, Parameter
+
+    from softnlp import __version__
+    from softnlp.cli.library import materials, robots
+    from softnlp.cli.plot import plot_material, plot_run, plot_section
+    from softnlp.cli.run import run
+
+    app = App(
+        name="softnlp",
+        help="Statics of pneumatic soft manipulators: how far they bend and stretch, and where the tip is under load.",
+        version=__version__,
+        help_format="plaintext",
+        result_action="return_value",
+        suppress_keyboard_interrupt=False,
+        default_parameter=Parameter(negative=()),
+    )
+    app.command(run)
+    app.command(robots)
+    app.command(materials)
+    plot = App(name="plot", help="Draw a cross-section, silicones, or the results of a run.")
+    plot.command(plot_section, name="section")
+    plot.command(plot_material, name="material")
+    plot.command(plot_run, name="run")
+    app.command(plot)
+    return app

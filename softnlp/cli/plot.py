@@ -1,0 +1,94 @@
+"""`softnlp plot`: a cross-section, silicones, or the results of a run, as figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from softnlp.cli.console import say
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def plot_section(robot: str, /, *, stretch: float = 1.0, out: Path | None = None) -> None:
+    """Draw a cross-section to scale, its sets coloured and the rules that it breaks marked.
+
+    Parameters
+    ----------
+    robot
+        A name of the library, or a scenario file (one whose robot cannot be made is drawn too).
+    stretch
+        Draw the section at this stretch as well.
+    out
+        PNG, PDF or SVG file; section-ROBOT.png by default.
+    """
+    from softnlp.plots import section_figure
+    from softnlp.robot import robot as library_robot
+    from softnlp.robot import violations
+    from softnlp.scenario import robot_of_scenario
+
+    if robot.endswith(".toml"):
+        made, broken = robot_of_scenario(robot)
+    else:
+        made = library_robot(robot)
+        broken = violations(made)
+    name = "".join(c if c.isalnum() or c in "-_." else "-" for c in made.name)
+    _save(section_figure(made, broken, stretch), out or Path(f"section-{name}.png"))
+
+
+def plot_material(
+    *names: str,
+    law: tuple[str, ...] = ("mooney-rivlin",),
+    file: Path | None = None,
+    stretch: float = 2.2,
+    out: Path = Path("materials.png"),
+) -> None:
+    """Draw stress and tangent modulus against stretch.
+
+    Parameters
+    ----------
+    names
+        Silicones; all of the file when none is named.
+    law
+        A law's name; repeat it for several, or "all".
+    file
+        A materials file of your own; the shipped one by default.
+    stretch
+        Draw from 1 to this stretch.
+    out
+        PNG, PDF or SVG file.
+    """
+    from softnlp.materials import load_materials, material
+    from softnlp.plots import material_figure
+
+    entries = load_materials(file)
+    chosen = []
+    for name in names or tuple(entries):
+        laws = tuple(entries[name].models) if "all" in law and name in entries else law
+        chosen += [material(name, model, file=file) for model in laws]
+    _save(material_figure(chosen, (1.0, stretch)), out)
+
+
+def plot_run(results: Path, /, *, out: Path | None = None) -> None:
+    """Draw the results of a run again: shapes, bending angle and elongation.
+
+    Parameters
+    ----------
+    results
+        Folder of a run, or its results.nc.
+    out
+        PNG, PDF or SVG file; figure.png beside the results by default.
+    """
+    from softnlp.plots import run_figure
+    from softnlp.results import load_run
+
+    folder = results if results.is_dir() else results.parent
+    _save(run_figure(load_run(results)), out or folder / "figure.png")
+
+
+def _save(figure: Figure, path: Path) -> None:
+    """Write a figure and say where."""
+    from softnlp.plots import save_figure
+
+    say(f"drawn in {save_figure(figure, path)}")

@@ -1,0 +1,113 @@
+"""`softnlp run`: a scenario file solved, its table printed, its results written."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say
+from softnlp.errors import InputError
+
+if TYPE_CHECKING:
+    from softnlp.scenario import Scenario
+    from softnlp.studies.step import Run, Step
+
+_TABLE_WIDTH = 100
+_SET_WIDTH = 12  # of what each chamber set beyond the third adds to the table
+
+
+class _StopRun(Exception):
+    """Ends a run between two steps."""
+
+
+def run(scenario: Path, /, *, out: Path | None = None, json: bool = False) -> int:
+    """Solve every step of a scenario file in order, each started from the last.
+
+    Prints a table and writes results.nc, table.csv, results.json, versions.json, figure.png and a copy of the scenario.
+    The exit status is 0 when every step solved, 3 when some did not, 2 for bad input, 130 when stopped by Ctrl-C.
+
+    Parameters
+    ----------
+    scenario
+        TOML file; docs/scenario.md lists what it may hold.
+    out
+        Folder for the results; by default results/NAME, where NAME is that of the scenario file.
+    json
+        Print one JSON document and nothing else; no files are written unless --out is given.
+    """
+    from softnlp.results import json_text
+    from softnlp.scenario import load_scenario
+
+    asked = load_scenario(scenario)
+    folder = out if out is not None or json else Path("results") / scenario.stem
+    if folder is not None:
+        _require_writable(folder)
+    done, stopped = _solve(asked)
+    try:
+        if folder is not None:
+            _write(done, folder, asked)
+    finally:  # the numbers are shown even where they cannot be written
+        say(json_text(done).rstrip("\n") if json else _table(done))
+    if folder is not None and not json:
+        say(f"results in {folder}")
+    if stopped:
+        kept = "" if folder is None else f"; those are in {folder}"
+        complain(f"stopped after {len(done.steps)} of {len(asked.pressures)} steps{kept}")
+        return STOPPED
+    return SOME_UNSOLVED if done.failed else SOLVED
+
+
+def _solve(asked: Scenario) -> tuple[Run, bool]:
+    """Run a scenario with a progress bar; return the steps that were done and whether it was stopped before the end."""
+    from softnlp.runner import partial_run, run_scenario
+
+    total = len(asked.pressures)
+    steps: list[Step] = []
+    with progress(total, asked.title) as (advance, stop_asked):
+
+        def keep(index: int, step: Step) -> None:
+            steps.append(step)
+            advance(len(steps))
+            if stop_asked() and len(steps) < total:
+                raise _StopRun
+
+        try:
+            return run_scenario(asked, keep), False
+        except _StopRun:
+            return partial_run(asked, steps), True
+
+
+def _require_writable(folder: Path) -> None:
+    """Refuse a folder that cannot be written before time is spent on a solve; nothing is made yet."""
+    standing = next((p for p in (folder, *folder.parents) if os.path.lexists(p)), Path())
+    if not standing.is_dir():
+        raise InputError("expected a folder, got a file", source=str(standing))
+    if not os.access(standing, os.W_OK | os.X_OK):
+        raise InputError("this folder cannot be written", source=str(standing))
+
+
+def _write(done: Run, folder: Path, asked: Scenario) -> None:
+    """Write results and figure."""
+    from softnlp.plots import run_figure
+    from softnlp.results import save
+
+    save(done, folder, scenario_text=asked.text, figure=run_figure)
+
+
+def _table(done: Run) -> str:
+    """Return the table of a run as text, coloured on a terminal; never narrower than its numbers need."""
+    from rich.console import Console
+    from rich.text import Text
+
+    from softnlp.results import table_lines
+
+    console = Console(highlight=False)
+    needed = _TABLE_WIDTH + _SET_WIDTH * max(0, done.robot.chamber_sets - 3)
+    if not console.is_terminal or console.width < needed:
+        console = Console(highlight=False, width=needed)
+    with console.capture() as shown:
+        heading = f"{done.title}: {done.robot.name}, {done.material.name} ({done.material.law.name})"
+        console.print(Text(heading, "bold"))
+        console.print(table_lines(done))
+    return shown.get().rstrip("\n")

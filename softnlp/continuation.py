@@ -1,0 +1,196 @@
+"""Following a solution along a path of fixed values: by steps of the path, and around its folds by arc length."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.problem import CompiledProblem
+from softnlp.solver import Engine, LinearSolver, Solution
+
+Array = NDArray[np.float64]
+Path = Callable[[float], Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """How far a path was followed: the last solution, the fraction 0..1 it belongs to, and all iterations spent."""
+
+    solution: Solution
+    fraction: float
+    iterations: int
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the end of the path was reached."""
+        return self.fraction >= 1.0
+
+
+def follow(
+    engine: Engine,
+    path: Path,
+    start: Array,
+    *,
+    distance: Callable[[Array], float],
+    first_step: float = 0.125,
+    smallest_step: float = 1 / 1024,
+    largest_jump: float = 0.6,
+    most_solves: int = 400,
+) -> Followed:
+    """Follow a solution along p = path(t) from t = 0, where `start` is a solution or close to one, to t = 1.
+
+    The step is halved when a solve fails or lands further than `largest_jump` (scaled) from its prediction, which is how
+    another branch shows, and grows again after success. The predictor is the secant. `distance` measures a change of x. A
+    solve counts when it meets ten times the engine's own tolerance, so an engine for a path may be a loose one.
+    """
+    tolerance = 10 * engine.tolerance
+    current = engine.solve(path(0.0), start)
+    iterations = current.iterations
+    if not current.holds(tolerance):
+        return Followed(current, 0.0, iterations)
+    done, step = 0.0, first_step
+    previous: tuple[float, Array] | None = None
+    for _ in range(most_solves):
+        target = min(1.0, done + step)
+        guess = current.x
+        if previous is not None:
+            guess = guess + (current.x - previous[1]) * (target - done) / (done - previous[0])
+        trial = engine.solve(path(target), guess)
+        iterations += trial.iterations
+        jump = distance(trial.x - guess)
+        if trial.holds(tolerance) and jump <= largest_jump:
+            previous, current, done = (done, current.x), trial, target
+            if done >= 1.0:
+                break
+            step *= 1.6 if trial.iterations <= 4 else 1.0
+        else:
+            step /= 2
+            if step < smallest_step:
+                break
+    return Followed(current, done, iterations)
+
+
+def straight_path(problem: CompiledProblem, start: Mapping[str, Any], end: Mapping[str, Any]) -> Path:
+    """Return p(t) along the straight line between two sets of values of the fixed quantities."""
+    a, b = problem.pack(start), problem.pack(end)
+    return lambda t: b if t >= 1.0 else a + t * (b - a)
+
+
+@dataclass(frozen=True, eq=False)
+class _Tangent:
+    """A unit direction of the curve (x, t) in the metric that `weight` gives to x."""
+
+    x: Array
+    t: float
+
+
+def around_folds(
+    engine: Engine,
+    linear: LinearSolver,
+    path: Path,
+    start: Solution,
+    fraction: float,
+    *,
+    weight: Array,
+    first_step: float = 0.02,
+    largest_step: float = 0.3,
+    smallest_step: float = 1e-5,
+    most_steps: int = 400,
+) -> Iterator[tuple[Array, int]]:
+    """Follow the curve of solutions (x, t) by arc length from t = `fraction`; yield x near every passage of t = 1.
+
+    Where a load path turns back, its curve goes on through unstable equilibria and often turns forward again: the robot
+    snaps through. weight : per entry of x, for the arc length. Yields also the iterations spent since the last passage.
+    """
+    x, t, step, spent = start.x, fraction, first_step, 0
+    tangent: _Tangent | None = None
+    for _ in range(most_steps):
+        try:
+            heading = _tangent(engine.problem, linear, path, x, t, weight, tangent)
+        except np.linalg.LinAlgError:
+            return
+        while step >= smallest_step:
+            corrected = _corrected(engine, linear, path, x, t, heading, step, weight)
+            spent += 4
+            if corrected is not None:
+                break
+            step /= 2
+        else:
+            return
+        x_new, t_new, steps_taken = corrected
+        if (t - 1.0) * (t_new - 1.0) <= 0.0 and t_new != t:
+            yield x + (x_new - x) * (1.0 - t) / (t_new - t), spent
+            spent = 0
+        if t_new < -1.0 or t_new > 2.0:
+            return
+        x, t, tangent = x_new, t_new, heading
+        step = min(largest_step, step * (1.5 if steps_taken <= 3 else 1.0))
+
+
+def _slope(problem: CompiledProblem, path: Path, x: Array, t: float) -> Array:
+    """Return dg/dt along the path by central differences; Newton needs it to a few digits only."""
+    h = 1e-6
+    ahead, behind = (np.asarray(problem.residual(x, path_value(path, t + s))).ravel() for s in (h, -h))
+    return (ahead - behind) / (2 * h)
+
+
+def path_value(path: Path, t: float) -> Array:
+    """Return the straight path beyond its ends as well."""
+    a, b = path(0.0), path(1.0)
+    return a + t * (b - a)
+
+
+def _tangent(
+    problem: CompiledProblem,
+    linear: LinearSolver,
+    path: Path,
+    x: Array,
+    t: float,
+    weight: Array,
+    before: _Tangent | None,
+) -> _Tangent:
+    """Return the direction of the curve at a solution, onwards from `before` (or towards larger t)."""
+    slope = linear.solve(x, path_value(path, t), _slope(problem, path, x, t))
+    size = float(np.sqrt(np.sum(weight * slope**2) + 1.0))
+    tangent = _Tangent(slope / size, 1.0 / size)
+    if before is not None and np.sum(weight * tangent.x * before.x) + tangent.t * before.t < 0:
+        return _Tangent(-tangent.x, -tangent.t)
+    return tangent
+
+
+def _corrected(
+    engine: Engine,
+    linear: LinearSolver,
+    path: Path,
+    x_start: Array,
+    t_start: float,
+    heading: _Tangent,
+    step: float,
+    weight: Array,
+) -> tuple[Array, float, int] | None:
+    """Return the point of the curve on the plane a step ahead, normal to the heading, and the iterations; else None."""
+    problem = engine.problem
+    x, t = x_start + step * heading.x, t_start + step * heading.t
+    for k in range(8):
+        p = path_value(path, t)
+        g = np.asarray(problem.residual(x, p)).ravel()
+        size = float(np.max(np.abs(g)))
+        if not size < 1e4:
+            return None
+        off = float(np.sum(weight * heading.x * (x - x_start)) + heading.t * (t - t_start) - step)
+        if size <= engine.tolerance and abs(off) <= 1e-6:
+            return x, t, k
+        try:
+            a, b = linear.solve(x, p, g), linear.solve(x, p, _slope(problem, path, x, t))
+        except np.linalg.LinAlgError:
+            return None
+        along = float(np.sum(weight * heading.x * b) + heading.t)
+        d_t = -(off + float(np.sum(weight * heading.x * a))) / along if along else np.inf
+        if not np.isfinite(d_t):
+            return None
+        x, t = x + a + b * d_t, t + d_t
+    return None
