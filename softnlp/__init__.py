@@ -68,7 +68,7 @@ __all__ = sorted([*_HOME_OF, "__version__"])
 
 
 class _Package(ModuleType):
-    """This package: `robot` stays the function when the submodule of that name is imported, in whatever order."""
+    """The package: `robot` stays the function when the submodule of that name is imported, in whatever order."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in _HOME_OF or not isinstance(value, ModuleType):

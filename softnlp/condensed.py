@@ -69,7 +69,10 @@ def _sweep_function(functions: RodFunctions, method: MultipleShooting) -> ca.Fun
     column, stretch = sym("p", functions.section.size1_in(0)), sym("stretch")
     constants, balance, _ = functions.section(column, stretch)
     section = ca.Function(
-        "section", [column, stretch], [constants, ca.jacobian(constants, stretch), ca.jacobian(balance, stretch)], {"cse": True}
+        "section",
+        [column, stretch],
+        [constants, ca.jacobian(constants, stretch), ca.jacobian(balance, stretch)],
+        {"cse": True},
     )
 
     x, p = ca.MX.sym("x", 1 + _NX * (K + 1)), ca.MX.sym("p", column.numel())

@@ -15,6 +15,8 @@ from softnlp.solver import Engine, LinearSolver, Solution
 Array = NDArray[np.float64]
 Path = Callable[[float], Array]
 
+_CORRECTIONS = 8
+
 
 @dataclass(frozen=True, eq=False)
 class Followed:
@@ -43,9 +45,9 @@ def follow(
 ) -> Followed:
     """Follow a solution along p = path(t) from t = 0, where `start` is a solution or close to one, to t = 1.
 
-    The step is halved when a solve fails or lands further than `largest_jump` (scaled) from its prediction, which is how
-    another branch shows, and grows again after success. The predictor is the secant. `distance` measures a change of x. A
-    solve counts when it meets ten times the engine's own tolerance, so an engine for a path may be a loose one.
+    The step is halved when a solve fails or lands further than `largest_jump` (scaled) from its prediction, which is
+    how another branch shows, and grows again after success. The predictor is the secant. `distance` measures a change
+    of x. A solve counts when it meets ten times the engine's own tolerance, so an engine for a path may be a loose one.
     """
     tolerance = 10 * engine.tolerance
     current = engine.solve(path(0.0), start)
@@ -99,29 +101,32 @@ def around_folds(
     first_step: float = 0.02,
     largest_step: float = 0.3,
     smallest_step: float = 1e-5,
-    most_steps: int = 400,
+    most_solves: int = 1500,
 ) -> Iterator[tuple[Array, int]]:
     """Follow the curve of solutions (x, t) by arc length from t = `fraction`; yield x near every passage of t = 1.
 
     Where a load path turns back, its curve goes on through unstable equilibria and often turns forward again: the robot
-    snaps through. weight : per entry of x, for the arc length. Yields also the iterations spent since the last passage.
+    snaps through. weight : per entry of x, for the arc length. Yields also the linear solves spent since the last
+    passage, and ends after `most_solves`.
     """
     x, t, step, spent = start.x, fraction, first_step, 0
     tangent: _Tangent | None = None
-    for _ in range(most_steps):
+    while True:
         try:
             heading = _tangent(engine.problem, linear, path, x, t, weight, tangent)
         except np.linalg.LinAlgError:
             return
         while step >= smallest_step:
-            corrected = _corrected(engine, linear, path, x, t, heading, step, weight)
-            spent += 4
+            corrected, steps_taken = _corrected(engine, linear, path, x, t, heading, step, weight)
+            spent += 1 + 2 * steps_taken  # linear solves
             if corrected is not None:
                 break
             step /= 2
         else:
             return
-        x_new, t_new, steps_taken = corrected
+        if spent > most_solves:
+            return
+        x_new, t_new = corrected
         if (t - 1.0) * (t_new - 1.0) <= 0.0 and t_new != t:
             yield x + (x_new - x) * (1.0 - t) / (t_new - t), spent
             spent = 0
@@ -171,26 +176,26 @@ def _corrected(
     heading: _Tangent,
     step: float,
     weight: Array,
-) -> tuple[Array, float, int] | None:
-    """Return the point of the curve on the plane a step ahead, normal to the heading, and the iterations; else None."""
+) -> tuple[tuple[Array, float] | None, int]:
+    """Return the point of the curve on the plane a step ahead, normal to the heading, or None; and the iterations."""
     problem = engine.problem
     x, t = x_start + step * heading.x, t_start + step * heading.t
-    for k in range(8):
+    for k in range(_CORRECTIONS):
         p = path_value(path, t)
         g = np.asarray(problem.residual(x, p)).ravel()
         size = float(np.max(np.abs(g)))
         if not size < 1e4:
-            return None
+            return None, k
         off = float(np.sum(weight * heading.x * (x - x_start)) + heading.t * (t - t_start) - step)
         if size <= engine.tolerance and abs(off) <= 1e-6:
-            return x, t, k
+            return (x, t), k
         try:
             a, b = linear.solve(x, p, g), linear.solve(x, p, _slope(problem, path, x, t))
         except np.linalg.LinAlgError:
-            return None
+            return None, k
         along = float(np.sum(weight * heading.x * b) + heading.t)
         d_t = -(off + float(np.sum(weight * heading.x * a))) / along if along else np.inf
         if not np.isfinite(d_t):
-            return None
+            return None, k
         x, t = x + a + b * d_t, t + d_t
-    return None
+    return None, _CORRECTIONS

@@ -5,8 +5,8 @@ A solve that fails is not an exception: it is a step with a named `softnlp.statu
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from collections.abc import Iterable
+from difflib import get_close_matches
 
 
 class SoftnlpError(Exception):
@@ -34,9 +34,7 @@ class InputError(SoftnlpError, ValueError):
         self.key = key
         super().__init__(self.__str__())
 
-    def located(
-        self, *, source: str | None = None, table: str | None = None, key: str | None = None
-    ) -> InputError:
+    def located(self, *, source: str | None = None, table: str | None = None, key: str | None = None) -> InputError:
         """Return the same error with the places that it did not yet know filled in."""
         return type(self)(
             self.message,

@@ -49,8 +49,8 @@ class RodFunctions:
 
     section : (quantities, stretch) -> c, scaled stretch imbalance, units (L_0, EI / L_0^2). field : (x, c) -> dx/ds on
     s in 0..1. lengths : (x, c) -> rates of the chamber lengths, the bending angle and the backbone length.
-    tip : (x, c, force, moment) -> the 6 tip residuals. arc : (quantities, stretch, s) -> state without gravity or tip load,
-    exact there and the first guess elsewhere.
+    tip : (x, c, force, moment) -> the 6 tip residuals. arc : (quantities, stretch, s) -> state without gravity or tip
+    load, exact there and the first guess elsewhere.
     """
 
     model: Model
@@ -118,9 +118,7 @@ class LoadCase:
     force_unit: ca.MX
 
 
-def load_case(
-    name: str, functions: RodFunctions, given: Mapping[str, Quantity], method: Transcription
-) -> LoadCase:
+def load_case(name: str, functions: RodFunctions, given: Mapping[str, Quantity], method: Transcription) -> LoadCase:
     """Transcribe the rod of a model in the state of loading that the quantities `given` describe.
 
     functions : of `rod_functions(model)`, which every grid and case of the model shares. given : every name of

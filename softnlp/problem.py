@@ -38,8 +38,8 @@ class Constraint:
 class CompiledProblem:
     """A problem as functions of its unknowns x (scaled) and its fixed values p (SI).
 
-    x stacks the free quantities, then each case's unknowns; p stacks the fixed quantities. residual(x, p) stacks each case's
-    equations, then the constraints over their scales. solver_arguments holds bounds and the NLP for IPOPT.
+    x stacks the free quantities, then each case's unknowns; p stacks the fixed quantities. residual(x, p) stacks each
+    case's equations, then the constraints over their scales. solver_arguments holds bounds and the NLP for IPOPT.
     """
 
     cases: tuple[LoadCase, ...]
@@ -125,7 +125,9 @@ def compile_problem(
     def function(name: str, expressions: Sequence[ca.MX], names: Sequence[str] | None = None) -> ca.Function:
         inner = ca.Function(name, originals, [ca.densify(ca.MX(e)) for e in expressions])
         results = inner.call(pieces, True, False)
-        return ca.Function(name, [x, p], results, ["x", "p"], list(names)) if names else ca.Function(name, [x, p], results)
+        return (
+            ca.Function(name, [x, p], results, ["x", "p"], list(names)) if names else ca.Function(name, [x, p], results)
+        )
 
     rows = [c.expression / c.scale for c in constraints]
     residual = function("residual", [ca.vertcat(*(case.residuals for case in cases), *map(ca.vec, rows))])

@@ -72,9 +72,9 @@ _COEFFICIENT_NAMES = {
 def quantities(model: Model) -> dict[str, Quantity]:
     """Return every quantity of the model by name, with the model's values as nominal ones.
 
-    "pressure" (one entry a set, Pa), "tip_force" (N), "tip_moment" (N m), "gravity" (m/s^2), "robot.<dimension>" (m or rad),
-    "material.<constant>", "material.density", "stiffening.elongation", "stiffening.bending", "corrections.area",
-    "corrections.inertia", "corrections.bore_fraction".
+    "pressure" (one entry a set, Pa), "tip_force" (N), "tip_moment" (N m), "gravity" (m/s^2), "robot.<dimension>" (m
+    or rad), "material.<constant>", "material.density", "stiffening.elongation", "stiffening.bending",
+    "corrections.area", "corrections.inertia", "corrections.bore_fraction".
     """
     robot, material = model.robot, model.material
     declared = [
@@ -109,8 +109,8 @@ def with_symbols(model: Model, values: Mapping[str, Any]) -> Model:
 def section_function(model: Model, build: Callable[[Model, Any, Any, Any], Sequence[Any]]) -> ca.Function:
     """Compile `build(model, pressures, gravity, stretch)` for symbols in place of the model's numbers.
 
-    Returns a function of (every quantity of `quantities(model)` in that order as one column, stretch) with the expressions
-    that `build` returns, made of scalar operations so that it costs one call in a larger graph.
+    Returns a function of (every quantity of `quantities(model)` in that order as one column, stretch) with the
+    expressions that `build` returns, made of scalar operations so that it costs one call in a larger graph.
     """
     declared = quantities(model)
     symbols = {name: ca.SX.sym(name, q.size) for name, q in declared.items()}

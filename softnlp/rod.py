@@ -1,7 +1,8 @@
 """The Cosserat rod: Eqs. (2), (5), (8), (13), (17) as a field along s, and its tip balance, Eq. (9).
 
-The state is x = [p (3), R (9, column by column), n (3), m (3)]: position, rotation (columns are the body axes), internal
-force and moment, all in the world frame. Pure functions of numbers or symbols in any consistent system of units.
+The state is x = [p (3), R (9, column by column), n (3), m (3)]: position, rotation (columns are the body axes),
+internal force and moment, all in the world frame. Pure functions of numbers or symbols in any consistent system of
+units.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ class RodSection(NamedTuple):
     """What the rod asks of its section at s, in one consistent system of units.
 
     shear, axial, bending_x, bending_y, torsion : GA, EA, EI_x, EI_y, GJ. pressure_force : F_P.
-    pressure_moment_x, pressure_moment_y : sum d_i x P_i A_c e3. load_x, load_y, load_z : f_e, force per length, world frame.
+    pressure_moment_x, pressure_moment_y : sum d_i x P_i A_c e3. load_x, load_y, load_z : f_e, force per length, world
+    frame.
     """
 
     shear: Any
@@ -101,8 +103,8 @@ def strains(x: Any, section: RodSection) -> tuple[Any, Any]:
 def field(x: Any, section: RodSection) -> Any:
     """Return dx/ds, Eqs. (2), (8), (13), for the stretched arc length s in 0..L.
 
-    The pressure term of the moment balance, sum P_i A_c [(v + u x d_i) x e3 + d_i x (u x e3)], is by the Jacobi identity
-    F_P v x e3 + u x (sum d_i x P_i A_c e3), so the rod needs two sums of its section and not every chamber.
+    The pressure term of the moment balance, sum P_i A_c [(v + u x d_i) x e3 + d_i x (u x e3)], is by the Jacobi
+    identity F_P v x e3 + u x (sum d_i x P_i A_c e3), so the rod needs two sums of its section and not every chamber.
     """
     _, R, n, _ = unpack(x)
     v, u = strains(x, section)

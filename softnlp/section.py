@@ -1,6 +1,7 @@
 """The stretched cross-section: Eqs. (10) to (12), (19) to (24) and (S2) to (S6) of the paper.
 
-Pure functions of numbers or CasADi symbols. The stretch is a given here: `stretch_balance` is the residual whose root it is.
+Pure functions of numbers or CasADi symbols. The stretch is a given here: `stretch_balance` is the residual whose root
+it is.
 """
 
 from __future__ import annotations

@@ -63,8 +63,8 @@ class LinearSolver(Protocol):
 class Engine:
     """Newton's method where a structured linear solver is given, and IPOPT, on one compiled problem.
 
-    IPOPT is the reference: it solves what Newton does not, unless `newton_only`. A square problem needs no Hessian: with a
-    zero one IPOPT's step is Newton's too. Safe to share between threads: calls wait for each other.
+    IPOPT is the reference: it solves what Newton does not, unless `newton_only`. A square problem needs no Hessian:
+    with a zero one IPOPT's step is Newton's too. Safe to share between threads: calls wait for each other.
     """
 
     def __init__(
@@ -122,7 +122,7 @@ class Engine:
         return replace(reference, iterations=reference.iterations + spent)
 
     def _newton(self, linear: LinearSolver, p: Array, x_start: Array) -> Solution:
-        """Take full Newton steps while they help; the equations are stated, so there is nothing to trade them against."""
+        """Take full Newton steps while they help."""
         problem = self.problem
         x, best, worst_allowed = x_start, np.inf, _DIVERGED
         with self._lock:
@@ -172,9 +172,7 @@ def _size(g: Array) -> float:
 def violation(problem: CompiledProblem, x: Array, p: Array) -> float:
     """Return the largest scaled violation of any equation, constraint or bound at x; inf when it is not a number."""
     g = np.asarray(problem.residual(x, p)).ravel()
-    excess = np.concatenate(
-        [problem.lower_g - g, g - problem.upper_g, problem.lower_x - x, x - problem.upper_x]
-    )
+    excess = np.concatenate([problem.lower_g - g, g - problem.upper_g, problem.lower_x - x, x - problem.upper_x])
     worst = float(np.max(excess, initial=0.0))
     return worst if np.all(np.isfinite(g)) and np.isfinite(worst) else float("inf")
 
@@ -204,8 +202,8 @@ def discretisation_correction(
 ) -> Array:
     """Return the first-order change of x from halving every step: one Newton step on the fine equations.
 
-    The fine equations reuse the coarse Jacobian, which differs from theirs by the discretisation error itself. Where the
-    problem is not square, the free quantities are held.
+    The fine equations reuse the coarse Jacobian, which differs from theirs by the discretisation error itself. Where
+    the problem is not square, the free quantities are held.
     """
     fine = np.asarray(problem.fine_residual(solution.x, solution.p)).ravel()
     if linear is not None:

@@ -1,13 +1,15 @@
 """Whether an equilibrium is a minimum of the potential energy: the index of its second variation.
 
-The loads are dead and the pressures fixed, so the rod has an energy. Its second variation is summed from tip to base: the
-part of the rod beyond a node answers a small pose of the node with a stiffness, the interval before the node with its own,
-and their sum, symmetric at an equilibrium, has as many negative eigenvalues as the node adds directions in which the
-energy falls. The total is the number of conjugate points (Morse); it is exact for points that coincide, as the two of a
-round column that buckles in both planes at once, where a determinant keeps its sign.
+The loads are dead and the pressures fixed, so the rod has an energy. Its second variation is summed from tip to base:
+the part of the rod beyond a node answers a small pose of the node with a stiffness, the interval before the node with
+its own, and their sum, symmetric at an equilibrium, has as many negative eigenvalues as the node adds directions in
+which the energy falls. The total is the number of conjugate points (Morse); it is exact for points that coincide, as
+the two of a round column that buckles in both planes at once, where a determinant keeps its sign.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -22,7 +24,7 @@ Array = NDArray[np.float64]
 _SUBSTEPS = 2
 
 
-def _perturbed(x: ca.SX, delta: ca.SX) -> ca.SX:
+def _perturbed(x: Any, delta: Any) -> Any:
     """Move a state along 12 independent directions: p, a rotation about the world axes, n, m."""
     p, R, n, m = rod.unpack(x)
     R_moved = (ca.SX.eye(3) + rod.hat(delta[3:6])) @ R
@@ -32,8 +34,8 @@ def _perturbed(x: ca.SX, delta: ca.SX) -> ca.SX:
 def transition_functions(field: ca.Function) -> tuple[ca.Function, ca.Function]:
     """Return the linearised step over one interval and the linearised tip balance.
 
-    field : of a load case. The first maps (x, c, h) to the 12x12 matrix from variations at x to those a step h further; the
-    second maps the tip's (x, c) to the 6x6 matrix A with d(n, m) = -A d(pose) at the tip, for a dead load.
+    field : of a load case. The first maps (x, c, h) to the 12x12 matrix from variations at x to those a step h
+    further; the second maps the tip's (x, c) to the 6x6 matrix A with d(n, m) = -A d(pose) at the tip, for a dead load.
     """
     x, c, h = ca.SX.sym("x", rod.STATE_SIZE), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("h")
     delta = ca.SX.sym("delta", 12)

@@ -1,8 +1,8 @@
 """From an ordinary differential equation on 0..1 to algebraic equations: multiple shooting and collocation.
 
 Knows no rod. A *field* is a `casadi.Function` (x, c) -> dx/ds, with the state x (nx) and constants c (nc), posed on
-s in 0..1. Both methods give the same thing, a `Transcribed`: unknowns in the order of the intervals, so that the Jacobian
-is banded,
+s in 0..1. Both methods give the same thing, a `Transcribed`: unknowns in the order of the intervals, so that the
+Jacobian is banded,
 
     [x_0 | (stages) x_1 | (stages) x_2 | ... | x_K]
 
@@ -225,8 +225,8 @@ class Collocation:
         stage, reached = self._stage_residuals(field, x, ca.reshape(z, nx, d), c, h)
         equations = ca.Function("stages", [z, x, c], [ca.vec(stage), reached])
         newton = ca.rootfinder("flow", "newton", equations, {"abstol": 1e-14, "max_iter": 50, "error_on_fail": False})
-        x, c = ca.MX.sym("x", nx), ca.MX.sym("c", field.size1_in(1))
-        return ca.Function("flow", [x, c], [newton(ca.repmat(x, d, 1), x, c)[1]])
+        start, constants = ca.MX.sym("x", nx), ca.MX.sym("c", field.size1_in(1))
+        return ca.Function("flow", [start, constants], [newton(ca.repmat(start, d, 1), start, constants)[1]])
 
 
 def method_named(name: str, intervals: int) -> Transcription:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from witness_section import LAWS, Body, Choices, NoRoot, Rubber, Section, Unstable, balance_pressure, section
@@ -59,7 +59,7 @@ def rubber_of(material: Material) -> Rubber:
     return LAWS[material.law.name](*(float(value) for value in material.constants.values()))
 
 
-def choices_of(coefficients: Coefficients = Coefficients(), conventions: Conventions = REPRODUCTION) -> Choices:
+def choices_of(coefficients: Coefficients, conventions: Conventions = REPRODUCTION) -> Choices:
     """Return coefficients and conventions as the witness takes them."""
     return Choices(
         k_e=coefficients.elongation,
@@ -159,7 +159,3 @@ def random_design(
     pressure, made = random_pressures(rng, robot, material, most_stretch=most_stretch, most_bending=most_bending)
     return Design(robot, material, pressure, random_loads(rng, made, force=force, moment=moment), made)
 
-
-def unloaded(design: Design) -> Design:
-    """Return the design without loads."""
-    return replace(design, loads=Loads())

@@ -150,9 +150,8 @@ def test_tangent_modulus_is_the_derivative_of_true_stress(silicone: str, law: st
 @pytest.mark.parametrize("silicone", TABLE_II)
 def test_linear_modulus_is_the_secant_of_mooney_rivlin_at_stretch_2(silicone: str) -> None:
     linear = of(silicone, "linear")
-    # Exact decimals, because one silicone's sixth digit is a 5.
     secant = FORMULAS["mooney-rivlin"](Decimal(2), *(Decimal(str(c)) for c in TABLE_II[silicone]["mooney-rivlin"]))
-    assert f"{linear.constants['E_l'] / MPA:.5g}" == f"{secant:.5g}"
+    assert linear.constants["E_l"] / MPA == pytest.approx(float(secant), rel=1e-12)
     assert linear.constants["E_l"] / 1e3 == pytest.approx(SECANTS_KPA[silicone], abs=0.05)
     # The linear law overrides Eq. (24): its modulus does not grow with the stretch.
     for stretch in (1.0, 1.5, 2.0):

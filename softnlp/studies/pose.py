@@ -1,4 +1,4 @@
-"""From a solution of a load case to a pose in SI units: shape, strains, internal force and moment, stability, warnings."""
+"""From a solution of a load case to a pose in SI units: shape, strains, internal force and moment, warnings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SUBSTEPS = 4
 
 
 def shape_function(field: ca.Function) -> ca.Function:
-    """Return (state, c, h) -> [state a step h further, strains (v, u)] in scaled units, for the field of a load case."""
+    """Return (state, c, h) -> [state a step h further, strains (v, u)], scaled, for the field of a load case."""
     x, c, h = ca.SX.sym("x", rod.STATE_SIZE), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("h")
     step = rk_step(field, RK4)
     end = x
@@ -65,9 +65,7 @@ def section_radii(model: Model, stretch: float) -> SectionRadii:
     )
 
 
-def pose_of(
-    model: Model, outputs: dict[str, Array], shape: Shape, unloaded_tip: Array, stable: bool
-) -> Pose:
+def pose_of(model: Model, outputs: dict[str, Array], shape: Shape, unloaded_tip: Array, stable: bool) -> Pose:
     """Assemble a pose. outputs : of the load case, SI. unloaded_tip : tip at this pressure without loads [m]."""
     stretch = float(outputs["stretch"][0])
     R = np.asarray(outputs["tip_rotation"])

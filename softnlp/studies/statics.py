@@ -1,4 +1,4 @@
-"""Solving one pose after another for one robot and silicone: guesses, refinement, and what to try when a solve fails."""
+"""Solving one pose after another for one robot: guesses, refinement, and what to try when a solve fails."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.branch import BranchPoint, branch_function, stretch_on_branch
-from softnlp.continuation import around_folds, follow, straight_path
 from softnlp.condensed import CondensedSolver
+from softnlp.continuation import around_folds, follow, straight_path
 from softnlp.loadcase import LoadCase, load_case, rod_functions
 from softnlp.numerics import Numerics
 from softnlp.problem import CompiledProblem, compile_problem
@@ -38,6 +38,7 @@ FIRST_INTERVALS = {"multiple-shooting": 10, "collocation": 5}
 MOST_INTERVALS = 1810
 _TURN = 0.25  # largest angle [rad] of the unloaded arc within one RK4 interval of a first grid
 _FINER = 4  # how much finer a grid is tried where a coarse one finds no solution
+_MOST_WORK = 200_000  # iterations times intervals on one grid, which is some ten seconds
 _PRESSURE_PARTS = (0.0, 0.5, 0.25, 0.75)
 _LOADS = ("tip_force", "tip_moment", "gravity")
 # Without loads the exact answer is a circular arc; a solution is good enough to show it.
@@ -72,8 +73,8 @@ class Grid:
 class Solved:
     """A solution on a grid and what was found of it.
 
-    nodes : (18, K + 1) scaled states. constants : what the field takes beside them. error : estimated tip position error
-    over L_0. rotation_error : the same for the tip's orientation [rad]. stable : no conjugate point.
+    nodes : (18, K + 1) scaled states. constants : what the field takes beside them. error : estimated tip position
+    error over L_0. rotation_error : the same for the tip's orientation [rad]. stable : no conjugate point.
     """
 
     grid: Grid
@@ -87,7 +88,7 @@ class Solved:
     @property
     def intervals(self) -> int:
         """The number of intervals."""
-        return self.nodes.shape[1] - 1
+        return int(self.nodes.shape[1]) - 1
 
     @property
     def refinement_error(self) -> float:
@@ -177,7 +178,8 @@ class PoseSolver:
         iterations = 0
         found: Solved | None = warm
         while True:
-            attempt, spent, reached = self._solve_on(intervals, values, branch, found)
+            refining = found is not None and found is not warm
+            attempt, spent, reached = self._solve_on(intervals, values, branch, found, refining=refining)
             iterations += spent
             if attempt is None and self.numerics.intervals is None and intervals < _FINER * first:
                 intervals, found = _FINER * intervals, None
@@ -186,7 +188,7 @@ class PoseSolver:
                 step = Step(
                     pressure,
                     Status.DIVERGED,
-                    f"{Status.DIVERGED.advice}; continuation reached {100 * reached:.3g} % of the way from the unloaded robot",
+                    f"{Status.DIVERGED.advice}; continuation came {100 * reached:.3g} % of the way",
                     iterations=iterations,
                     solve_time=time.perf_counter() - began,
                 )
@@ -199,7 +201,7 @@ class PoseSolver:
                 step = Step(
                     pressure,
                     Status.INACCURATE,
-                    f"{Status.INACCURATE.advice}; the estimate with {intervals} intervals is {found.error:.2g} of the length",
+                    f"{Status.INACCURATE.advice}; with {intervals} intervals it is {found.error:.2g} L_0",
                     residual=found.solution.residual,
                     iterations=iterations,
                     solve_time=time.perf_counter() - began,
@@ -217,7 +219,7 @@ class PoseSolver:
         return min(next_size(max(first, curl / turn)), MOST_INTERVALS)
 
     def _target_accuracy(self, loads: Loads) -> float:
-        """Return the estimate to aim for: a third of the accuracy asked for, since estimates are good to a factor of 3."""
+        """Return the estimate to aim for: a third of the accuracy, since estimates are good to a factor of 3."""
         accuracy = self.numerics.accuracy
         if not np.any([loads.tip_force, loads.tip_moment, loads.gravity]):
             accuracy = min(accuracy, UNLOADED_ACCURACY * 3)
@@ -232,12 +234,13 @@ class PoseSolver:
         return next_size(max(factor, 1.3) * solved.intervals)
 
     def _solve_on(
-        self, intervals: int, values: dict[str, Any], branch: BranchPoint, near: Solved | None
+        self, intervals: int, values: dict[str, Any], branch: BranchPoint, near: Solved | None, *, refining: bool
     ) -> tuple[Solved | None, int, float]:
         """Try, in order: the neighbour, the unloaded arc, loads applied after the pressure, and after part of it.
 
-        The first stable solution wins; an unstable one is kept in case there is no other. Returns it, the iterations spent
-        and how far continuation came.
+        The first stable solution wins; an unstable one is kept in case there is no other. When refining, `near` is this
+        pose on a coarser grid, and its like is the answer. Returns it, the iterations
+        spent and how far continuation came.
         """
         grid = self.grid(intervals)
         p = grid.problem.pack(values)
@@ -260,9 +263,11 @@ class PoseSolver:
             reached = max(reached, fraction) if fraction < 1.0 else reached
             if fraction >= 1.0 and solution.holds(self.numerics.tolerance):
                 solved = self._examine(grid, solution)
-                if solved.stable:
+                if solved.stable or refining:
                     return solved, spent, 1.0
                 unstable = solved
+            if spent * intervals > _MOST_WORK:
+                break
         return unstable, spent, reached
 
     def _along(self, grid: Grid, waypoints: list[dict[str, Any]]) -> Iterator[tuple[Solution, float]]:
