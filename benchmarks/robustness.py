@@ -96,8 +96,8 @@ def pressure_at(model: Model, share: NDArray[np.float64], stretch: float) -> NDA
     return low * share
 
 
-def hard_case(seed: int) -> Case:
-    """Draw a case; the same seed gives the same one."""
+def hard_case(seed: int, hardest: float = 1.0) -> Case:
+    """Draw a case; the same seed gives the same one. `hardest` below 1 keeps that part of the range of stretch."""
     rng = np.random.default_rng([seed, 300])
 
     def direction() -> NDArray[np.float64]:
@@ -111,7 +111,7 @@ def hard_case(seed: int) -> Case:
     model = Model(robot, material)
     pressed = rng.permutation(robot.chamber_sets) < rng.integers(1, robot.chamber_sets + 1)
     share = pressed * rng.uniform(0.1, 1, robot.chamber_sets)
-    pressure = pressure_at(model, share, min(rng.uniform(1, 2.2), MOST_STRETCH))
+    pressure = pressure_at(model, share, 1 + hardest * (min(rng.uniform(1, 2.2), MOST_STRETCH) - 1))
     rest = deform(robot, material, np.zeros(robot.chamber_sets), 1.0, model.coefficients)
     EI, L = float(sum(rest.bending_stiffness)) / 2, robot.length
     loads = Loads(
@@ -127,9 +127,9 @@ def solve_cold(case: Case) -> Step:
     return forward(case.robot, case.material, case.pressure, loads=case.loads).steps[0]
 
 
-def outcome_of(seed: int) -> Outcome:
+def outcome_of(seed: int, hardest: float = 1.0) -> Outcome:
     """Draw and solve a case; never raises."""
-    case = hard_case(seed)
+    case = hard_case(seed, hardest)
     began = time.perf_counter()
     try:
         step = solve_cold(case)

@@ -67,16 +67,11 @@ class CompiledProblem:
         return sum(q.size for q in self.free)
 
     def pack(self, values: Mapping[str, Any]) -> Array:
-        """Return p from values by quantity name; what is not named keeps its nominal value.
+        """Return p from SI values by quantity name; what is not named keeps its nominal value.
 
-        Raises KeyError-like `IllPosedError` for a name that is not a fixed quantity of this problem.
+        Raises `IllPosedError` for a name that is not a fixed quantity of this problem, or a value of another size.
         """
-        known = {q.name for q in self.fixed}
-        for name in values:
-            if name not in known:
-                raise IllPosedError(f"'{name}' is not a fixed quantity of this problem{nearest(name, known)}")
-        parts = [np.broadcast_to(np.asarray(values.get(q.name, q.nominal), float).ravel(), q.size) for q in self.fixed]
-        return np.concatenate(parts) if parts else np.zeros(0)
+        return _column(self.fixed, values, "a fixed")
 
     def free_values(self, x: Array) -> dict[str, Array]:
         """Return the free quantities in x by name, SI."""
@@ -87,9 +82,25 @@ class CompiledProblem:
         return found
 
     def pack_free(self, values: Mapping[str, Any]) -> Array:
-        """Return the head of x from SI values of the free quantities; nominal where not named."""
-        parts = [np.asarray(values.get(q.name, q.nominal), float).ravel() / q.scale for q in self.free]
-        return np.concatenate(parts) if parts else np.zeros(0)
+        """Return the head of x from SI values of the free quantities; nominal where not named. Raises as `pack`."""
+        scales = np.repeat([q.scale for q in self.free], [q.size for q in self.free])
+        scaled: Array = _column(self.free, values, "a free") / scales
+        return scaled
+
+
+def _column(among: Sequence[Quantity], values: Mapping[str, Any], kind: str) -> Array:
+    """Stack the values of quantities, SI."""
+    known = {q.name for q in among}
+    for name in values:
+        if name not in known:
+            raise IllPosedError(f"'{name}' is not {kind} quantity of this problem{nearest(name, known)}")
+    parts = [np.zeros(0)]
+    for q in among:
+        value = np.asarray(values.get(q.name, q.nominal), float).ravel()
+        if value.size not in (1, q.size):
+            raise IllPosedError(f"'{q.name}' takes {q.size} numbers, got {value.size}")
+        parts.append(np.broadcast_to(value, q.size))
+    return np.concatenate(parts)
 
 
 def compile_problem(
@@ -107,6 +118,9 @@ def compile_problem(
     or when an objective has nothing left to choose.
     """
     by_name = {q.name: q for q in given}
+    if len(by_name) < len(given):
+        twice = next(q.name for q in given if by_name[q.name] is not q)
+        raise IllPosedError(f"two quantities are named '{twice}'; a case's own quantity needs a name of its own")
     for name in free:
         if name not in by_name:
             raise IllPosedError(f"'{name}' cannot be freed: no such quantity{nearest(name, by_name)}")
@@ -208,6 +222,8 @@ def _refuse_ill_posed(problem: CompiledProblem, has_objective: bool) -> None:
     r, c = (np.asarray(index, dtype=int) for index in J.get_triplet())
     entries_in_row = np.bincount(r, minlength=J.size1())
     entries_in_column = np.bincount(c, minlength=J.size2())
+    in_cost = ca.jacobian_sparsity(problem.nlp["f"], problem.nlp["x"]).get_triplet()[1]
+    entries_in_cost = np.bincount(np.asarray(in_cost, dtype=int), minlength=J.size2())
     for equation in problem.equations[-len(problem.constraints) :] if problem.constraints else ():
         if not np.all(entries_in_row[equation.rows]):
             raise IllPosedError(
@@ -223,6 +239,11 @@ def _refuse_ill_posed(problem: CompiledProblem, has_objective: bool) -> None:
             f"too few equations: free are {free_text}, and the constraints add {added} equations: {added_text}; "
             "fix a quantity, add a constraint or give an objective"
         )
+    if added == freed and has_objective:
+        raise IllPosedError(
+            f"the objective has nothing to choose: free are {free_text}, and the constraints add as many equations: "
+            f"{added_text}; free more quantities, or leave the objective out"
+        )
     rows = np.flatnonzero(equal).tolist()
     equalities = J.sub(rows, list(range(J.size2())))[0]
     rank = ca.sprank(ca.DM(equalities, 1))
@@ -235,6 +256,8 @@ def _refuse_ill_posed(problem: CompiledProblem, has_objective: bool) -> None:
     for q in problem.free:
         columns = list(range(start, start + q.size))
         start += q.size
-        idle = [k for k in columns if not entries_in_column[k]]
-        if idle and (not has_objective or len(idle) == q.size):
-            raise IllPosedError(f"'{q.name}' is free but enters no equation, so nothing determines it; fix it")
+        if not np.all(entries_in_column[columns] + entries_in_cost[columns]):
+            raise IllPosedError(
+                f"'{q.name}' is free but enters no equation{' and no objective' if has_objective else ''}, "
+                "so nothing determines it; fix it"
+            )

@@ -15,6 +15,7 @@ from softnlp.problem import CompiledProblem
 
 Array = NDArray[np.float64]
 
+_LONGEST_SOLVE = 60.0  # seconds after which IPOPT is stopped
 _NEWTON_STEPS = 12
 _DIVERGED = 1e4  # scaled residual past which Newton steps are not worth following
 _SLACK = 100.0  # round-off may leave a residual this much above the tolerance asked of an engine
@@ -100,6 +101,7 @@ class Engine:
                 "acceptable_iter": 0,
                 "nlp_scaling_method": "none",
                 "max_iter": self._max_iterations,
+                "max_wall_time": _LONGEST_SOLVE,
             },
         }
         if self.problem.is_square:
@@ -112,6 +114,10 @@ class Engine:
     def solve(self, p: Array, x_start: Array) -> Solution:
         """Solve at fixed values p from a first guess; judge the result by the residual, evaluated again."""
         x_start = np.asarray(x_start, dtype=float)
+        start_residual = violation(self.problem, x_start, p)
+        if self.problem.is_square and not start_residual < _DIVERGED:
+            # A sparse factorisation of such numbers may take minutes, and Newton leads nowhere from them.
+            return Solution(x_start, p, start_residual, 0, "the first guess is out of all proportion")
         spent = 0
         if self.linear is not None:
             quick = self._newton(self.linear, p, x_start)

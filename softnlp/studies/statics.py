@@ -253,6 +253,8 @@ class PoseSolver:
             if near is not None:
                 yield grid.engine.solve(p, self._transfer(near, grid, p, branch.stretch)), 1.0
             yield grid.engine.solve(p, self._arc_guess(grid, p, branch.stretch)), 1.0
+            if not any(np.any(values[name]) for name in _LOADS):
+                return  # the arc is the answer; a grid that does not show it is too coarse
             yield from self._along(grid, [unloaded, values])
             for part in _PRESSURE_PARTS:
                 partly = values | {"pressure": part * values["pressure"]}
