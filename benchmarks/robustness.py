@@ -82,7 +82,7 @@ class Outcome:
 
 
 def pressure_at(model: Model, share: NDArray[np.float64], stretch: float) -> NDArray[np.float64]:
-    """Return the pressures [Pa] in the ratio of `share` that stretch the robot so, or the last before the branch ends."""
+    """Return the pressures [Pa] in the ratio of `share` with that stretch, or the last before the branch ends."""
     function = branch_function(model)
     declared = quantities(model)
     low, high = 0.0, 1e8

@@ -112,7 +112,7 @@ def random_pressures(
     most_stretch: float = 1.8,
     most_bending: float = 200.0,
 ) -> tuple[np.ndarray, Section]:
-    """Draw pressures [Pa] whose unloaded arc bends by no more than `most_bending` [deg]; return them and the section."""
+    """Draw pressures [Pa] whose unloaded arc bends by at most `most_bending` [deg]; return them and the section."""
     body, rubber = body_of(robot), rubber_of(material)
     share = rng.dirichlet(np.full(robot.chamber_sets, 0.6))
     stretch = rng.uniform(1.02, most_stretch)
@@ -158,4 +158,3 @@ def random_design(
     robot, material = random_robot(rng), random_material(rng, laws)
     pressure, made = random_pressures(rng, robot, material, most_stretch=most_stretch, most_bending=most_bending)
     return Design(robot, material, pressure, random_loads(rng, made, force=force, moment=moment), made)
-
