@@ -22,8 +22,8 @@ LAYERS = (
     *("formula", "laws", "materials", "robot", "section", "rod", "transcription"),
     *("quantities", "loadcase", "problem", "branch", "solver", "condensed", "continuation", "stability"),
     *("studies", "studies.step", "studies.pose", "studies.statics", "studies.*"),
-    *("scenario_schema", "scenario_check", "pressures", "scenario"),
-    *("runner", "results", "plots", "cli", "__main__"),
+    *("scenario_schema", "scenario_check", "pressures", "scenario_contact", "scenario"),
+    *("runner_blocked", "runner", "results", "plots", "cli", "__main__"),
 )
 MIXED = ("results", "plots", "cli")
 LONGEST_FILE = 400
