@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+CLOSURES = ("free", "compliant", "weighted", "rigid")
+
 Vector = tuple[float, float, float]
 
 
