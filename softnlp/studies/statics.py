@@ -126,20 +126,20 @@ class PoseSolver:
     def __init__(self, model: Model, numerics: Numerics) -> None:
         self.model = model
         self.numerics = numerics
-        self._quantities = quantities(model)
-        self._branch = branch_function(model)
-        self._functions = rod_functions(model)
-        self._shape = shape_function(self._functions.field)
-        self._transition, self._tip_variation = transition_functions(self._functions.field)
+        self.quantities = quantities(model)
+        self.branch = branch_function(model)
+        self.functions = rod_functions(model)
+        self.shape = shape_function(self.functions.field)
+        self._transition, self._tip_variation = transition_functions(self.functions.field)
         self._grids: dict[int, Grid] = {}
 
     def grid(self, intervals: int) -> Grid:
         """Return the compiled problem on a grid, building it at first use."""
         if intervals not in self._grids:
             method = method_named(self.numerics.transcription, intervals)
-            case = load_case("pose", self._functions, self._quantities, method)
-            problem = compile_problem(list(self._quantities.values()), [case])
-            linear = CondensedSolver(self._functions, method) if isinstance(method, MultipleShooting) else None
+            case = load_case("pose", self.functions, self.quantities, method)
+            problem = compile_problem(list(self.quantities.values()), [case])
+            linear = CondensedSolver(self.functions, method) if isinstance(method, MultipleShooting) else None
             self._grids[intervals] = Grid(
                 case=case,
                 engine=Engine(problem, linear=linear),
@@ -167,14 +167,14 @@ class PoseSolver:
         began = time.perf_counter()
         pressure = np.asarray(pressure, dtype=float)
         values = self.values(pressure, loads)
-        column = self._column(values)
-        branch = stretch_on_branch(self._branch, column, pressure)
+        column = self.column(values)
+        branch = stretch_on_branch(self.branch, column, pressure)
         if branch.status is not Status.SOLVED:
             return Step(pressure, branch.status, branch.message, solve_time=time.perf_counter() - began), None
 
-        first = self.numerics.intervals or self._first_intervals(column, branch.stretch)
+        first = self.numerics.intervals or self.first_intervals(column, branch.stretch)
         intervals = warm.intervals if warm else first
-        target = self._target_accuracy(loads)
+        target = self.target_accuracy(loads)
         iterations = 0
         found: Solved | None = warm
         while True:
@@ -194,7 +194,7 @@ class PoseSolver:
                 )
                 return step, None
             found = attempt
-            wanted = self._next_intervals(found, target)
+            wanted = self.next_intervals(found.refinement_error, intervals, target)
             if wanted is None:
                 break
             if intervals >= MOST_INTERVALS:
@@ -210,28 +210,28 @@ class PoseSolver:
             intervals = min(wanted, MOST_INTERVALS)
         return self._finished(pressure, loads, found, iterations, began), found
 
-    def _first_intervals(self, column: Array, stretch: float) -> int:
+    def first_intervals(self, column: Array, stretch: float) -> int:
         """Return a grid coarse enough to be quick and fine enough for the curl of the unloaded robot."""
         first = FIRST_INTERVALS[self.numerics.transcription]
-        straight = np.asarray(self._functions.arc(column, stretch, 0.01)).ravel()
+        straight = np.asarray(self.functions.arc(column, stretch, 0.01)).ravel()
         curl = 100 * float(np.hypot(straight[9], straight[10]))  # of the axis, R e3, over the first hundredth
         turn = _TURN * FIRST_INTERVALS["multiple-shooting"] / first
         return min(next_size(max(first, curl / turn)), MOST_INTERVALS)
 
-    def _target_accuracy(self, loads: Loads) -> float:
+    def target_accuracy(self, loads: Loads) -> float:
         """Return the estimate to aim for: a third of the accuracy, since estimates are good to a factor of 3."""
         accuracy = self.numerics.accuracy
         if not np.any([loads.tip_force, loads.tip_moment, loads.gravity]):
             accuracy = min(accuracy, UNLOADED_ACCURACY * 3)
         return accuracy / 3
 
-    def _next_intervals(self, solved: Solved, target: float) -> int | None:
+    def next_intervals(self, error: float, intervals: int, target: float) -> int | None:
         """Return the finer grid that should meet the target, or None where this one does or the grid is given."""
-        if self.numerics.intervals is not None or solved.refinement_error <= target:
+        if self.numerics.intervals is not None or error <= target:
             return None
         order = method_named(self.numerics.transcription, 1).order
-        factor = 1.1 * (solved.refinement_error / target) ** (1 / order)
-        return next_size(max(factor, 1.3) * solved.intervals)
+        factor = 1.1 * (error / target) ** (1 / order)
+        return next_size(max(factor, 1.3) * intervals)
 
     def _solve_on(
         self, intervals: int, values: dict[str, Any], branch: BranchPoint, near: Solved | None, *, refining: bool
@@ -252,7 +252,7 @@ class PoseSolver:
         def attempts() -> Iterator[tuple[Solution, float]]:
             if near is not None:
                 yield grid.engine.solve(p, self._transfer(near, grid, p, branch.stretch)), 1.0
-            yield grid.engine.solve(p, self._arc_guess(grid, p, branch.stretch)), 1.0
+            yield grid.engine.solve(p, self.arc_guess(grid, p, branch.stretch)), 1.0
             yield from self._along(grid, [unloaded, values])
             for part in _PRESSURE_PARTS:
                 partly = values | {"pressure": part * values["pressure"]}
@@ -277,7 +277,7 @@ class PoseSolver:
         every equilibrium at the end that it passes is offered.
         """
         problem = grid.problem
-        x = self._arc_guess(grid, problem.pack(waypoints[0]), self._stretch(waypoints[0]))
+        x = self.arc_guess(grid, problem.pack(waypoints[0]), self._stretch(waypoints[0]))
         p_end = problem.pack(waypoints[-1])
         legs = len(waypoints) - 1
         spent = 0
@@ -300,18 +300,18 @@ class PoseSolver:
         final = grid.engine.solve(p_end, x)
         yield replace(final, iterations=spent + final.iterations), 1.0
 
-    def _column(self, values: dict[str, Any]) -> Array:
+    def column(self, values: dict[str, Any]) -> Array:
         """Return every quantity in its order, SI."""
-        return np.concatenate([np.ravel(values.get(name, q.nominal)) for name, q in self._quantities.items()])
+        return np.concatenate([np.ravel(values.get(name, q.nominal)) for name, q in self.quantities.items()])
 
     def _stretch(self, values: dict[str, Any]) -> float:
         """Return the stretch on the branch from zero pressure at the pressure in `values`."""
-        return stretch_on_branch(self._branch, self._column(values), values["pressure"]).stretch
+        return stretch_on_branch(self.branch, self.column(values), values["pressure"]).stretch
 
-    def _arc_guess(self, grid: Grid, p: Array, stretch: float) -> Array:
+    def arc_guess(self, grid: Grid, p: Array, stretch: float) -> Array:
         """Return x of the unloaded circular arc at this pressure."""
         s = grid.case.transcribed.points
-        states = np.asarray(self._functions.arc(p, stretch, s[None, :]))
+        states = np.asarray(self.functions.arc(p, stretch, s[None, :]))
         return np.concatenate([[stretch], states.T.ravel()])
 
     def _transfer(self, solved: Solved, grid: Grid, p: Array, stretch: float) -> Array:
@@ -320,9 +320,9 @@ class PoseSolver:
         if solved.grid is grid:
             states = solved.solution.x[1:]
         else:
-            states = between_nodes(self._shape, solved.nodes, solved.constants, s)[:STATE_SIZE].T.ravel()
+            states = between_nodes(self.shape, solved.nodes, solved.constants, s)[:STATE_SIZE].T.ravel()
         x_old, p_old = solved.solution.x, solved.solution.p
-        moved = self._arc_guess(grid, p, stretch) - self._arc_guess(grid, p_old, x_old[0])
+        moved = self.arc_guess(grid, p, stretch) - self.arc_guess(grid, p_old, x_old[0])
         return np.concatenate([[x_old[0]], states]) + moved
 
     def _examine(self, grid: Grid, solution: Solution) -> Solved:
@@ -350,8 +350,8 @@ class PoseSolver:
         result = outputs(problem, solution)
         L_0, F_0 = (float(v) for v in np.asarray(grid.problem.units(solution.x, solution.p)).ravel())
         s = np.linspace(0, 1, SHAPE_POINTS)
-        shape = shape_of(between_nodes(self._shape, solved.nodes, solved.constants, s), s, L_0, F_0)
-        unloaded_tip = np.asarray(self._functions.arc(solution.p, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
+        shape = shape_of(between_nodes(self.shape, solved.nodes, solved.constants, s), s, L_0, F_0)
+        unloaded_tip = np.asarray(self.functions.arc(solution.p, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
         pose = pose_of(self.model, result, shape, unloaded_tip, solved.stable)
         warnings = list(pose_warnings(self.model, pose))
         if solved.error > self.numerics.accuracy:
