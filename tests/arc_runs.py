@@ -132,7 +132,7 @@ def ramp_run(
 
 
 def contact_of(
-    body: Robot, pressure: np.ndarray, *, force: float = 0.5, offset: float = 0.0, tip_cap: float = 0.0, **changes: Any
+    body: Robot, pressure: np.ndarray, *, force: float, offset: float = 0.0, tip_cap: float = 0.0, **changes: Any
 ) -> Contact:
     """Return a contact that holds the tip at x = offset and pushes along +x; its free shape is the pressures' arc."""
     free = arc_pose(body, pressure)
@@ -151,8 +151,16 @@ def contact_of(
     return replace(contact, **changes)
 
 
-def blocked_step(body: Robot, pressure: Sequence[float], force: float, **changes: Any) -> Step:
-    """Return a solved blocked step, its tip held upright by an S of no physics: an arc there and one back."""
+def blocked_step(
+    body: Robot,
+    pressure: Sequence[float],
+    force: float,
+    *,
+    time: float | None = None,
+    solve_time: float = 0.0123,
+    **changes: Any,
+) -> Step:
+    """Return a solved blocked step; its shape is a bulge of no physics that ends at the wall."""
     values = np.array(pressure, dtype=float)
     contact = contact_of(body, values, force=force, **changes)
     pose = contact.free
@@ -167,7 +175,7 @@ def blocked_step(body: Robot, pressure: Sequence[float], force: float, **changes
     blocked = replace(
         pose, tip_position=position[-1], tip_rotation=rotation[-1], bending_angle=0.7 * pose.bending_angle, shape=shape
     )
-    return arc_step(body, pressure, pose=blocked, contact=contact)
+    return arc_step(body, pressure, pose=blocked, contact=contact, time=time, solve_time=solve_time)
 
 
 def blocked_run(

@@ -24,7 +24,7 @@ from softnlp.plots.body import (
     tube,
 )
 from softnlp.plots.series import finish_panels, new_panels, series
-from softnlp.plots.style import GREY, INK, SMALL, colour, new_figure
+from softnlp.plots.style import GREY, INK, SMALL, colour, new_figure, step_colours
 from softnlp.results import Body, ContactView, RunView
 from softnlp.units import DEGREE, MILLIMETRE
 
@@ -45,8 +45,8 @@ _ALONG_X = 1e-9  # a normal this near to x
 def blocked_figure(view: RunView, contact: ContactView, measured: Sequence[tuple[float, float]] = ()) -> Figure:
     """Draw a blocked force; `measured` is (pressure [Pa] or offset [m], force [N]), whichever was varied.
 
-    In 3-D the last solved step: the blocked body cut open, the free shape behind the wall, the wall's push as an arrow.
-    Beside it force and bending angle against offset, pressure, time or step.
+    In 3-D the step of the largest force: the blocked body cut open, the free shape behind the wall, the wall's push as
+    an arrow. Beside it force and bending angle against offset, pressure, time or step.
     """
     total, solved = len(view.status), len(view.solved)
     parts = [view.robot.name, view.material, f"closure {contact.closure}", view.conventions]
@@ -60,8 +60,14 @@ def blocked_figure(view: RunView, contact: ContactView, measured: Sequence[tuple
     _draw_measured(panels[0], x, measured)
     _bending(panels[1], view, contact, x)
     finish_panels(figure, panels, view, x)
-    _legends(figure, view, bool(measured))
+    _legends(figure, view, contact, bool(measured))
     return figure
+
+
+def shown_step(view: RunView, contact: ContactView) -> int | None:
+    """Return the step that is drawn in full: that of the largest force, the last of equals; None if none is solved."""
+    known = [k for k in view.solved if contact.free[k] is not None]
+    return max(known, key=lambda k: (contact.force[k], k)) if known else None
 
 
 def wall_offset(contact: ContactView) -> Array:
@@ -105,8 +111,10 @@ def _bending(axes: Axes, view: RunView, contact: ContactView, x: Abscissa) -> No
 
 
 def _wall_panel(figure: Figure, centre: tuple[float, float], view: RunView, contact: ContactView) -> Any:
-    """Draw the last solved step at its wall about a point of the figure [inch]."""
-    k = next((k for k in reversed(view.solved) if contact.free[k] is not None), None)
+    """Draw the step of the largest force at its wall about a point of the figure [inch], and the axes of the others."""
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+    k = shown_step(view, contact)
     if k is None:
         axes, reach = standing_on_base(figure, centre, view, -60.0)
         frame(axes, np.vstack(reach))
@@ -120,6 +128,11 @@ def _wall_panel(figure: Figure, centre: tuple[float, float], view: RunView, cont
     axes, reach = standing_on_base(figure, centre, view, azimuth)
     eye, light = direction(azimuth, ELEVATION), direction(azimuth - 50, 40)
     reach += _draw_free(axes, free, light)
+    solved = list(view.solved)
+    lines = [b.position / MILLIMETRE for b in view.bodies if b is not None]
+    shades = step_colours(len(view.bodies))[solved]
+    axes.add_collection3d(Line3DCollection(lines, colors=shades, linewidths=1.4, zorder=2.5, label="axes of the steps"))
+    reach += lines
     cap = contact.tip_cap / MILLIMETRE
     at = body.position[-1] / MILLIMETRE + cap * body.rotation[-1][:, 2]
     reach.append(_draw_wall(axes, contact.wall_point[k] / MILLIMETRE, normal, at, view))
@@ -191,7 +204,7 @@ def _draw_cap(axes: Any, body: Body, cap: float, light: Array) -> Array:
     return quads.reshape(-1, 3)
 
 
-def _legends(figure: Figure, view: RunView, measured: bool) -> None:
+def _legends(figure: Figure, view: RunView, contact: ContactView, measured: bool) -> None:
     """Say what colours and lines mean."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
@@ -206,8 +219,8 @@ def _legends(figure: Figure, view: RunView, measured: bool) -> None:
     if measured:
         mark = Line2D([], [], color=INK, marker="s", markerfacecolor="none", linestyle="", label="measured")
         figure.axes[1].legend(handles=[mark], loc="upper left", **style)
-    if view.solved:
-        caption = f"Step {view.solved[-1] + 1} cut open at the wall, chambers without pressure pale; free shape grey"
+    if (k := shown_step(view, contact)) is not None:
+        caption = f"Step {k + 1} cut open at the wall, chambers without pressure pale; grey: free at the same pressure"
     else:
         caption = "No step has a solution, so no shape is shown"
     figure.text(0.018, 0.018, caption, size=SMALL, color=GREY)

@@ -37,7 +37,7 @@ def table_text(run: Run) -> str:
     header += [f"p{k + 1}_bar" for k in range(run.robot.chamber_sets)]
     header += ["status", *(name for f in document_fields(run) for name in _columns(f, run.robot))]
     header += ["closure"] * (run.study == BLOCKED_FORCE)
-    header += ["_".join(["left", *name.split(), unit.replace(" ", "")]) for name, unit in weighted.items()]
+    header += ["_".join(["weighted_residual", *name.split(), unit.replace(" ", "")]) for name, unit in weighted.items()]
     header += ["residual", "message", "warnings"]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

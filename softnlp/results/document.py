@@ -65,7 +65,7 @@ def _step(run: Run, step: Step) -> dict[str, Any]:
     if run.study == BLOCKED_FORCE:
         table["closure"] = closure_of(run, step)
         if table["closure"] == "weighted":
-            table["weighted"] = _lines(left_by_weights(step))
+            table["weighted_residual"] = _lines(left_by_weights(step))
     table["residual"] = _plain(step.residual)
     table["certificate"] = _lines(step.certificate)
     table["warnings"] = list(step.warnings)
