@@ -74,7 +74,7 @@ def wall_offset(contact: ContactView) -> Array:
     """Return where the wall stands in each step (S,) [m]: h along x, or along its normal for a wall that leans."""
     n, p = contact.normal, contact.wall_point
     known = n[np.isfinite(n).all(axis=1)]
-    if np.all(np.abs(known[:, 0]) > 1 - _ALONG_X):
+    if not len(known) or np.all(np.abs(known[:, 0]) > 1 - _ALONG_X):
         return np.asarray(p[:, 0])
     return np.asarray(np.einsum("si,si->s", p, n))
 
@@ -122,9 +122,10 @@ def _wall_panel(figure: Figure, centre: tuple[float, float], view: RunView, cont
     body, free = view.bodies[k], contact.free[k]
     assert body is not None
     assert free is not None
-    normal, L = contact.normal[k], view.robot.length / MILLIMETRE
+    L = view.robot.length / MILLIMETRE
     # From the robot's side of the wall, so that the free shape is what the wall veils.
-    azimuth = side_azimuth(-normal[:2], 1e-6, turn=-24.0)
+    towards = -contact.normal[k][:2] if contact.has_wall else free.position[-1, :2]
+    azimuth = side_azimuth(towards, 1e-6, turn=-24.0)
     axes, reach = standing_on_base(figure, centre, view, azimuth)
     eye, light = direction(azimuth, ELEVATION), direction(azimuth - 50, 40)
     reach += _draw_free(axes, free, light)
@@ -135,13 +136,14 @@ def _wall_panel(figure: Figure, centre: tuple[float, float], view: RunView, cont
     reach += lines
     cap = contact.tip_cap / MILLIMETRE
     at = body.position[-1] / MILLIMETRE + cap * body.rotation[-1][:, 2]
-    reach.append(_draw_wall(axes, contact.wall_point[k] / MILLIMETRE, normal, at, view))
+    if contact.has_wall:
+        reach.append(_draw_wall(axes, contact.wall_point[k] / MILLIMETRE, contact.normal[k], at, view))
     only_last = replace(view, bodies=tuple(b if j == k else None for j, b in enumerate(view.bodies)))
     reach += draw_cut_open(axes, only_last, k, eye, light, tip_frame=False)
     if cap > 0:
         reach.append(_draw_cap(axes, body, cap, light))
     if contact.force[k] > 0:
-        push = _ARROW * L * normal
+        push = _ARROW * L * contact.normal[k]
         text = f"$F_b$ = {contact.force[k]:.3g} N"
         reach += draw_arrow(axes, at - push, push, text, "wall's force", azimuth, at_tail=True)
     reach += draw_loads(axes, view, body.position[-1] / MILLIMETRE, np.vstack(reach), azimuth)
@@ -211,16 +213,16 @@ def _legends(figure: Figure, view: RunView, contact: ContactView, measured: bool
 
     style: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "labelcolor": INK, "handlelength": 1.6}
     sets: list[Any] = [Patch(color=colour(k), label=f"set {k + 1}") for k in range(view.robot.chamber_sets)]
-    sets += [
-        Line2D([], [], color=FREE, linewidth=1.4, linestyle=(0, (4, 2)), label="free shape"),
-        Patch(facecolor=WALL, alpha=0.5, label="wall"),
-    ]
+    sets.append(Line2D([], [], color=FREE, linewidth=1.4, linestyle=(0, (4, 2)), label="free shape"))
+    if contact.has_wall:
+        sets.append(Patch(facecolor=WALL, alpha=0.5, label="wall"))
     figure.legend(handles=sets, loc="upper left", bbox_to_anchor=(0.01, 0.885), ncols=6, columnspacing=1.4, **style)
     if measured:
         mark = Line2D([], [], color=INK, marker="s", markerfacecolor="none", linestyle="", label="measured")
         figure.axes[1].legend(handles=[mark], loc="upper left", **style)
     if (k := shown_step(view, contact)) is not None:
-        caption = f"Step {k + 1} cut open at the wall, chambers without pressure pale; grey: free at the same pressure"
+        where = " at the wall" if contact.has_wall else ""
+        caption = f"Step {k + 1} cut open{where}, chambers without pressure pale; grey: free at the same pressure"
     else:
         caption = "No step has a solution, so no shape is shown"
     figure.text(0.018, 0.018, caption, size=SMALL, color=GREY)

@@ -155,7 +155,11 @@ def _weighted(steps: Sequence[Step]) -> dict[str, Variable]:
         return {}
     dims, line = ("step", "weighted_equation"), ("weighted_equation",)
     return {
-        "weighted_residual": (dims, values[0], _attributes("see weighted_residual_unit", "what `weighted` left of each equation")),
+        "weighted_residual": (
+            dims,
+            values[0],
+            _attributes("see weighted_residual_unit", "what `weighted` left of each equation"),
+        ),
         "weighted_residual_scaled": (dims, values[1], _attributes("1", "the same, scaled as the certificate")),
         "weighted_residual_unit": (line, _text(list(units.values())), _attributes("1", "unit of what was left")),
         "weighted_equation": (line, _text(list(units)), _attributes("1", "equation that `weighted` weighs")),

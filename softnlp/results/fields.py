@@ -138,8 +138,13 @@ SHAPE_FIELDS: tuple[Field, ...] = (
 
 
 def _contact(of: Callable[[Contact], Any]) -> Callable[[Step, Pose], Any]:
-    """Take a number from the contact of a step; None where there is no wall, as with the chambers constrained alone."""
+    """Take a number from the contact of a step; None without one."""
     return lambda s, p: None if s.contact is None else of(s.contact)
+
+
+def _wall(of: Callable[[Contact], Any]) -> Callable[[Step, Pose], Any]:
+    """Take a number of the wall; None where the chambers alone are constrained, whose contact has no normal."""
+    return _contact(lambda c: of(c) if c.normal.any() else None)
 
 
 CONTACT_FIELDS: tuple[Field, ...] = (
@@ -162,10 +167,10 @@ CONTACT_FIELDS: tuple[Field, ...] = (
         (),
         "mm",
         "distance of the free shape's contact point in front of the wall, negative beyond it",
-        _contact(lambda c: c.gap / MILLIMETRE),
+        _wall(lambda c: c.gap / MILLIMETRE),
     ),
-    Field("wall_point_mm", ("axis",), "mm", "a point of the wall", _contact(lambda c: c.wall_point / MILLIMETRE)),
-    Field("wall_normal", ("axis",), "1", "direction in which the wall pushes the robot", _contact(lambda c: c.normal)),
+    Field("wall_point_mm", ("axis",), "mm", "a point of the wall", _wall(lambda c: c.wall_point / MILLIMETRE)),
+    Field("wall_normal", ("axis",), "1", "direction in which the wall pushes the robot", _wall(lambda c: c.normal)),
     Field("tip_cap_mm", (), "mm", "length L_t of the rigid cap on the tip", _contact(lambda c: c.tip_cap / MILLIMETRE)),
     Field(
         "length_error_mm",

@@ -80,7 +80,8 @@ def _blocked_numbers(step: Step) -> list[str]:
     plain = _numbers(step)
     wall = [NONE, NONE]
     if step.contact is not None and step.status.has_solution:
-        wall = [f"{step.contact.force:.4f}", _millimetres(step.contact.gap)]
+        gap = _millimetres(step.contact.gap) if step.contact.normal.any() else NONE
+        wall = [f"{step.contact.force:.4f}", gap]
     return [*wall, *plain[:4], *plain[5:7], plain[8]]
 
 

@@ -54,6 +54,11 @@ class ContactView:
     free_bending_angle: Array
     free: tuple[Body | None, ...]
 
+    @property
+    def has_wall(self) -> bool:
+        """Whether there is a wall; without one the chambers alone are constrained."""
+        return bool(np.isfinite(self.normal).any())
+
 
 @dataclass(frozen=True, eq=False)
 class RunView:
@@ -127,9 +132,9 @@ def _contact_of_run(run: Run) -> ContactView | None:
     return ContactView(
         closure=known[0].closure,
         force=series(lambda c: c.force),
-        gap=series(lambda c: c.gap),
-        wall_point=series(lambda c: c.wall_point, (3,)),
-        normal=series(lambda c: c.normal, (3,)),
+        gap=series(lambda c: c.gap if c.normal.any() else np.nan),
+        wall_point=series(lambda c: c.wall_point if c.normal.any() else np.full(3, np.nan), (3,)),
+        normal=series(lambda c: c.normal if c.normal.any() else np.full(3, np.nan), (3,)),
         tip_cap=known[0].tip_cap,
         free_bending_angle=series(lambda c: c.free.bending_angle),
         free=tuple(
