@@ -9,22 +9,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.condensed import CondensedSolver, plane_directions
+from softnlp.condensed import CondensedSolver
 from softnlp.contact_settings import ContactSettings
 from softnlp.continuation import follow
-from softnlp.loadcase import LoadCase, load_case, rod_functions
+from softnlp.loadcase import load_case, rod_functions
 from softnlp.numerics import Numerics
-from softnlp.problem import CompiledProblem, compile_problem
+from softnlp.problem import compile_problem
 from softnlp.quantities import Model
 from softnlp.rod import STATE_SIZE, Loads
 from softnlp.solver import Engine, Solution, discretisation_correction
 from softnlp.status import Status
+from softnlp.studies.blocked_grid import Blocked, BlockedGrid
 from softnlp.studies.blocked_step import failed_step, solved_step, touching_step
 from softnlp.studies.free_shape import FreeShapes
 from softnlp.studies.pose import between_nodes, shape_function
 from softnlp.studies.statics import MOST_INTERVALS, PoseSolver, Solved
 from softnlp.studies.step import Step
-from softnlp.studies.wall import Situation, Wall
+from softnlp.studies.wall import Situation, Wall, wall_of
 from softnlp.studies.weighted import Weighted
 from softnlp.tip import tip_conditions
 from softnlp.transcription import MultipleShooting, method_named
@@ -35,72 +36,6 @@ _TOUCHING = 1e-9  # of the length: a free contact point nearer to the wall than 
 _SCAN = 17
 _NEAR_FOLD = 0.2  # of the largest in-plane determinant on the way: below it a branch that ends has turned
 _LARGEST_JUMP = 0.3
-
-
-@dataclass(frozen=True, eq=False)
-class BlockedGrid:
-    """Everything compiled for one number of intervals, in a plane of symmetry or in space."""
-
-    case: LoadCase
-    engine: Engine | Weighted
-    stepper: Engine | Weighted
-    judge: CondensedSolver
-    intervals: int
-    state_size: int
-
-    @property
-    def problem(self) -> CompiledProblem:
-        """The compiled problem, with every quantity fixed."""
-        return self.engine.problem
-
-    def states(self, x: Array) -> Array:
-        """Return every state in x, (nx, count)."""
-        count = len(self.case.transcribed.points)
-        return x[1 : 1 + self.state_size * count].reshape(count, self.state_size).T
-
-    def nodes(self, x: Array) -> Array:
-        """Return the node states (nx, K + 1) in x."""
-        return np.ascontiguousarray(self.states(x)[:, self.case.transcribed.node_index])
-
-    def tip_forces(self, x: Array) -> Array:
-        """Return the scaled forces that the tip conditions add."""
-        return x[1 + self.state_size * len(self.case.transcribed.points) :]
-
-    def distance(self, change: Array) -> float:
-        """Return the largest change of a scaled position or of a direction cosine."""
-        return float(np.max(np.abs(self.states(change)[:12])))
-
-    def determinants(self, solution: Solution, plane: Array | None) -> tuple[float, float]:
-        """Return the determinants of the tip equations in the plane and out of it, or in space and 1."""
-        x = np.concatenate([solution.x[:1], self.nodes(solution.x).T.ravel(), self.tip_forces(solution.x)])
-        matrix = self.judge.tip_system(x, solution.p, np.zeros(x.size)).matrix
-        if plane is None:
-            return float(np.linalg.det(matrix)), 1.0
-        inside, outside = plane_directions(plane, len(matrix))
-        return (
-            float(np.linalg.det(inside.T @ matrix @ inside)),
-            float(np.linalg.det(outside.T @ matrix @ outside)),
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Blocked:
-    """A solution with the wall in place and what was found of it.
-
-    constants : what the field takes beside the states. error : estimated tip position error over L_0. refinement_error
-    : the same for position, rotation and forces. slips : pressure [Pa] of the most pressurised set above which a planar
-    shape may slip sideways, or None. free : of the free shape at the same pressure.
-    """
-
-    situation: Situation
-    pressed: Array
-    grid: BlockedGrid
-    solution: Solution
-    constants: Array
-    error: float
-    refinement_error: float
-    slips: float | None
-    free: Solved
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +67,10 @@ class BlockedSolver:
         self._transfer = shape_function(self.functions.field)
         self._grids: dict[tuple[int, bytes], BlockedGrid] = {}
 
+    def with_contact(self, contact: ContactSettings) -> BlockedSolver:
+        """Return a solver with other settings that shares the free shapes."""
+        return BlockedSolver(self.model, self.numerics, contact, wall=self.has_wall, poses=self.poses)
+
     def grid(self, intervals: int, plane: Array | None) -> BlockedGrid:
         """Return the compiled problem on a grid and in a plane (None: in space), building it at first use."""
         key = (intervals, b"" if plane is None else np.round(plane, 12).tobytes())
@@ -153,7 +92,9 @@ class BlockedSolver:
             problem, linear=linear, newton_only=linear is not None, max_iterations=8, tolerance=1e-7
         )
         if self.contact.closure == "weighted":
-            engine, stepper = (Weighted(e, self.functions, case, condensed, plane, self.contact.weights) for e in (engine, stepper))
+            engine, stepper = (
+                Weighted(e, self.functions, case, condensed, plane, self.contact.weights) for e in (engine, stepper)
+            )
         self._grids[key] = BlockedGrid(case, engine, stepper, judge, intervals, self.functions.state_size)
         return self._grids[key]
 
@@ -181,7 +122,7 @@ class BlockedSolver:
         spent += free_step.iterations
         if isinstance(found, _Ended):
             return failed_step(situation.pressure, found.situation.pressure, found.folded, spent, began), None
-        return solved_step(self, found, free_step, spent, began), found
+        return solved_step(self.poses, self.functions, self.contact, found, free_step, spent, began), found
 
     def _settle(self, situation: Situation, free: Solved, near: Blocked | None) -> tuple[Blocked | _Ended, int]:
         """Follow the branch to a situation and refine the grid until its accuracy is met."""
@@ -268,7 +209,9 @@ class BlockedSolver:
         unloaded = not self.has_wall
         if near is not None:
             begin, t_0 = near.situation, 0.0
-            shapes.begin(float(near.solution.x[0]), near.free.solution.x if near.free.intervals == free.intervals else None)
+            shapes.begin(
+                float(near.solution.x[0]), near.free.solution.x if near.free.intervals == free.intervals else None
+            )
         else:
             begin, t_0 = self._from_zero(end, shapes)
 
@@ -313,7 +256,9 @@ class BlockedSolver:
             final = grid.engine.solve(path(1.0), followed.solution.x)
             if final.holds(self.numerics.tolerance) and grid.distance(final.x - followed.solution.x) < 0.01:
                 slips = self._slips(begin, end, t_0, trace, near)
-                return self._examined(grid, replace(final, iterations=final.iterations + spent), end, pressed, slips, free)
+                return self._examined(
+                    grid, replace(final, iterations=final.iterations + spent), end, pressed, slips, free
+                )
         reached = begin.towards(end, t_0 + followed.fraction * (1 - t_0))
         sizes = [abs(inside) for _, inside, _ in trace]
         folded = len(sizes) > 1 and sizes[-1] < _NEAR_FOLD * max(sizes)
@@ -387,7 +332,9 @@ class BlockedSolver:
         if found.grid.intervals == grid.intervals:
             return found.solution.x
         s = grid.case.transcribed.points
-        states = between_nodes(self._transfer, found.grid.nodes(found.solution.x), found.constants, s)[: grid.state_size]
+        states = between_nodes(self._transfer, found.grid.nodes(found.solution.x), found.constants, s)[
+            : grid.state_size
+        ]
         return np.concatenate([found.solution.x[:1], states.T.ravel(), found.grid.tip_forces(found.solution.x)])
 
     def _refined(self, found: Blocked, grid: BlockedGrid) -> Blocked | None:
@@ -400,7 +347,12 @@ class BlockedSolver:
         return self._examined(grid, solution, found.situation, found.pressed, found.slips, found.free)
 
     def _slips(
-        self, begin: Situation, end: Situation, t_0: float, trace: list[tuple[float, float, float]], near: Blocked | None
+        self,
+        begin: Situation,
+        end: Situation,
+        t_0: float,
+        trace: list[tuple[float, float, float]],
+        near: Blocked | None,
     ) -> float | None:
         """Return the largest set pressure at which the out-of-plane determinant changed its sign, if it has."""
         if near is not None and near.slips is not None:
@@ -427,3 +379,18 @@ class BlockedSolver:
         constants = np.asarray(grid.problem.case_constants(solution.x, solution.p)).ravel()
         worst = max(position, rotation / 5, force / 5)
         return Blocked(situation, pressed, grid, solution, constants, position, worst, slips, free)
+
+
+def standing_wall(solver: BlockedSolver, pressures: Array, loads: Loads) -> Wall:
+    """Return the wall that the solver's settings describe, where the free shape goes at the largest pressure."""
+    contact = solver.contact
+    largest = pressures[int(np.argmax(np.sum(pressures, axis=1)))]
+    rest = np.array([0.0, 0.0, float(solver.model.robot.length) + contact.tip_cap])
+    for tried in (loads, Loads()):
+        pose = solver.poses.solve(largest, tried)[0].pose
+        if pose is not None:
+            return wall_of(contact, rest, pose.tip_position + contact.tip_cap * pose.tip_rotation[:, 2])
+    small = solver.poses.solve(1e-3 * largest, Loads())[0].pose
+    if small is None:
+        return wall_of(contact, rest, rest)
+    return wall_of(contact, rest, small.tip_position + contact.tip_cap * small.tip_rotation[:, 2])

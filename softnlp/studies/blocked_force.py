@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.contact_settings import ContactSettings
+from softnlp.contact_settings import ClosureWeights, ContactSettings
 from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.errors import InputError
 from softnlp.materials import Material
@@ -17,13 +17,24 @@ from softnlp.numerics import Numerics
 from softnlp.quantities import Model
 from softnlp.robot import LOWERABLE_RULES, Robot, check
 from softnlp.rod import Loads
-from softnlp.studies.blocked import Blocked, BlockedSolver
+from softnlp.studies.blocked import BlockedSolver, standing_wall
+from softnlp.studies.blocked_grid import Blocked
+from softnlp.studies.force_inversion import pressure_for_force
 from softnlp.studies.forward import checked_loads, pressure_table
 from softnlp.studies.multistart import other_equilibria
 from softnlp.studies.step import Run, Step
-from softnlp.studies.wall import Wall, checked_contact, wall_of
+from softnlp.studies.wall import Wall, checked_contact
 
 Array = NDArray[np.float64]
+
+__all__ = [
+    "WeightSensitivity",
+    "blocked_force",
+    "constrained_pose",
+    "force_against_offset",
+    "pressure_for_force",
+    "weight_sensitivity",
+]
 
 
 def blocked_force(
@@ -91,16 +102,125 @@ def blocked_force(
     )
 
 
-def standing_wall(solver: BlockedSolver, pressures: Array, loads: Loads) -> Wall:
-    """Return the wall that the solver's settings describe, where the free shape goes at the largest pressure."""
-    contact = solver.contact
-    largest = pressures[int(np.argmax(np.sum(pressures, axis=1)))]
-    rest = np.array([0.0, 0.0, float(solver.model.robot.length) + contact.tip_cap])
-    for tried in (loads, Loads()):
-        pose = solver.poses.solve(largest, tried)[0].pose
-        if pose is not None:
-            return wall_of(contact, rest, pose.tip_position + contact.tip_cap * pose.tip_rotation[:, 2])
-    small = solver.poses.solve(1e-3 * largest, Loads())[0].pose
-    if small is None:
-        return wall_of(contact, rest, rest)
-    return wall_of(contact, rest, small.tip_position + contact.tip_cap * small.tip_rotation[:, 2])
+def force_against_offset(
+    robot: Robot,
+    material: Material,
+    pressure: Any,
+    offsets: Any,
+    contact: ContactSettings = ContactSettings(),
+    *,
+    loads: Loads = Loads(),
+    coefficients: Coefficients = Coefficients(),
+    conventions: Conventions = REPRODUCTION,
+    numerics: Numerics = Numerics(),
+    title: str = "",
+    progress: Callable[[int, Step], None] | None = None,
+) -> Run:
+    """Solve the characteristic curve: the blocked force at one pressure against where the wall stands.
+
+    pressure : (sets,) [Pa]. offsets : (steps,) h [m], along x; for a wall given by point and normal, how far it is moved
+    from its point in the direction in which it pushes. Each is followed from the last while there is contact.
+    The rest is as for `blocked_force`; one step an offset.
+    """
+    warnings = check(robot, allow=LOWERABLE_RULES)
+    P = pressure_table(pressure, robot.chamber_sets)
+    loads, contact = checked_loads(loads), checked_contact(contact)
+    h = np.asarray(offsets, float)
+    if len(P) != 1:
+        raise InputError(f"expected one pressure a set, got {len(P)} steps", key="pressure")
+    if h.ndim != 1 or h.size == 0 or not np.all(np.isfinite(h)):
+        raise InputError("expected a list of finite offsets", key="offsets")
+    solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
+    given = contact.wall_point is not None
+    first = standing_wall(solver if given else solver.with_contact(replace(contact, offset=0.0)), P, loads)
+    steps: list[Step] = []
+    near: Blocked | None = None
+    for k, offset in enumerate(h):
+        point = first.point + offset * first.normal if given else np.array([offset, 0.0, 0.0])
+        step, near = solver.solve(P[0], loads, Wall(point, first.normal), near)
+        steps.append(step)
+        if progress is not None:
+            progress(k, step)
+    return Run(
+        "blocked-force", robot, material, coefficients, conventions, loads, tuple(steps), title, warnings, contact
+    )
+
+
+def constrained_pose(
+    robot: Robot,
+    material: Material,
+    pressure: Any,
+    loads: Loads,
+    closure: str = "compliant",
+    *,
+    weights: ClosureWeights = ClosureWeights(),
+    coefficients: Coefficients = Coefficients(),
+    conventions: Conventions = REPRODUCTION,
+    numerics: Numerics = Numerics(),
+) -> Step:
+    """Solve the pose under dead loads whose pressurised chambers are held at the lengths they have without loads.
+
+    This is the paper's constrained loaded kinematics; the closure says how they are held, as for a wall. The step's
+    `contact` carries the chamber reactions and the shape without loads; its force and normal are 0.
+    """
+    check(robot, allow=LOWERABLE_RULES)
+    P = pressure_table(pressure, robot.chamber_sets)
+    if len(P) != 1:
+        raise InputError(f"expected one pressure a set, got {len(P)} steps", key="pressure")
+    contact = checked_contact(ContactSettings(closure=closure, weights=weights))  # type: ignore[arg-type]
+    solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact, wall=False)
+    return solver.solve(P[0], checked_loads(loads), None)[0]
+
+
+@dataclass(frozen=True)
+class WeightSensitivity:
+    """How the force of `weighted` answers to one weight: d ln F / d ln W at the weight used, in `unit`."""
+
+    weight: str
+    value: float
+    unit: str
+    elasticity: float
+
+
+def weight_sensitivity(
+    robot: Robot,
+    material: Material,
+    pressure: Any,
+    contact: ContactSettings,
+    *,
+    loads: Loads = Loads(),
+    coefficients: Coefficients = Coefficients(),
+    conventions: Conventions = REPRODUCTION,
+    numerics: Numerics = Numerics(),
+    factor: float = 1.1,
+) -> tuple[Step, tuple[WeightSensitivity, ...]]:
+    """Return the step of `weighted` and how its force changes with each weight that is given, by central differences.
+
+    Raises
+    ------
+    InputError
+        When the closure is not `weighted`, or no weight is given.
+    """
+    contact = checked_contact(contact)
+    names = {"force": "1/N", "moment": "1/(N m)", "length": "1/m", "position": "1/m"}
+    given = {name: value for name in names if (value := getattr(contact.weights, name)) is not None}
+    if contact.closure != "weighted":
+        raise InputError(f"expected closure = 'weighted', got {contact.closure!r}", key="closure")
+    if not given:
+        raise InputError("expected at least one weight", key="weights")
+
+    def solved(weights: ClosureWeights) -> Step:
+        settings = replace(contact, weights=weights)
+        return blocked_force(
+            robot, material, pressure, settings, loads=loads, coefficients=coefficients, conventions=conventions,
+            numerics=numerics,
+        ).steps[-1]  # fmt: skip
+
+    step = solved(contact.weights)
+    found = []
+    for name, value in given.items():
+        pair = [solved(replace(contact.weights, **{name: value * f})).contact for f in (factor, 1 / factor)]
+        forces = [c.force if c is not None and c.force > 0 else np.nan for c in pair]
+        slope = float(np.log(forces[0] / forces[1]) / (2 * np.log(factor)))
+        found.append(WeightSensitivity(name, value, names[name], slope))
+    return step, tuple(found)

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.contact_settings import ContactSettings
+from softnlp.loadcase import RodFunctions
 from softnlp.rod import STATE_SIZE
 from softnlp.solver import EquationResidual, certificate, outputs
 from softnlp.status import Status
+from softnlp.studies.blocked_grid import Blocked
 from softnlp.studies.pose import SHAPE_POINTS, between_nodes, pose_of, pose_warnings, shape_of
-from softnlp.studies.step import Contact, Pose, Step
+from softnlp.studies.statics import PoseSolver
+from softnlp.studies.step import Contact, Step
 from softnlp.studies.wall import Wall
 from softnlp.units import BAR
-
-if TYPE_CHECKING:
-    from softnlp.studies.blocked import Blocked, BlockedSolver
 
 Array = NDArray[np.float64]
 
@@ -33,7 +32,9 @@ def touching_step(free: Step, contact: ContactSettings, wall: Wall, gap: float, 
     return replace(
         free,
         status=status,
-        message=status.advice if status is Status.NO_CONTACT else "the free shape just touches the wall; the force is 0",
+        message=status.advice
+        if status is Status.NO_CONTACT
+        else "the free shape just touches the wall; the force is 0",
         contact=Contact(
             force=0.0,
             normal=wall.normal,
@@ -61,10 +62,18 @@ def failed_step(pressure: Array, reached: Array, folded: bool, iterations: int, 
     )
 
 
-def solved_step(solver: BlockedSolver, found: Blocked, free: Step, iterations: int, began: float) -> Step:
+def solved_step(
+    poses: PoseSolver,
+    functions: RodFunctions,
+    settings: ContactSettings,
+    found: Blocked,
+    free: Step,
+    iterations: int,
+    began: float,
+) -> Step:
     """Return the step of a solution with its certificate, the wall and the warnings."""
     assert free.pose is not None
-    model, settings, grid, solution = solver.model, solver.contact, found.grid, found.solution
+    model, grid, solution = functions.model, found.grid, found.solution
     problem, situation = grid.problem, found.situation
     L_0, F_0 = (float(v) for v in np.asarray(problem.units(solution.x, solution.p)).ravel())
     y = grid.tip_forces(solution.x)
@@ -75,10 +84,10 @@ def solved_step(solver: BlockedSolver, found: Blocked, free: Step, iterations: i
         return Step(situation.pressure, Status.DIVERGED, message, iterations=iterations)
     s = np.linspace(0, 1, SHAPE_POINTS)
     nodes = np.ascontiguousarray(grid.nodes(solution.x)[:STATE_SIZE])
-    shape = shape_of(between_nodes(solver.poses.shape, nodes, found.constants, s), s, L_0, F_0)
+    shape = shape_of(between_nodes(poses.shape, nodes, found.constants, s), s, L_0, F_0)
     result = outputs(problem, solution)
-    column = solution.p[: solver.functions.section.size1_in(0)]
-    unloaded = np.asarray(solver.functions.arc(column, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
+    column = solution.p[: functions.section.size1_in(0)]
+    unloaded = np.asarray(functions.arc(column, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
     # The branch keeps the sign of its determinant, so it is as stable in the plane as the free shape it begins at.
     pose = pose_of(model, result, shape, unloaded, free.pose.stable)
     warnings = list(pose_warnings(model, pose))
@@ -87,7 +96,7 @@ def solved_step(solver: BlockedSolver, found: Blocked, free: Step, iterations: i
             f"the blocked shape may slip sideways past the wall above {found.slips / BAR:.3g} bar: nothing but friction "
             "holds it in the plane"
         )
-    if found.error > solver.numerics.accuracy:
+    if found.error > poses.numerics.accuracy:
         warnings.append(
             f"estimated discretisation error {found.error:.2g} of the length is above the accuracy asked for with "
             f'{grid.intervals} intervals; set [solver] intervals = "auto" or a larger number'
@@ -95,7 +104,7 @@ def solved_step(solver: BlockedSolver, found: Blocked, free: Step, iterations: i
     wall = situation.wall
     taken = solution.p[column.size :]
     tip = grid.nodes(solution.x)[:, -1]
-    T, e_L, _ = (np.asarray(v).ravel() for v in solver.functions.contact(tip, found.constants, y, taken, [L_0, F_0]))
+    T, e_L, _ = (np.asarray(v).ravel() for v in functions.contact(tip, found.constants, y, taken, [L_0, F_0]))
     if wall is None:
         wall = Wall(pose.tip_position, np.zeros(3))
         gap = 0.0
@@ -114,7 +123,7 @@ def solved_step(solver: BlockedSolver, found: Blocked, free: Step, iterations: i
         solve_time=time.perf_counter() - began,
         warnings=tuple(warnings),
         contact=Contact(
-            force=max(float(y[0]) * F_0, 0.0) if solver.has_wall else 0.0,
+            force=max(float(y[0]) * F_0, 0.0) if situation.wall is not None else 0.0,
             normal=wall.normal,
             wall_point=wall.point,
             tip_cap=settings.tip_cap,

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from softnlp.studies.blocked import Blocked, BlockedSolver
+from softnlp.studies.blocked import BlockedSolver
+from softnlp.studies.blocked_grid import Blocked
 
 Array = NDArray[np.float64]
 

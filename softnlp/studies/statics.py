@@ -314,6 +314,10 @@ class PoseSolver:
         states = np.asarray(self.functions.arc(p, stretch, s[None, :]))
         return np.concatenate([[stretch], states.T.ravel()])
 
+    def transfer(self, solved: Solved, grid: Grid) -> Array:
+        """Return x of a solution on another grid."""
+        return self._transfer(solved, grid, solved.solution.p, float(solved.solution.x[0]))
+
     def _transfer(self, solved: Solved, grid: Grid, p: Array, stretch: float) -> Array:
         """Return a solution's states on a grid, moved by what the unloaded arc moves between the two poses."""
         s = grid.case.transcribed.points

@@ -21,7 +21,7 @@ from softnlp.solver import Engine, LinearSolver, Solution
 
 Array = NDArray[np.float64]
 
-_ERRORS = 7
+_GIVEN = 7  # e_n, e_m, e_h are the last of a problem's fixed values
 _STEPS = 60
 _MEMORY = 4
 
@@ -61,6 +61,7 @@ class Weighted:
         self._states = len(case.transcribed.points)
         self._condensed = condensed
         self._plane = plane
+        self._rows = int(functions.tip.size1_out(0))  # 6 without a wall
         self._weights = weights
         self.tolerance = engine.tolerance
 
@@ -80,12 +81,13 @@ class Weighted:
         L_0, F_0 = (float(v) for v in np.asarray(problem.units(x_start, p)).ravel())
         units = np.array([F_0] * 3 + [F_0 * L_0] * 3 + [L_0])
         inverse, W_L = scaled_weights(self._weights, L_0, F_0)
+        inverse = inverse[: self._rows]
 
         def with_errors(s: Array) -> Array:
-            return np.concatenate([p[:-_ERRORS], s * units])
+            return np.concatenate([p[:-_GIVEN], s * units[: s.size], np.zeros(_GIVEN - s.size)])
 
         # what the guess leaves of the tip equations is where the search begins
-        s = np.asarray(problem.residual(x_start, with_errors(np.zeros(_ERRORS)))).ravel()[-_ERRORS:]
+        s = np.asarray(problem.residual(x_start, with_errors(np.zeros(self._rows)))).ravel()[-self._rows :]
         s = np.where(inverse > 0, self._flat(s), 0.0)
         x, spent = x_start, 0
         history: list[tuple[Array, Array]] = []
@@ -110,7 +112,7 @@ class Weighted:
         """Return errors without what leaves the plane."""
         if self._plane is None:
             return s
-        inside = plane_directions(self._plane, _ERRORS)[0]
+        inside = plane_directions(self._plane, self._rows)[0]
         flat: Array = inside @ (inside.T @ s)
         return flat
 
@@ -130,7 +132,7 @@ class Weighted:
         if self._plane is None:
             moves = np.linalg.inv(system.matrix)
         else:
-            inside = plane_directions(self._plane, _ERRORS)[0]
+            inside = plane_directions(self._plane, self._rows)[0]
             moves = inside @ np.linalg.solve(inside.T @ system.matrix @ inside, inside.T)
         N = nx - STATE_SIZE
         pressed = taken[8 + N : 8 + 2 * N]
