@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from softnlp.condensed import CondensedSolver
 from softnlp.contact_settings import ContactSettings
 from softnlp.continuation import follow
-from softnlp.loadcase import load_case, rod_functions
+from softnlp.loadcase import LoadCase, load_case, rod_functions
 from softnlp.numerics import Numerics
-from softnlp.problem import compile_problem
+from softnlp.problem import CompiledProblem, compile_problem
 from softnlp.quantities import Model
 from softnlp.rod import STATE_SIZE, Loads
 from softnlp.solver import Engine, Solution, discretisation_correction
@@ -66,10 +66,14 @@ class BlockedSolver:
         self._declared = self.functions.declared()
         self._transfer = shape_function(self.functions.field)
         self._grids: dict[tuple[int, bytes], BlockedGrid] = {}
+        self._compiled: dict[int, tuple[LoadCase, CompiledProblem, CondensedSolver]] = {}
 
     def with_contact(self, contact: ContactSettings) -> BlockedSolver:
-        """Return a solver with other settings that shares the free shapes."""
-        return BlockedSolver(self.model, self.numerics, contact, wall=self.has_wall, poses=self.poses)
+        """Return a solver with other settings that shares the free shapes, and what is compiled under the same closure."""
+        other = BlockedSolver(self.model, self.numerics, contact, wall=self.has_wall, poses=self.poses)
+        if contact.closure == self.contact.closure:
+            other.functions, other._compiled = self.functions, self._compiled
+        return other
 
     def grid(self, intervals: int, plane: Array | None) -> BlockedGrid:
         """Return the compiled problem on a grid and in a plane (None: in space), building it at first use."""
@@ -77,14 +81,12 @@ class BlockedSolver:
         if key in self._grids:
             return self._grids[key]
         shooting = MultipleShooting(intervals)
-        other = next((g for (n, _), g in self._grids.items() if n == intervals), None)
-        if other is None:
+        if intervals not in self._compiled:
             method = method_named(self.numerics.transcription, intervals)
             case = load_case("blocked", self.functions, self._declared, method)
             problem = compile_problem(list(self._declared.values()), [case])
-            judge = CondensedSolver(self.functions, shooting)
-        else:
-            case, problem, judge = other.case, other.problem, other.judge
+            self._compiled[intervals] = (case, problem, CondensedSolver(self.functions, shooting))
+        case, problem, judge = self._compiled[intervals]
         condensed = CondensedSolver(self.functions, shooting, plane, like=judge.sweep)
         linear = condensed if self.numerics.transcription == "multiple-shooting" else None
         engine: Engine | Weighted = Engine(problem, linear=linear)

@@ -209,12 +209,12 @@ def weight_sensitivity(
     if not given:
         raise InputError("expected at least one weight", key="weights")
 
+    P, loads = pressure_table(pressure, robot.chamber_sets), checked_loads(loads)
+    solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
+    wall = standing_wall(solver, P, loads)
+
     def solved(weights: ClosureWeights) -> Step:
-        settings = replace(contact, weights=weights)
-        return blocked_force(
-            robot, material, pressure, settings, loads=loads, coefficients=coefficients, conventions=conventions,
-            numerics=numerics,
-        ).steps[-1]  # fmt: skip
+        return solver.with_contact(replace(contact, weights=weights)).solve(P[-1], loads, wall)[0]
 
     step = solved(contact.weights)
     found = []
