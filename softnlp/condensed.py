@@ -14,25 +14,25 @@ The same numbers as a sparse factorisation gives, for the cost of one sweep.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.loadcase import RodFunctions
-from softnlp.transcription import MultipleShooting, rk_step
+from softnlp.transcription import MultipleShooting, Tableau, rk_step
 
 Array = NDArray[np.float64]
 
-_DIRECTIONS = 7
 _FORCE = slice(12, 18)
 
 
 @dataclass(frozen=True, eq=False)
 class TipSystem:
-    """The last equations: matrix (6 + n_y square) times d(n(0), m(0), y) = -right.
+    """The last equations: matrix (6 + n_y, d + n_y) times d(n(0), m(0) along d directions, y) = -right.
 
-    directions : (nx, K + 1, 7), how the states follow d(n, m)_0 and, last, the known part. d_stretch : solved.
+    directions : (nx, K + 1, d + 1), how the states follow those and, last, the known part. d_stretch : solved.
     """
 
     matrix: Array
@@ -45,38 +45,50 @@ class CondensedSolver:
     """Solves J dx = -g for a load case with every quantity fixed, transcribed by multiple shooting.
 
     The fixed values p are those of `functions.declared()`, in order. plane : unit normal of a plane of symmetry through
-    +z, in which the shape is held: of n(0), m(0) only what keeps it there moves. None: in space.
+    +z, in which the shape is held: n(0), m(0) have three directions in it. None: in space, where they have six.
     """
 
-    def __init__(
-        self, functions: RodFunctions, method: MultipleShooting, plane: Array | None = None, *, like: ca.Function = None
-    ) -> None:
-        self._intervals = method.intervals
-        self._nx = functions.state_size
-        self.sweep = like or _sweep_function(functions, method)
-        self._tip_rows = 6 + functions.tip_unknowns
-        self._plane = plane
+    def __init__(self, functions: RodFunctions, method: MultipleShooting, plane: Array | None = None) -> None:
+        self._shape = (functions.state_size, method.intervals + 1)
+        rows = 6 + functions.tip_unknowns
+        inside = np.eye(rows) if plane is None else plane_directions(plane, rows)[0]
+        self._into = inside.T
+        self._base = inside[:6, : inside.shape[1] - functions.tip_unknowns]
+        self._sweep = _sweep_function(functions, method, self._base)
 
-    def tip_system(self, x: Array, p: Array, g: Array) -> TipSystem:
-        """Return the last equations. Raises `numpy.linalg.LinAlgError` where they are not finite."""
-        directions, tip, turned = (np.asarray(part) for part in self.sweep(x, p, g))
+    def tip_system(self, x: Array, p: Array, g: Array | None = None) -> TipSystem:
+        """Return the last equations for the residual g, or for none.
+
+        Raises `numpy.linalg.LinAlgError` where they are not finite.
+        """
+        rows, known = len(self._into[0]), self._base.shape[1]
+        given = np.zeros(x.size) if g is None else g
+        directions, tip, turned = (np.asarray(part) for part in self._sweep(x, p, given))
         if not np.all(np.isfinite(tip)):
             raise np.linalg.LinAlgError("the linearised tip equations are not finite")
-        every = directions.reshape(self._nx, self._intervals + 1, _DIRECTIONS)
-        known = _DIRECTIONS - 1
         matrix = np.delete(tip, known, axis=1)
-        return TipSystem(matrix, tip[:, known] + g[-self._tip_rows :], every, float(turned[0, 0]))
+        every = directions.reshape(*self._shape, known + 1)
+        return TipSystem(matrix, tip[:, known] + given[-rows:], every, float(turned[0, 0]))
 
     def solve(self, x: Array, p: Array, g: Array) -> Array:
         """Return dx. Raises `numpy.linalg.LinAlgError` where the tip equations are singular or not finite."""
         system = self.tip_system(x, p, g)
-        if self._plane is None:
-            found = np.linalg.solve(system.matrix, -system.right)
-        else:
-            inside = plane_directions(self._plane, len(system.right))[0]
-            found = inside @ np.linalg.solve(inside.T @ system.matrix @ inside, -(inside.T @ system.right))
-        states = system.directions @ np.append(found[:6], 1.0)
-        return np.concatenate([[system.d_stretch], states.T.ravel(), found[6:]])
+        found = np.linalg.solve(self._into @ system.matrix, -(self._into @ system.right))
+        known = self._base.shape[1]
+        states = system.directions @ np.append(found[:known], 1.0)
+        return np.concatenate([[system.d_stretch], states.T.ravel(), found[known:]])
+
+    def determinant(self, x: Array, p: Array) -> float:
+        """Return the determinant of the tip equations; it changes its sign where the solution turns or branches."""
+        return float(np.linalg.det(self._into @ self.tip_system(x, p).matrix))
+
+    def tip_moves(self, x: Array, p: Array) -> Array:
+        """Return how the tip's state moves when the tip equations are off by given errors, (nx, 6 + n_y)."""
+        system = self.tip_system(x, p)
+        moves = np.linalg.solve(self._into @ system.matrix, self._into)
+        known = self._base.shape[1]
+        tip: Array = system.directions[:, -1, :known] @ moves[:known]
+        return tip
 
 
 def plane_directions(normal: Array, size: int) -> tuple[Array, Array]:
@@ -94,26 +106,25 @@ def plane_directions(normal: Array, size: int) -> tuple[Array, Array]:
     return inside, outside
 
 
-def _sweep_function(functions: RodFunctions, method: MultipleShooting) -> ca.Function:
-    """Return (x, p, g) -> directions (nx, 7 (K + 1)), linearised tip (rows, 7 + n_y), d(stretch)."""
-    K, nx, ny = method.intervals, functions.state_size, functions.tip_unknowns
+@lru_cache(maxsize=8)
+def _pieces(functions: RodFunctions, tableau: Tableau, columns: int) -> tuple[ca.Function, ca.Function, ca.Function]:
+    """Return one linearised step, the linearised tip and section, for `columns` directions; shared by every grid."""
+    nx, ny = functions.state_size, functions.tip_unknowns
     nc, na = functions.field.size1_in(1), functions.tip.size1_in(5)
-    step = rk_step(functions.field, method.tableau)
+    step = rk_step(functions.field, tableau)
 
     def sym(name: str, *shape: int) -> ca.SX:
         return ca.SX.sym(name, *shape)
 
-    V, state, gap, c, dc = sym("V", nx, _DIRECTIONS), sym("x", nx), sym("gap", nx), sym("c", nc), sym("dc", nc)
-    moves = ca.vertcat(V, ca.horzcat(ca.SX(nc, _DIRECTIONS - 1), dc))
-    arrived = ca.jtimes(step(state, c, 1 / K), ca.vertcat(state, c), moves)
+    V, state, gap, c, dc, h = sym("V", nx, columns), sym("x", nx), sym("gap", nx), sym("c", nc), sym("dc", nc), sym("h")
+    moves = ca.vertcat(V, ca.horzcat(ca.SX(nc, columns - 1), dc))
+    arrived = ca.jtimes(step(state, c, h), ca.vertcat(state, c), moves)
     arrived[:, -1] += gap
-    advance = ca.Function("advance", [V, state, gap, c, dc], [arrived], {"cse": True}).mapaccum(K)
+    advance = ca.Function("advance", [V, state, gap, c, dc, h], [arrived], {"cse": True})
 
     y, a, units = sym("y", ny), sym("a", na), sym("units", 2)
     tip_residual = functions.tip(state, c, ca.SX.zeros(3), ca.SX.zeros(3), y, a, units)
-    by_state = ca.jtimes(tip_residual, ca.vertcat(state, c), moves)
-    by_forces = ca.densify(ca.jacobian(tip_residual, y))
-    linear = ca.horzcat(by_state, by_forces)
+    linear = ca.horzcat(ca.jtimes(tip_residual, ca.vertcat(state, c), moves), ca.jacobian(tip_residual, y))
     tip = ca.Function("tip", [V, state, c, dc, y, a, units], [ca.densify(linear)], {"cse": True})
 
     column, stretch = sym("p", functions.section.size1_in(0)), sym("stretch")
@@ -124,21 +135,28 @@ def _sweep_function(functions: RodFunctions, method: MultipleShooting) -> ca.Fun
         [constants, ca.jacobian(constants, stretch), ca.jacobian(balance, stretch), scales],
         {"cse": True},
     )
+    return advance, tip, section
 
-    x, p = ca.MX.sym("x", 1 + nx * (K + 1) + ny), ca.MX.sym("p", column.numel() + na)
+
+def _sweep_function(functions: RodFunctions, method: MultipleShooting, base_directions: Array) -> ca.Function:
+    """Return (x, p, g) -> directions (nx, (d + 1) (K + 1)), linearised tip (rows, d + 1 + n_y), d(stretch)."""
+    K, nx, ny = method.intervals, functions.state_size, functions.tip_unknowns
+    columns = base_directions.shape[1] + 1
+    advance, tip, section = _pieces(functions, method.tableau, columns)
+    n_p, na = section.size1_in(0), functions.tip.size1_in(5)
+    x, p = ca.MX.sym("x", 1 + nx * (K + 1) + ny), ca.MX.sym("p", n_p + na)
     g = ca.MX.sym("g", x.numel())
-    c_now, c_slope, balance_slope, scales_now = section(p[: column.numel()], x[0])
+    c_now, c_slope, balance_slope, scales_now = section(p[:n_p], x[0])
     d_stretch = -g[0] / balance_slope
     d_constants = c_slope * d_stretch
     nodes = ca.reshape(x[1 : 1 + nx * (K + 1)], nx, K + 1)
     base = g[1 : 1 + nx - 6]
     gaps = ca.reshape(g[1 + nx - 6 : g.numel() - 6 - ny], nx, K)
-    free = ca.DM.zeros(nx, 6)
-    free[_FORCE, :] = ca.DM.eye(6)
+    free = ca.DM.zeros(nx, columns - 1)
+    free[_FORCE, :] = ca.DM(base_directions)
     held = ca.vertcat(-base[:12], ca.DM.zeros(6), -base[12:])
     start = ca.horzcat(ca.MX(free), held)
-    every = advance(start, nodes[:, :K], gaps, ca.repmat(c_now, 1, K), ca.repmat(d_constants, 1, K))
-    last = tip(
-        every[:, -_DIRECTIONS:], nodes[:, K], c_now, d_constants, x[x.numel() - ny :], p[column.numel() :], scales_now
-    )
+    steps = advance.mapaccum(K)
+    every = steps(start, nodes[:, :K], gaps, ca.repmat(c_now, 1, K), ca.repmat(d_constants, 1, K), ca.DM.ones(1, K) / K)
+    last = tip(every[:, -columns:], nodes[:, K], c_now, d_constants, x[x.numel() - ny :], p[n_p:], scales_now)
     return ca.Function("condensed", [x, p, g], [ca.horzcat(start, every), last, d_stretch])

@@ -61,7 +61,8 @@ class BlockedSolver:
         self.numerics = numerics
         self.contact = contact
         self.has_wall = wall
-        self.poses = poses or PoseSolver(model, numerics)
+        # Without loads the free lengths and tip are taken from the closed form, so the grid need not show it.
+        self.poses = poses or PoseSolver(model, numerics, unloaded_accuracy=numerics.accuracy)
         self.functions = rod_functions(model, tip_conditions(contact.closure, wall=wall))
         self._declared = self.functions.declared()
         self._transfer = shape_function(self.functions.field)
@@ -87,7 +88,7 @@ class BlockedSolver:
             problem = compile_problem(list(self._declared.values()), [case])
             self._compiled[intervals] = (case, problem, CondensedSolver(self.functions, shooting))
         case, problem, judge = self._compiled[intervals]
-        condensed = CondensedSolver(self.functions, shooting, plane, like=judge.sweep)
+        condensed = CondensedSolver(self.functions, shooting, plane)
         linear = condensed if self.numerics.transcription == "multiple-shooting" else None
         engine: Engine | Weighted = Engine(problem, linear=linear)
         stepper: Engine | Weighted = Engine(
@@ -97,7 +98,7 @@ class BlockedSolver:
             engine, stepper = (
                 Weighted(e, self.functions, case, condensed, plane, self.contact.weights) for e in (engine, stepper)
             )
-        self._grids[key] = BlockedGrid(case, engine, stepper, judge, intervals, self.functions.state_size)
+        self._grids[key] = BlockedGrid(case, engine, stepper, condensed, judge, intervals, self.functions.state_size)
         return self._grids[key]
 
     def solve(
@@ -113,10 +114,9 @@ class BlockedSolver:
         free_step, free = self.poses.solve(situation.pressure, free_loads, near.free if near else None)
         if free is None or free_step.pose is None:
             return free_step, None
-        pose = free_step.pose
         touch = _TOUCHING + 3 * free.error if situation.is_loaded else _TOUCHING
         if wall is not None:
-            ahead = wall.gap(pose.tip_position + self.contact.tip_cap * pose.tip_rotation[:, 2])
+            ahead = wall.gap(self.free_tip(free)[1])
             if ahead > -touch * float(self.model.robot.length):
                 step = touching_step(free_step, self.contact, wall, ahead, touch * float(self.model.robot.length))
                 return replace(step, solve_time=time.perf_counter() - began), None
@@ -225,19 +225,22 @@ class BlockedSolver:
             lengths = free_lengths if u >= 1.0 else shapes.tip(free_situation(situation))[0]
             return grid.problem.pack(self.values(situation, pressed, lengths))
 
-        free_lengths = self.free_lengths(free)
+        free_lengths = self.free_tip(free)[0]
         if near is not None:
             x = self._transferred(near, grid)
         else:
             first = begin.towards(end, t_0)
             x = self._free_guess(grid, first, shapes)
-        trace: list[tuple[float, float, float]] = []
+        trace: list[tuple[float, float]] = []
+        sideways: list[tuple[float, float]] = [] if near is None else [(0.0, near.sideways)]
 
         def same_branch(u: float, solution: Solution) -> bool:
-            inside, outside = grid.determinants(solution, plane)
-            if trace and inside * trace[0][1] <= 0:
+            size = grid.determinant(solution)
+            if trace and size * trace[0][1] <= 0:
                 return False
-            trace.append((u, inside, outside))
+            trace.append((u, size))
+            if near is None or u >= 1.0:
+                sideways.append((u, grid.sideways(solution, plane)))
             return True
 
         begun = grid.stepper.solve(path(0.0), x)
@@ -248,7 +251,7 @@ class BlockedSolver:
             path,
             begun.x,
             distance=grid.distance,
-            first_step=0.5 if near is not None else 0.25,
+            first_step=1.0 if near is not None else 0.25,
             smallest_step=1 / 2048,
             largest_jump=_LARGEST_JUMP,
             same_branch=same_branch,
@@ -257,12 +260,11 @@ class BlockedSolver:
         if followed.arrived:
             final = grid.engine.solve(path(1.0), followed.solution.x)
             if final.holds(self.numerics.tolerance) and grid.distance(final.x - followed.solution.x) < 0.01:
-                slips = self._slips(begin, end, t_0, trace, near)
-                return self._examined(
-                    grid, replace(final, iterations=final.iterations + spent), end, pressed, slips, free
-                )
+                final = replace(final, iterations=final.iterations + spent)
+                aside = self._slips(begin, end, t_0, sideways, near), sideways[-1][1]
+                return self._examined(grid, final, end, pressed, aside, free)
         reached = begin.towards(end, t_0 + followed.fraction * (1 - t_0))
-        sizes = [abs(inside) for _, inside, _ in trace]
+        sizes = [abs(size) for _, size in trace]
         folded = len(sizes) > 1 and sizes[-1] < _NEAR_FOLD * max(sizes)
         return _Ended(reached, folded, spent)
 
@@ -318,16 +320,16 @@ class BlockedSolver:
                 states = np.vstack([moved[:STATE_SIZE], states[STATE_SIZE:]])
         return np.concatenate([[stretch], states.T.ravel(), np.zeros(self.functions.tip_unknowns)])
 
-    def free_lengths(self, free: Solved) -> Array:
-        """Return the chamber lengths of a free shape [m], in closed form where no load acts on it."""
-        column = free.solution.p
-        found = free.grid.problem.outputs(x=free.solution.x, p=column)
-        sets = self.model.robot.chamber_sets
+    def free_tip(self, free: Solved) -> tuple[Array, Array]:
+        """Return chamber lengths and contact point of a free shape [m], in closed form where no load acts on it."""
+        column, cap = free.solution.p, self.contact.tip_cap
+        sets, L_0 = self.model.robot.chamber_sets, float(self.model.robot.length)
         if not np.any(column[sets : sets + 9]):  # tip force, tip moment, gravity
             state = np.asarray(self.functions.arc(column, float(free.solution.x[0]), 1.0)).ravel()
-            return state[STATE_SIZE:] * float(self.model.robot.length)
+            return state[STATE_SIZE:] * L_0, state[:3] * L_0 + cap * state[9:12]
         found = free.grid.problem.outputs(x=free.solution.x, p=column)
-        return np.asarray(found["chamber_lengths"]).ravel()
+        axis = np.asarray(found["tip_rotation"])[:, 2]
+        return np.asarray(found["chamber_lengths"]).ravel(), np.asarray(found["tip_position"]).ravel() + cap * axis
 
     def _transferred(self, found: Blocked, grid: BlockedGrid) -> Array:
         """Return a solution on another grid."""
@@ -341,32 +343,27 @@ class BlockedSolver:
 
     def _refined(self, found: Blocked, grid: BlockedGrid) -> Blocked | None:
         """Return a solution solved again on a finer grid, or None where that leads elsewhere."""
-        p = grid.problem.pack(self.values(found.situation, found.pressed, self.free_lengths(found.free)))
+        p = grid.problem.pack(self.values(found.situation, found.pressed, self.free_tip(found.free)[0]))
         guess = self._transferred(found, grid)
         solution = grid.engine.solve(p, guess)
         if not solution.holds(self.numerics.tolerance) or grid.distance(solution.x - guess) > 0.05:
             return None
-        return self._examined(grid, solution, found.situation, found.pressed, found.slips, found.free)
+        return self._examined(grid, solution, found.situation, found.pressed, (found.slips, found.sideways), found.free)
 
     def _slips(
-        self,
-        begin: Situation,
-        end: Situation,
-        t_0: float,
-        trace: list[tuple[float, float, float]],
-        near: Blocked | None,
+        self, begin: Situation, end: Situation, t_0: float, sideways: list[tuple[float, float]], near: Blocked | None
     ) -> float | None:
         """Return the largest set pressure at which the out-of-plane determinant changed its sign, if it has."""
         if near is not None and near.slips is not None:
             return near.slips
-        for (u, _, a), (w, _, b) in zip(trace, trace[1:], strict=False):
+        for (u, a), (w, b) in zip(sideways, sideways[1:], strict=False):
             if a * b < 0:
                 crossing = u + (w - u) * a / (a - b)
                 return float(np.max(begin.towards(end, t_0 + crossing * (1 - t_0)).pressure))
         return None
 
     def _examined(
-        self, grid: BlockedGrid, solution: Solution, situation: Situation, pressed: Array, slips: float | None, free: Solved
+        self, grid: BlockedGrid, solution: Solution, situation: Situation, pressed: Array, aside: tuple[float | None, float], free: Solved
     ) -> Blocked:  # fmt: skip
         """Estimate the discretisation error of a solution."""
         linear = grid.engine.linear
@@ -380,7 +377,7 @@ class BlockedSolver:
         force = float(np.max(np.abs(forces), initial=0.0))
         constants = np.asarray(grid.problem.case_constants(solution.x, solution.p)).ravel()
         worst = max(position, rotation / 5, force / 5)
-        return Blocked(situation, pressed, grid, solution, constants, position, worst, slips, free)
+        return Blocked(situation, pressed, grid, solution, constants, position, worst, *aside, free)
 
 
 def standing_wall(solver: BlockedSolver, pressures: Array, loads: Loads) -> Wall:

@@ -20,11 +20,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class BlockedGrid:
-    """Everything compiled for one number of intervals, in a plane of symmetry or in space."""
+    """Everything compiled for one number of intervals, in a plane of symmetry or in space.
+
+    condensed, judge : the tip equations at the nodes, in the plane and in space.
+    """
 
     case: LoadCase
     engine: Engine | Weighted
     stepper: Engine | Weighted
+    condensed: CondensedSolver
     judge: CondensedSolver
     intervals: int
     state_size: int
@@ -51,17 +55,21 @@ class BlockedGrid:
         """Return the largest change of a scaled position or of a direction cosine."""
         return float(np.max(np.abs(self.states(change)[:12])))
 
-    def determinants(self, solution: Solution, plane: Array | None) -> tuple[float, float]:
-        """Return the determinants of the tip equations in the plane and out of it, or in space and 1."""
-        x = np.concatenate([solution.x[:1], self.nodes(solution.x).T.ravel(), self.tip_forces(solution.x)])
-        matrix = self.judge.tip_system(x, solution.p, np.zeros(x.size)).matrix
+    def determinant(self, solution: Solution) -> float:
+        """Return the determinant of the tip equations, in the plane where there is one."""
+        return self.condensed.determinant(self._at_nodes(solution.x), solution.p)
+
+    def sideways(self, solution: Solution, plane: Array | None) -> float:
+        """Return the determinant of the tip equations out of the plane; 1 in space."""
         if plane is None:
-            return float(np.linalg.det(matrix)), 1.0
-        inside, outside = plane_directions(plane, len(matrix))
-        return (
-            float(np.linalg.det(inside.T @ matrix @ inside)),
-            float(np.linalg.det(outside.T @ matrix @ outside)),
-        )
+            return 1.0
+        matrix = self.judge.tip_system(self._at_nodes(solution.x), solution.p).matrix
+        outside = plane_directions(plane, len(matrix))[1]
+        return float(np.linalg.det(outside.T @ matrix @ outside))
+
+    def _at_nodes(self, x: Array) -> Array:
+        """Return x with the states of the nodes alone."""
+        return np.concatenate([x[:1], self.nodes(x).T.ravel(), self.tip_forces(x)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +78,7 @@ class Blocked:
 
     constants : what the field takes beside the states. error : estimated tip position error over L_0. refinement_error
     : the same for position, rotation and forces. slips : pressure [Pa] of the most pressurised set above which a planar
-    shape may slip sideways, or None. free : of the free shape at the same pressure.
+    shape may slip sideways, or None. sideways : determinant out of the plane. free : of the free shape at the same pressure.
     """
 
     situation: Situation
@@ -81,4 +89,5 @@ class Blocked:
     error: float
     refinement_error: float
     slips: float | None
+    sideways: float
     free: Solved

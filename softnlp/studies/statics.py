@@ -120,12 +120,16 @@ def pose_distance(change: Array) -> float:
 class PoseSolver:
     """Solves poses of one model; compiled grids are kept between poses, so a sequence pays for each once.
 
-    model : robot, silicone, coefficients, conventions, all numbers.
+    model : robot, silicone, coefficients, conventions, all numbers. unloaded_accuracy : estimate to aim for, times 3,
+    where no load acts, if it is below that of the numerics.
     """
 
-    def __init__(self, model: Model, numerics: Numerics) -> None:
+    def __init__(
+        self, model: Model, numerics: Numerics, *, unloaded_accuracy: float = UNLOADED_ACCURACY * 3
+    ) -> None:
         self.model = model
         self.numerics = numerics
+        self._unloaded_accuracy = unloaded_accuracy
         self.quantities = quantities(model)
         self.branch = branch_function(model)
         self.functions = rod_functions(model)
@@ -222,7 +226,7 @@ class PoseSolver:
         """Return the estimate to aim for: a third of the accuracy, since estimates are good to a factor of 3."""
         accuracy = self.numerics.accuracy
         if not np.any([loads.tip_force, loads.tip_moment, loads.gravity]):
-            accuracy = min(accuracy, UNLOADED_ACCURACY * 3)
+            accuracy = min(accuracy, self._unloaded_accuracy)
         return accuracy / 3
 
     def next_intervals(self, error: float, intervals: int, target: float) -> int | None:

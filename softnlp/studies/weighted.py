@@ -124,19 +124,13 @@ class Weighted:
         nodes = states[self._node_index]
         y = x[1 + nx * self._states :]
         at_nodes = np.concatenate([x[:1], nodes.ravel(), y])
-        system = self._condensed.tip_system(at_nodes, p, np.zeros(at_nodes.size))
         taken = p[self._functions.section.size1_in(0) :]
         units = self.problem.units(x, p)
         constants = self.problem.case_constants(x, p)
         e_L = float(self._functions.contact(nodes[-1], constants, y, taken, units)[1])
-        if self._plane is None:
-            moves = np.linalg.inv(system.matrix)
-        else:
-            inside = plane_directions(self._plane, self._rows)[0]
-            moves = inside @ np.linalg.solve(inside.T @ system.matrix @ inside, inside.T)
         N = nx - STATE_SIZE
         pressed = taken[8 + N : 8 + 2 * N]
-        lengths = system.directions[STATE_SIZE:, -1, :6] @ moves[:6]
+        lengths = self._condensed.tip_moves(at_nodes, p)[STATE_SIZE:]
         return e_L, -(pressed @ lengths)
 
 
