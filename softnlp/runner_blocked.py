@@ -10,7 +10,8 @@ import numpy as np
 
 from softnlp.contact_settings import ContactTask
 from softnlp.scenario import Scenario
-from softnlp.studies.blocked_force import blocked_force, constrained_pose, force_against_offset, pressure_for_force
+from softnlp.studies.blocked_force import blocked_force, constrained_pose, force_against_offset
+from softnlp.studies.force_inversion import pressure_for_force
 from softnlp.studies.step import Run, Step
 
 Progress = Callable[[int, Step], None]
@@ -55,7 +56,13 @@ def _constrained(scenario: Scenario, progress: Progress | None, settings: dict[s
     steps = []
     for k, pressure in enumerate(scenario.pressures):
         step = constrained_pose(
-            scenario.robot, scenario.material, pressure, scenario.loads, scenario.contact.closure, **settings
+            scenario.robot,
+            scenario.material,
+            pressure,
+            scenario.loads,
+            scenario.contact.closure,
+            weights=scenario.contact.weights,
+            **settings,
         )
         if scenario.times is not None:
             step = replace(step, time=float(scenario.times[k]))

@@ -600,6 +600,10 @@ def test_terminal_table_of_a_blocked_force() -> None:
     assert "force" in header
     assert "gap" in header
     assert "[N]" in header
+    curve = printed(offset_run())
+    assert "offset" in curve[0]
+    assert next(line.split() for line in curve if line.split()[:1] == ["2"])[5:7] == ["-10.00", "0.8000"]
+    assert max(map(len, curve)) <= 100
     body = robot("D25L60")
     wide = [
         blocked_step(body, [1.2345e5, 0.0, 1.1111e5], 12.34567, time=1234.56, solve_time=12.3) if k else

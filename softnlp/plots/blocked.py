@@ -129,10 +129,13 @@ def _wall_panel(figure: Figure, centre: tuple[float, float], view: RunView, cont
     axes, reach = standing_on_base(figure, centre, view, azimuth)
     eye, light = direction(azimuth, ELEVATION), direction(azimuth - 50, 40)
     reach += _draw_free(axes, free, light)
-    solved = list(view.solved)
-    lines = [b.position / MILLIMETRE for b in view.bodies if b is not None]
-    shades = step_colours(len(view.bodies))[solved]
-    axes.add_collection3d(Line3DCollection(lines, colors=shades, linewidths=1.4, zorder=2.5, label="axes of the steps"))
+    others = [j for j in view.solved if j != k]
+    lines = [b.position / MILLIMETRE for j in others if (b := view.bodies[j]) is not None]
+    shades = step_colours(len(view.bodies))[others]
+    if lines:
+        axes.add_collection3d(
+            Line3DCollection(lines, colors=shades, linewidths=1.4, zorder=2.5, label="axes of the steps")
+        )
     reach += lines
     cap = contact.tip_cap / MILLIMETRE
     at = body.position[-1] / MILLIMETRE + cap * body.rotation[-1][:, 2]
