@@ -24,11 +24,12 @@ from softnlp.conventions import COEFFICIENT_SETS, CONVENTIONS
 from softnlp.formula import FUNCTIONS
 from softnlp.laws import LAWS
 from softnlp.scenario import scenario_from_text
-from softnlp.scenario_schema import SCHEMAS, BlockedForceFile, RampTable
+from softnlp.scenario_schema import SCHEMAS, BlockedForceFile, OffsetRampTable, RampTable
 from softnlp.status import Status
 
 ROOT = Path(__file__).parents[1]
 README, SCENARIO, MODEL = ROOT / "README.md", ROOT / "docs" / "scenario.md", ROOT / "docs" / "model.md"
+BLOCKED = ROOT / "docs" / "blocked-force.md"
 ONE_SET = ROOT / "scenarios" / "D25L60_one_set.toml"
 
 
@@ -85,7 +86,7 @@ PARSERS = (
 
 EXAMPLES = [
     pytest.param(example, id=f"{path.name}:{example.line}")
-    for path in (README, SCENARIO, MODEL)
+    for path in (README, SCENARIO, MODEL, BLOCKED)
     for example in Document.parse(str(path), *PARSERS).examples()
 ]
 
@@ -96,9 +97,9 @@ def test_an_example_of_the_documents_runs(example: Example, capsys: pytest.Captu
 
 
 def test_every_kind_of_example_was_found() -> None:
-    text = README.read_text() + SCENARIO.read_text()
+    text = README.read_text() + SCENARIO.read_text() + BLOCKED.read_text()
     kinds = re.findall(r"^```(\w+)$", text, re.MULTILINE)
-    assert {kind: kinds.count(kind) for kind in set(kinds)} == {"bash": 3, "python": 1, "toml": 4, "csv": 1, "json": 1}
+    assert {kind: kinds.count(kind) for kind in set(kinds)} == {"bash": 4, "python": 2, "toml": 4, "csv": 1, "json": 1}
     assert len(EXAMPLES) == len(kinds)
 
 
@@ -130,7 +131,7 @@ def test_every_table_and_key_of_a_scenario_is_documented() -> None:
     shown = documented(SCENARIO)
     found = dict(tables(BlockedForceFile))
     assert {f"[{name}]" for name in found} <= shown
-    for table in (*found.values(), RampTable):
+    for table in (*found.values(), RampTable, OffsetRampTable):
         assert set(table.model_fields) <= shown, table
     assert {"study", "title", *LAWS, *(f'"{law}"' for law in LAWS)} <= shown
     assert {c.file_key for law in LAWS.values() for c in law.constants} <= shown
@@ -140,7 +141,7 @@ def test_every_table_and_key_of_a_scenario_is_documented() -> None:
 def test_no_key_is_documented_that_is_not_there() -> None:
     """A key of a table in a table row of the documents."""
     tops = dict(tables(BlockedForceFile))
-    known = {key for table in (*tops.values(), RampTable) for key in table.model_fields}
+    known = {key for table in (*tops.values(), RampTable, OffsetRampTable) for key in table.model_fields}
     known |= {"study", "title", "set", *Status, *LAWS}
     scenario_part = SCENARIO.read_text().split("\n# Results")[0]
     first_cells = re.findall(r"^\| (`[^|]+`) \|(?: (`[^|]+`) \|)?", scenario_part, re.MULTILINE)
@@ -185,7 +186,7 @@ def test_every_result_is_documented() -> None:
 
 
 def test_links_lead_somewhere() -> None:
-    for path in (README, SCENARIO, MODEL, ROOT / "CONTRIBUTING.md"):
+    for path in (README, SCENARIO, MODEL, BLOCKED, ROOT / "CONTRIBUTING.md"):
         for target in re.findall(r"\]\(([^)]+)\)", path.read_text()):
             if target.startswith("http"):
                 continue
