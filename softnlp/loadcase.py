@@ -219,9 +219,7 @@ def load_case(name: str, functions: RodFunctions, given: Mapping[str, Quantity],
     )
 
 
-def _equations(
-    transcribed: Transcribed, conditions: TipConditions, L_0: ca.MX, F_0: ca.MX
-) -> tuple[Equation, ...]:
+def _equations(transcribed: Transcribed, conditions: TipConditions, L_0: ca.MX, F_0: ca.MX) -> tuple[Equation, ...]:
     """Name the residual rows of a load case: stretch, base, stages and continuity, tip."""
     nx = transcribed.state_size
     units = {

@@ -90,13 +90,13 @@ class BlockedSolver:
         case, problem, judge = self._compiled[intervals]
         condensed = CondensedSolver(self.functions, shooting, plane)
         linear = condensed if self.numerics.transcription == "multiple-shooting" else None
-        engine: Engine | Weighted = Engine(problem, linear=linear)
-        stepper: Engine | Weighted = Engine(
-            problem, linear=linear, newton_only=linear is not None, max_iterations=8, tolerance=1e-7
-        )
+        exact = Engine(problem, linear=linear)
+        loose = Engine(problem, linear=linear, newton_only=linear is not None, max_iterations=8, tolerance=1e-7)
+        engine: Engine | Weighted = exact
+        stepper: Engine | Weighted = loose
         if self.contact.closure == "weighted":
             engine, stepper = (
-                Weighted(e, self.functions, case, condensed, plane, self.contact.weights) for e in (engine, stepper)
+                Weighted(e, self.functions, case, condensed, plane, self.contact.weights) for e in (exact, loose)
             )
         self._grids[key] = BlockedGrid(case, engine, stepper, condensed, judge, intervals, self.functions.state_size)
         return self._grids[key]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -47,7 +47,7 @@ def pressure_for_force(
     conventions: Conventions = REPRODUCTION,
     numerics: Numerics = Numerics(),
 ) -> tuple[Array, Step]:
-    """Return the pressures (sets,) [Pa], the same in each of `sets` and 0 in others, that give a blocked force, and the step.
+    """Return the pressures (sets,) [Pa] that give a blocked force, the same in each of `sets` and 0 in others; and the step.
 
     sets : counted from 0. force : [N], above 0. highest : the largest pressure allowed [Pa]. The branch from zero
     pressure is followed until it passes the force; there both shapes are solved at once with the pressure free. Where
@@ -88,17 +88,26 @@ def pressure_for_force(
         lost = Step(direction * highest, Status.OUT_OF_REACH, message, solve_time=step.solve_time)
         return np.full_like(direction, np.nan), lost
     exact = contact.closure == "weighted"
-    P, step, solved = _bracketed(solve, (low, low_force), (float(P), found), force, near, 1e-10 if exact else 1e-3)
+    pressure, step, solved = _bracketed(
+        solve, (low, low_force), (float(P), found), force, near, 1e-10 if exact else 1e-3
+    )
     if solved is not None and not exact:
-        refined = _jointly(solver, solved, direction, float(P), force)
-        if refined is not None and abs(refined - P) < 0.05 * P:
+        refined = _jointly(solver, solved, direction, pressure, force)
+        if refined is not None and abs(refined - pressure) < 0.05 * pressure:
             again, on_branch, _ = solve(refined, near)
             if on_branch is not None:
-                P, step = refined, again
-    return direction * P, step
+                pressure, step = refined, again
+    return direction * pressure, step
 
 
-def _bracketed(solve, low, high, force, near, accuracy):  # type: ignore[no-untyped-def]
+def _bracketed(
+    solve: Callable[[float, Blocked | None], tuple[Step, Blocked | None, float]],
+    low: tuple[float, float],
+    high: tuple[float, float],
+    force: float,
+    near: Blocked | None,
+    accuracy: float,
+) -> tuple[float, Step, Blocked | None]:
     """Return the pressure between two that gives the force, by the Illinois method, with its step and solution."""
     (a, f_a), (b, f_b) = (low[0], low[1] - force), (high[0], high[1] - force)
     for _ in range(_SECANTS):

@@ -124,9 +124,7 @@ class PoseSolver:
     where no load acts, if it is below that of the numerics.
     """
 
-    def __init__(
-        self, model: Model, numerics: Numerics, *, unloaded_accuracy: float = UNLOADED_ACCURACY * 3
-    ) -> None:
+    def __init__(self, model: Model, numerics: Numerics, *, unloaded_accuracy: float = UNLOADED_ACCURACY * 3) -> None:
         self.model = model
         self.numerics = numerics
         self._unloaded_accuracy = unloaded_accuracy

@@ -99,7 +99,9 @@ class Situation:
             return other
 
         def between(a: Any, b: Any) -> Array:
-            return np.asarray(a, float) + t * (np.asarray(b, float) - np.asarray(a, float))
+            start = np.asarray(a, float)
+            moved: Array = start + t * (np.asarray(b, float) - start)
+            return moved
 
         here, there = self.loads, other.loads
         loads = Loads(
