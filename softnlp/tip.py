@@ -1,4 +1,4 @@
-"""What holds at the tip of the rod: dead loads alone, or a wall and reactions of the chambers too, Eqs. (9), (14) to (18).
+"""What holds at the tip of the rod: dead loads alone, or a wall and chamber reactions, Eqs. (9), (14) to (18).
 
 Pure functions of numbers or symbols in any consistent system of units. Every condition is 6 balances and as many more
 equations as it has unknown forces of its own.
@@ -110,9 +110,9 @@ def _balance(at: AtTip, T: Any, F_b: Any) -> Any:
     R = rod.unpack(at.state)[1]
     e3 = R[:, 2]
     push = F_b * at.given.wall_normal
-    M_T = ca.vertcat(
-        sum(T[i] * d_y for i, (_, d_y) in enumerate(at.centres)), -sum(T[i] * d_x for i, (d_x, _) in enumerate(at.centres)), 0
-    )  # fmt: skip
+    M_x = sum(T[i] * d_y for i, (_, d_y) in enumerate(at.centres))
+    M_y = -sum(T[i] * d_x for i, (d_x, _) in enumerate(at.centres))
+    M_T = ca.vertcat(M_x, M_y, 0)
     force = at.force + push + ca.sum1(T) * e3 + at.given.force_error
     moment = at.moment + at.given.tip_cap * ca.cross(e3, push) + R @ M_T + at.given.moment_error
     return rod.tip_balance(at.state, at.section, force, moment)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,6 @@ from softnlp.problem import CompiledProblem, compile_problem
 from softnlp.quantities import Model
 from softnlp.rod import STATE_SIZE, Loads
 from softnlp.solver import Engine, Solution, discretisation_correction
-from softnlp.status import Status
 from softnlp.studies.blocked_grid import Blocked, BlockedGrid
 from softnlp.studies.blocked_step import failed_step, solved_step, touching_step
 from softnlp.studies.free_shape import FreeShapes
@@ -55,8 +55,14 @@ class BlockedSolver:
     """
 
     def __init__(
-        self, model: Model, numerics: Numerics, contact: ContactSettings, *, wall: bool = True, poses: PoseSolver | None = None
-    ) -> None:  # fmt: skip
+        self,
+        model: Model,
+        numerics: Numerics,
+        contact: ContactSettings,
+        *,
+        wall: bool = True,
+        poses: PoseSolver | None = None,
+    ) -> None:
         self.model = model
         self.numerics = numerics
         self.contact = contact
@@ -70,7 +76,7 @@ class BlockedSolver:
         self._compiled: dict[int, tuple[LoadCase, CompiledProblem, CondensedSolver]] = {}
 
     def with_contact(self, contact: ContactSettings) -> BlockedSolver:
-        """Return a solver with other settings that shares the free shapes, and what is compiled under the same closure."""
+        """Return a solver with other settings that shares what both need compiled."""
         other = BlockedSolver(self.model, self.numerics, contact, wall=self.has_wall, poses=self.poses)
         if contact.closure == self.contact.closure:
             other.functions, other._compiled = self.functions, self._compiled
@@ -313,7 +319,7 @@ class BlockedSolver:
         s = grid.case.transcribed.points
         states = np.asarray(self.functions.arc(column, stretch, s[None, :]))
         if situation.is_loaded and self.has_wall:
-            step, solved = self.poses.solve(situation.pressure, situation.loads)
+            _, solved = self.poses.solve(situation.pressure, situation.loads)
             if solved is not None:
                 nodes = np.vstack([solved.nodes, np.zeros((states.shape[0] - STATE_SIZE, solved.nodes.shape[1]))])
                 moved = between_nodes(self._transfer, nodes, solved.constants, s)[: states.shape[0]]
@@ -356,15 +362,21 @@ class BlockedSolver:
         """Return the largest set pressure at which the out-of-plane determinant changed its sign, if it has."""
         if near is not None and near.slips is not None:
             return near.slips
-        for (u, a), (w, b) in zip(sideways, sideways[1:], strict=False):
+        for (u, a), (w, b) in pairwise(sideways):
             if a * b < 0:
                 crossing = u + (w - u) * a / (a - b)
                 return float(np.max(begin.towards(end, t_0 + crossing * (1 - t_0)).pressure))
         return None
 
     def _examined(
-        self, grid: BlockedGrid, solution: Solution, situation: Situation, pressed: Array, aside: tuple[float | None, float], free: Solved
-    ) -> Blocked:  # fmt: skip
+        self,
+        grid: BlockedGrid,
+        solution: Solution,
+        situation: Situation,
+        pressed: Array,
+        aside: tuple[float | None, float],
+        free: Solved,
+    ) -> Blocked:
         """Estimate the discretisation error of a solution."""
         linear = grid.engine.linear
         correction = discretisation_correction(grid.problem, solution, linear)

@@ -1,4 +1,4 @@
-"""Blocked tip force: how hard the tip pushes against a wall, at each pressure of a sequence or against the wall's offset."""
+"""Blocked tip force: how hard the tip pushes against a wall, by pressure or by the wall's offset."""
 
 from __future__ import annotations
 
@@ -118,8 +118,8 @@ def force_against_offset(
 ) -> Run:
     """Solve the characteristic curve: the blocked force at one pressure against where the wall stands.
 
-    pressure : (sets,) [Pa]. offsets : (steps,) h [m], along x; for a wall given by point and normal, how far it is moved
-    from its point in the direction in which it pushes. Each is followed from the last while there is contact.
+    pressure : (sets,) [Pa]. offsets : (steps,) h [m], along x; for a wall given by a point, how far it is moved
+    from it in the direction in which it pushes. Each is followed from the last while there is contact.
     The rest is as for `blocked_force`; one step an offset.
     """
     warnings = check(robot, allow=LOWERABLE_RULES)

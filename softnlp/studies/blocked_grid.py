@@ -78,7 +78,7 @@ class Blocked:
 
     constants : what the field takes beside the states. error : estimated tip position error over L_0. refinement_error
     : the same for position, rotation and forces. slips : pressure [Pa] of the most pressurised set above which a planar
-    shape may slip sideways, or None. sideways : determinant out of the plane. free : of the free shape at the same pressure.
+    shape may slip sideways, or None. sideways : determinant out of the plane. free : the free shape there.
     """
 
     situation: Situation

@@ -93,8 +93,8 @@ def solved_step(
     warnings = list(pose_warnings(model, pose))
     if found.slips is not None:
         warnings.append(
-            f"the blocked shape may slip sideways past the wall above {found.slips / BAR:.3g} bar: nothing but friction "
-            "holds it in the plane"
+            f"the blocked shape may slip sideways past the wall above {found.slips / BAR:.3g} bar: nothing but "
+            "friction holds it in the plane"
         )
     if found.error > poses.numerics.accuracy:
         warnings.append(

@@ -47,7 +47,9 @@ def pressure_for_force(
     conventions: Conventions = REPRODUCTION,
     numerics: Numerics = Numerics(),
 ) -> tuple[Array, Step]:
-    """Return the pressures (sets,) [Pa] that give a blocked force, the same in each of `sets` and 0 in others; and the step.
+    """Return the pressures (sets,) [Pa] that give a blocked force, and the step.
+
+    The pressure is the same in each of `sets` and 0 in others.
 
     sets : counted from 0. force : [N], above 0. highest : the largest pressure allowed [Pa]. The branch from zero
     pressure is followed until it passes the force; there both shapes are solved at once with the pressure free. Where
