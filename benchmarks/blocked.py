@@ -28,7 +28,8 @@ from softnlp.contact_settings import ContactSettings
 from softnlp.quantities import Model, quantities
 from softnlp.robot import ROBOTS
 from softnlp.section import deform
-from softnlp.studies.blocked import BlockedSolver, standing_wall
+from softnlp.studies.blocked import BlockedSolver
+from softnlp.studies.wall import standing_wall
 
 NAMES = [name for name in ROBOTS if name.startswith("D")]
 SILICONE = material("Ecoflex 00-50")
@@ -64,7 +65,7 @@ def main() -> None:
 def our_seconds(solver: BlockedSolver) -> float:
     """Return the time of one step [s], a mean over the sequence."""
     began = time.perf_counter()
-    wall, near = standing_wall(solver, PRESSURES, Loads()), None
+    wall, near = standing_wall(solver.poses, solver.contact, PRESSURES, Loads()), None
     for pressure in PRESSURES:
         step, solved = solver.solve(pressure, Loads(), wall, near)
         near = solved or near

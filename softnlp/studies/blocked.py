@@ -25,7 +25,7 @@ from softnlp.studies.free_shape import FreeShapes
 from softnlp.studies.pose import between_nodes, shape_function
 from softnlp.studies.statics import MOST_INTERVALS, PoseSolver, Solved
 from softnlp.studies.step import Step
-from softnlp.studies.wall import Situation, Wall, wall_of
+from softnlp.studies.wall import Situation, Wall
 from softnlp.studies.weighted import Weighted
 from softnlp.tip import tip_conditions
 from softnlp.transcription import MultipleShooting, method_named
@@ -390,18 +390,3 @@ class BlockedSolver:
         constants = np.asarray(grid.problem.case_constants(solution.x, solution.p)).ravel()
         worst = max(position, rotation / 5, force / 5)
         return Blocked(situation, pressed, grid, solution, constants, position, worst, *aside, free)
-
-
-def standing_wall(solver: BlockedSolver, pressures: Array, loads: Loads) -> Wall:
-    """Return the wall that the solver's settings describe, where the free shape goes at the largest pressure."""
-    contact = solver.contact
-    largest = pressures[int(np.argmax(np.sum(pressures, axis=1)))]
-    rest = np.array([0.0, 0.0, float(solver.model.robot.length) + contact.tip_cap])
-    for tried in (loads, Loads()):
-        pose = solver.poses.solve(largest, tried)[0].pose
-        if pose is not None:
-            return wall_of(contact, rest, pose.tip_position + contact.tip_cap * pose.tip_rotation[:, 2])
-    small = solver.poses.solve(1e-3 * largest, Loads())[0].pose
-    if small is None:
-        return wall_of(contact, rest, rest)
-    return wall_of(contact, rest, small.tip_position + contact.tip_cap * small.tip_rotation[:, 2])

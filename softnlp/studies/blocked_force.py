@@ -17,13 +17,13 @@ from softnlp.numerics import Numerics
 from softnlp.quantities import Model
 from softnlp.robot import LOWERABLE_RULES, Robot, check
 from softnlp.rod import Loads
-from softnlp.studies.blocked import BlockedSolver, standing_wall
+from softnlp.studies.blocked import BlockedSolver
 from softnlp.studies.blocked_grid import Blocked
 from softnlp.studies.force_inversion import pressure_for_force
 from softnlp.studies.forward import checked_loads, pressure_table
 from softnlp.studies.multistart import other_equilibria
 from softnlp.studies.step import Run, Step
-from softnlp.studies.wall import Wall, checked_contact
+from softnlp.studies.wall import Wall, checked_contact, standing_wall
 
 Array = NDArray[np.float64]
 
@@ -84,7 +84,7 @@ def blocked_force(
     if branches < 0:
         raise InputError(f"expected a number that is not negative, got {branches}", key="branches")
     solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
-    wall = standing_wall(solver, P, loads)
+    wall = standing_wall(solver.poses, solver.contact, P, loads)
     steps: list[Step] = []
     near: Blocked | None = None
     for k, pressure in enumerate(P):
@@ -132,7 +132,7 @@ def force_against_offset(
         raise InputError("expected a list of finite offsets", key="offsets")
     solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
     given = contact.wall_point is not None
-    first = standing_wall(solver if given else solver.with_contact(replace(contact, offset=0.0)), P, loads)
+    first = standing_wall(solver.poses, contact if given else replace(contact, offset=0.0), P, loads)
     steps: list[Step] = []
     near: Blocked | None = None
     for k, offset in enumerate(h):
@@ -211,7 +211,7 @@ def weight_sensitivity(
 
     P, loads = pressure_table(pressure, robot.chamber_sets), checked_loads(loads)
     solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
-    wall = standing_wall(solver, P, loads)
+    wall = standing_wall(solver.poses, solver.contact, P, loads)
 
     def solved(weights: ClosureWeights) -> Step:
         return solver.with_contact(replace(contact, weights=weights)).solve(P[-1], loads, wall)[0]

@@ -20,11 +20,11 @@ from softnlp.robot import LOWERABLE_RULES, Robot, check
 from softnlp.rod import Loads
 from softnlp.solver import Engine
 from softnlp.status import Status
-from softnlp.studies.blocked import BlockedSolver, standing_wall
+from softnlp.studies.blocked import BlockedSolver
 from softnlp.studies.blocked_grid import Blocked
 from softnlp.studies.forward import checked_loads
 from softnlp.studies.step import Step
-from softnlp.studies.wall import checked_contact
+from softnlp.studies.wall import checked_contact, standing_wall
 from softnlp.transcription import method_named
 from softnlp.units import BAR
 
@@ -71,7 +71,7 @@ def pressure_for_force(
     direction = np.zeros(robot.chamber_sets)
     direction[chosen] = 1.0
     solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
-    wall = standing_wall(solver, (direction * highest)[None, :], loads)
+    wall = standing_wall(solver.poses, solver.contact, (direction * highest)[None, :], loads)
 
     def solve(P: float, near: Blocked | None) -> tuple[Step, Blocked | None, float]:
         step, solved = solver.solve(direction * P, loads, wall, near)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from softnlp.contact_settings import CLOSURES, ContactSettings
 from softnlp.errors import InputError
 from softnlp.rod import Loads
+from softnlp.studies.statics import PoseSolver
 
 Array = NDArray[np.float64]
 
@@ -118,3 +119,17 @@ class Situation:
     def is_loaded(self) -> bool:
         """Whether any dead load acts."""
         return bool(np.any([self.loads.tip_force, self.loads.tip_moment, self.loads.gravity]))
+
+
+def standing_wall(poses: PoseSolver, contact: ContactSettings, pressures: Array, loads: Loads) -> Wall:
+    """Return the wall that the settings describe, where the free shape goes at the largest pressure."""
+    largest = pressures[int(np.argmax(np.sum(pressures, axis=1)))]
+    rest = np.array([0.0, 0.0, float(poses.model.robot.length) + contact.tip_cap])
+    for tried in (loads, Loads()):
+        pose = poses.solve(largest, tried)[0].pose
+        if pose is not None:
+            return wall_of(contact, rest, pose.tip_position + contact.tip_cap * pose.tip_rotation[:, 2])
+    small = poses.solve(1e-3 * largest, Loads())[0].pose
+    if small is None:
+        return wall_of(contact, rest, rest)
+    return wall_of(contact, rest, small.tip_position + contact.tip_cap * small.tip_rotation[:, 2])

@@ -1,8 +1,8 @@
 """The paper's closure: the tip equations and the chamber constraint are met as well as their weights ask, Eq. (14).
 
 With the errors s = (e_n, e_m, e_h) of the tip equations given, the problem is square and e_L is a function of s. The
-sum |W s|^2 + (W_L e_L(s))^2 is then minimised over s: each step replaces e_L(s) by its tangent, for which the minimum is in
-closed form. A weight W_h of None holds e_h = 0 exactly.
+sum |W s|^2 + (W_L e_L(s))^2 is then minimised over s: each step replaces e_L(s) by its tangent, for which the minimum
+is in closed form. A weight W_h of None holds e_h = 0 exactly.
 """
 
 from __future__ import annotations
