@@ -158,4 +158,3 @@ def random_design(
     robot, material = random_robot(rng), random_material(rng, laws)
     pressure, made = random_pressures(rng, robot, material, most_stretch=most_stretch, most_bending=most_bending)
     return Design(robot, material, pressure, random_loads(rng, made, force=force, moment=moment), made)
-
