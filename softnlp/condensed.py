@@ -1,90 +1,162 @@
 """The linear algebra of one multiple-shooting load case, with its interior nodes eliminated interval by interval.
 
-For J(x) dx = -g, with x = [stretch | x_0 | ... | x_K] and g = [balance | base | gaps | tip] (see `softnlp.loadcase`):
+For J(x) dx = -g, with x = [stretch | x_0 | ... | x_K | y] and g = [balance | base | gaps | tip] (see
+`softnlp.loadcase`):
 
     stretch   the balance depends on nothing else, so d(lambda) = -g_0 / b'(lambda)
-    base      d(p, R)_0 = -g_base; d(n, m)_0 stays unknown: six directions and one known part
+    base      d(p, R, L_i)_0 = -g_base; d(n, m)_0 stays unknown: six directions and one known part
     interval  dx_k+1 = F_x dx_k + F_c c' d(lambda) + g_k, one Runge-Kutta step with seven forward directions
-    tip       six equations for the six unknowns
+    tip       6 + n_y equations for d(n, m)_0 and the forces y that the tip conditions add
 
 The same numbers as a sparse factorisation gives, for the cost of one sweep.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import lru_cache
+
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp import rod
 from softnlp.loadcase import RodFunctions
-from softnlp.transcription import MultipleShooting, rk_step
+from softnlp.transcription import MultipleShooting, Tableau, rk_step
 
 Array = NDArray[np.float64]
 
-_NX = rod.STATE_SIZE
-_DIRECTIONS = 7
+_FORCE = slice(12, 18)
+
+
+@dataclass(frozen=True, eq=False)
+class TipSystem:
+    """The last equations: matrix (6 + n_y, d + n_y) times d(n(0), m(0) along d directions, y) = -right.
+
+    directions : (nx, K + 1, d + 1), how the states follow those and, last, the known part. d_stretch : solved.
+    """
+
+    matrix: Array
+    right: Array
+    directions: Array
+    d_stretch: float
 
 
 class CondensedSolver:
     """Solves J dx = -g for a load case with every quantity fixed, transcribed by multiple shooting.
 
-    The fixed values p are those of `softnlp.quantities.quantities(model)`, in order.
+    The fixed values p are those of `functions.declared()`, in order. plane : unit normal of a plane of symmetry through
+    +z, in which the shape is held: n(0), m(0) have three directions in it. None: in space, where they have six.
     """
 
-    def __init__(self, functions: RodFunctions, method: MultipleShooting) -> None:
-        self._intervals = method.intervals
-        self._sweep = _sweep_function(functions, method)
+    def __init__(self, functions: RodFunctions, method: MultipleShooting, plane: Array | None = None) -> None:
+        self._shape = (functions.state_size, method.intervals + 1)
+        rows = 6 + functions.tip_unknowns
+        inside = np.eye(rows) if plane is None else plane_directions(plane, rows)[0]
+        self._into = inside.T
+        self._base = inside[:6, : inside.shape[1] - functions.tip_unknowns]
+        self._sweep = _sweep_function(functions, method, self._base)
 
-    def solve(self, x: Array, p: Array, g: Array) -> Array:
-        """Return dx. Raises `numpy.linalg.LinAlgError` where the six tip equations are singular or not finite."""
-        K = self._intervals
-        directions, tip, turned = (np.asarray(part) for part in self._sweep(x, p, g))
+    def tip_system(self, x: Array, p: Array, g: Array | None = None) -> TipSystem:
+        """Return the last equations for the residual g, or for none.
+
+        Raises `numpy.linalg.LinAlgError` where they are not finite.
+        """
+        rows, known = len(self._into[0]), self._base.shape[1]
+        given = np.zeros(x.size) if g is None else g
+        directions, tip, turned = (np.asarray(part) for part in self._sweep(x, p, given))
         if not np.all(np.isfinite(tip)):
             raise np.linalg.LinAlgError("the linearised tip equations are not finite")
-        base = np.linalg.solve(tip[:, :6], -(tip[:, 6] + g[-6:]))
-        known = np.append(base, 1.0)
-        states = directions.reshape(_NX, K + 1, _DIRECTIONS) @ known
-        return np.concatenate([turned.ravel(), states.T.ravel()])
+        matrix = np.delete(tip, known, axis=1)
+        every = directions.reshape(*self._shape, known + 1)
+        return TipSystem(matrix, tip[:, known] + given[-rows:], every, float(turned[0, 0]))
+
+    def solve(self, x: Array, p: Array, g: Array) -> Array:
+        """Return dx. Raises `numpy.linalg.LinAlgError` where the tip equations are singular or not finite."""
+        system = self.tip_system(x, p, g)
+        found = np.linalg.solve(self._into @ system.matrix, -(self._into @ system.right))
+        known = self._base.shape[1]
+        states = system.directions @ np.append(found[:known], 1.0)
+        return np.concatenate([[system.d_stretch], states.T.ravel(), found[known:]])
+
+    def determinant(self, x: Array, p: Array) -> float:
+        """Return the determinant of the tip equations; it changes its sign where the solution turns or branches."""
+        return float(np.linalg.det(self._into @ self.tip_system(x, p).matrix))
+
+    def tip_moves(self, x: Array, p: Array) -> Array:
+        """Return how the tip's state moves when the tip equations are off by given errors, (nx, 6 + n_y)."""
+        system = self.tip_system(x, p)
+        moves = np.linalg.solve(self._into @ system.matrix, self._into)
+        known = self._base.shape[1]
+        tip: Array = system.directions[:, -1, :known] @ moves[:known]
+        return tip
 
 
-def _sweep_function(functions: RodFunctions, method: MultipleShooting) -> ca.Function:
-    """Return (x, p, g) -> directions (18, 7 (K + 1)), linearised tip (6, 7), d(stretch)."""
-    K = method.intervals
-    nc = functions.field.size1_in(1)
-    step = rk_step(functions.field, method.tableau)
+def plane_directions(normal: Array, size: int) -> tuple[Array, Array]:
+    """Return the directions of (force, moment, more forces) in a plane through +z and those out of it, as columns.
+
+    In the plane: force along it and +z, moment along its normal, and what follows; out of it: the other three. They
+    are directions of the tip equations too.
+    """
+    up = np.array([0.0, 0.0, 1.0])
+    along = np.cross(normal, up)
+    inside, outside = np.zeros((size, size - 3)), np.zeros((size, 3))
+    inside[:3, 0], inside[:3, 1], inside[3:6, 2] = along, up, normal
+    inside[6:, 3:] = np.eye(size - 6)
+    outside[:3, 0], outside[3:6, 1], outside[3:6, 2] = normal, along, up
+    return inside, outside
+
+
+@lru_cache(maxsize=8)
+def _pieces(functions: RodFunctions, tableau: Tableau, columns: int) -> tuple[ca.Function, ca.Function, ca.Function]:
+    """Return one linearised step, the linearised tip and section, for `columns` directions; shared by every grid."""
+    nx, ny = functions.state_size, functions.tip_unknowns
+    nc, na = functions.field.size1_in(1), functions.tip.size1_in(5)
+    step = rk_step(functions.field, tableau)
 
     def sym(name: str, *shape: int) -> ca.SX:
         return ca.SX.sym(name, *shape)
 
-    V, state, gap, c, dc = sym("V", _NX, _DIRECTIONS), sym("x", _NX), sym("gap", _NX), sym("c", nc), sym("dc", nc)
-    moves = ca.vertcat(V, ca.horzcat(ca.SX(nc, _DIRECTIONS - 1), dc))
-    arrived = ca.jtimes(step(state, c, 1 / K), ca.vertcat(state, c), moves)
+    V, state, gap, c, dc, h = sym("V", nx, columns), sym("x", nx), sym("gap", nx), sym("c", nc), sym("dc", nc), sym("h")
+    moves = ca.vertcat(V, ca.horzcat(ca.SX(nc, columns - 1), dc))
+    arrived = ca.jtimes(step(state, c, h), ca.vertcat(state, c), moves)
     arrived[:, -1] += gap
-    advance = ca.Function("advance", [V, state, gap, c, dc], [arrived], {"cse": True}).mapaccum(K)
+    advance = ca.Function("advance", [V, state, gap, c, dc, h], [arrived], {"cse": True})
 
-    tip_residual = functions.tip(state, c, ca.SX.zeros(3), ca.SX.zeros(3))
-    tip = ca.Function("tip", [V, state, c, dc], [ca.jtimes(tip_residual, ca.vertcat(state, c), moves)])
+    y, a, units = sym("y", ny), sym("a", na), sym("units", 2)
+    tip_residual = functions.tip(state, c, ca.SX.zeros(3), ca.SX.zeros(3), y, a, units)
+    linear = ca.horzcat(ca.jtimes(tip_residual, ca.vertcat(state, c), moves), ca.jacobian(tip_residual, y))
+    tip = ca.Function("tip", [V, state, c, dc, y, a, units], [ca.densify(linear)], {"cse": True})
 
     column, stretch = sym("p", functions.section.size1_in(0)), sym("stretch")
-    constants, balance, _ = functions.section(column, stretch)
+    constants, balance, scales = functions.section(column, stretch)
     section = ca.Function(
         "section",
         [column, stretch],
-        [constants, ca.jacobian(constants, stretch), ca.jacobian(balance, stretch)],
+        [constants, ca.jacobian(constants, stretch), ca.jacobian(balance, stretch), scales],
         {"cse": True},
     )
+    return advance, tip, section
 
-    x, p = ca.MX.sym("x", 1 + _NX * (K + 1)), ca.MX.sym("p", column.numel())
+
+def _sweep_function(functions: RodFunctions, method: MultipleShooting, base_directions: Array) -> ca.Function:
+    """Return (x, p, g) -> directions (nx, (d + 1) (K + 1)), linearised tip (rows, d + 1 + n_y), d(stretch)."""
+    K, nx, ny = method.intervals, functions.state_size, functions.tip_unknowns
+    columns = base_directions.shape[1] + 1
+    advance, tip, section = _pieces(functions, method.tableau, columns)
+    n_p, na = section.size1_in(0), functions.tip.size1_in(5)
+    x, p = ca.MX.sym("x", 1 + nx * (K + 1) + ny), ca.MX.sym("p", n_p + na)
     g = ca.MX.sym("g", x.numel())
-    c_now, c_slope, balance_slope = section(p, x[0])
+    c_now, c_slope, balance_slope, scales_now = section(p[:n_p], x[0])
     d_stretch = -g[0] / balance_slope
     d_constants = c_slope * d_stretch
-    nodes = ca.reshape(x[1:], _NX, K + 1)
-    gaps = ca.reshape(g[13:-6], _NX, K)
-    free = ca.DM.zeros(_NX, 6)
-    free[12:, :] = ca.DM.eye(6)
-    start = ca.horzcat(ca.MX(free), ca.vertcat(-g[1:13], ca.DM.zeros(6)))
-    every = advance(start, nodes[:, :K], gaps, ca.repmat(c_now, 1, K), ca.repmat(d_constants, 1, K))
-    last = tip(every[:, -_DIRECTIONS:], nodes[:, K], c_now, d_constants)
+    nodes = ca.reshape(x[1 : 1 + nx * (K + 1)], nx, K + 1)
+    base = g[1 : 1 + nx - 6]
+    gaps = ca.reshape(g[1 + nx - 6 : g.numel() - 6 - ny], nx, K)
+    free = ca.DM.zeros(nx, columns - 1)
+    free[_FORCE, :] = ca.DM(base_directions)
+    held = ca.vertcat(-base[:12], ca.DM.zeros(6), -base[12:])
+    start = ca.horzcat(ca.MX(free), held)
+    steps = advance.mapaccum(K)
+    every = steps(start, nodes[:, :K], gaps, ca.repmat(c_now, 1, K), ca.repmat(d_constants, 1, K), ca.DM.ones(1, K) / K)
+    last = tip(every[:, -columns:], nodes[:, K], c_now, d_constants, x[x.numel() - ny :], p[n_p:], scales_now)
     return ca.Function("condensed", [x, p, g], [ca.horzcat(start, every), last, d_stretch])

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+CLOSURES = ("free", "compliant", "weighted", "rigid")
+
 Vector = tuple[float, float, float]
 
 
@@ -37,3 +39,16 @@ class ContactSettings:
     wall_point: Vector | None = None
     wall_normal: Vector | None = None
     weights: ClosureWeights = field(default_factory=ClosureWeights)
+
+
+@dataclass(frozen=True)
+class ContactTask:
+    """What a scenario asks of a blocked force; at most one of its three, else the force at each pressure.
+
+    offsets : h of a characteristic curve at the one pressure given [m]. target_force : the force to find the pressure
+    for, bounded by the last pressure given [N]. constrained : no wall; the chambers' lengths are held under the loads.
+    """
+
+    offsets: tuple[float, ...] | None = None
+    target_force: float | None = None
+    constrained: bool = False

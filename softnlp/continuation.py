@@ -42,12 +42,14 @@ def follow(
     smallest_step: float = 1 / 1024,
     largest_jump: float = 0.6,
     most_solves: int = 400,
+    same_branch: Callable[[float, Solution], bool] | None = None,
 ) -> Followed:
     """Follow a solution along p = path(t) from t = 0, where `start` is a solution or close to one, to t = 1.
 
     The step is halved when a solve fails or lands further than `largest_jump` (scaled) from its prediction, which is
     how another branch shows, and grows again after success. The predictor is the secant. `distance` measures a change
     of x. A solve counts when it meets ten times the engine's own tolerance, so an engine for a path may be a loose one.
+    `same_branch(t, solution)` may refuse a solution that the distance does not tell from the branch.
     """
     tolerance = 10 * engine.tolerance
     current = engine.solve(path(0.0), start)
@@ -63,8 +65,8 @@ def follow(
             guess = guess + (current.x - previous[1]) * (target - done) / (done - previous[0])
         trial = engine.solve(path(target), guess)
         iterations += trial.iterations
-        jump = distance(trial.x - guess)
-        if trial.holds(tolerance) and jump <= largest_jump:
+        found = trial.holds(tolerance) and distance(trial.x - guess) <= largest_jump
+        if found and (same_branch is None or same_branch(target, trial)):
             previous, current, done = (done, current.x), trial, target
             if done >= 1.0:
                 break

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -50,7 +51,6 @@ class CompiledProblem:
     nlp: Mapping[str, ca.MX]
     residual: ca.Function
     fine_residual: ca.Function
-    jacobian: ca.Function
     si_scales: ca.Function
     outputs: ca.Function
     case_constants: ca.Function
@@ -60,6 +60,12 @@ class CompiledProblem:
     lower_g: Array
     upper_g: Array
     is_square: bool
+
+    @cached_property
+    def jacobian(self) -> ca.Function:
+        """The Jacobian of the residual by x, as a function of (x, p); built at first use."""
+        x, p, g = (self.nlp[name] for name in "xpg")
+        return ca.Function("jacobian", [x, p], [ca.jacobian(g, x)])
 
     @property
     def free_size(self) -> int:
@@ -148,7 +154,6 @@ def compile_problem(
     fine = function("fine", [ca.vertcat(*(case.fine_residuals for case in cases), *map(ca.vec, rows))])
     cost = function("cost", [objective])(x, p) if objective is not None else ca.MX(0)
     g = residual(x, p)
-    jacobian = ca.Function("jacobian", [x, p], [ca.jacobian(g, x)])
 
     equations = _all_equations(cases, constraints)
     lower_g, upper_g = np.zeros(g.numel()), np.zeros(g.numel())
@@ -167,7 +172,6 @@ def compile_problem(
         nlp={"x": x, "p": p, "f": cost, "g": g},
         residual=residual,
         fine_residual=fine,
-        jacobian=jacobian,
         si_scales=function("si_scales", [ca.vertcat(*(e.si_scale for e in equations))]),
         outputs=_outputs(function, cases),
         case_constants=function("constants", [ca.vertcat(*(case.constants for case in cases))]),
@@ -178,7 +182,8 @@ def compile_problem(
         upper_g=upper_g,
         is_square=objective is None and g.numel() == x.numel() and all(c.is_equality for c in constraints),
     )
-    _refuse_ill_posed(compiled, objective is not None)
+    if freed or constraints:  # load cases alone are square and well posed
+        _refuse_ill_posed(compiled, objective is not None)
     return compiled
 
 

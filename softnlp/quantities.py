@@ -97,6 +97,24 @@ def quantities(model: Model) -> dict[str, Quantity]:
     return {q.name: q for q in declared}
 
 
+def contact_quantities(model: Model) -> dict[str, Quantity]:
+    """Return the quantities of a wall and a chamber closure by name, "contact." and a field of `softnlp.tip.Given`."""
+    N = model.robot.chambers
+    L_0 = float(model.robot.length)
+    declared = [
+        quantity("contact.wall_point", "m", np.zeros(3), scale=L_0),
+        quantity("contact.wall_normal", "1", np.array([1.0, 0.0, 0.0])),
+        quantity("contact.tip_cap", "m", 0.0, scale=L_0, lower=0.0),
+        quantity("contact.chamber_reaction", "1", float(model.coefficients.chamber_reaction), lower=0.0),
+        quantity("contact.free_lengths", "m", np.full(N, L_0), scale=L_0, lower=0.0),
+        quantity("contact.pressed", "1", np.zeros(N)),
+        quantity("contact.force_error", "N", np.zeros(3)),
+        quantity("contact.moment_error", "N m", np.zeros(3), scale=1e-2),
+        quantity("contact.gap_error", "m", 0.0, scale=L_0),
+    ]
+    return {q.name: q for q in declared}
+
+
 def with_symbols(model: Model, values: Mapping[str, Any]) -> Model:
     """Return the model with the named quantities (see `quantities`) in place of its numbers."""
     robot = replace(model.robot, **{name: values[f"robot.{name}"] for name in _SIZES})

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from softnlp.errors import InputError
 from softnlp.reading import choices
+from softnlp.runner_blocked import run_blocked
 from softnlp.scenario import Scenario
 from softnlp.studies.forward import forward
 from softnlp.studies.step import Run, Step
@@ -14,8 +15,10 @@ from softnlp.studies.step import Run, Step
 Progress = Callable[[int, Step], None]
 
 
-def run_scenario(scenario: Scenario, progress: Progress | None = None) -> Run:
+def run_scenario(scenario: Scenario, progress: Progress | None = None, branches: int = 0) -> Run:
     """Run the study of a scenario, every step in order; `progress` is called with each step as it is done.
+
+    branches : other starts for each step of a blocked force, see `softnlp.studies.blocked_force`.
 
     Raises
     ------
@@ -28,12 +31,12 @@ def run_scenario(scenario: Scenario, progress: Progress | None = None) -> Run:
             source=str(scenario.path),
             key="study",
         )
-    return replace(_STUDIES[scenario.study](scenario, progress), warnings=scenario.warnings)
+    return replace(_STUDIES[scenario.study](scenario, progress, branches), warnings=scenario.warnings)
 
 
 def partial_run(scenario: Scenario, steps: Sequence[Step]) -> Run:
     """Return the run of a scenario that was stopped after some steps; a warning says so."""
-    note = f"stopped by the user after {len(steps)} of {len(scenario.pressures)} steps"
+    note = f"stopped by the user after {len(steps)} of {scenario.step_count} steps"
     return Run(
         study=scenario.study,
         robot=scenario.robot,
@@ -44,10 +47,11 @@ def partial_run(scenario: Scenario, steps: Sequence[Step]) -> Run:
         steps=tuple(steps),
         title=scenario.title,
         warnings=(*scenario.warnings, note),
+        contact=scenario.contact,
     )
 
 
-def _forward(scenario: Scenario, progress: Progress | None) -> Run:
+def _forward(scenario: Scenario, progress: Progress | None, branches: int) -> Run:
     return forward(
         scenario.robot,
         scenario.material,
@@ -62,4 +66,7 @@ def _forward(scenario: Scenario, progress: Progress | None) -> Run:
     )
 
 
-_STUDIES: Mapping[str, Callable[[Scenario, Progress | None], Run]] = {"forward": _forward}
+_STUDIES: Mapping[str, Callable[[Scenario, Progress | None, int], Run]] = {
+    "forward": _forward,
+    "blocked-force": run_blocked,
+}

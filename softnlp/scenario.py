@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.contact_settings import ClosureWeights, ContactSettings
+from softnlp.contact_settings import ContactSettings, ContactTask
 from softnlp.conventions import COEFFICIENT_SETS, CONVENTIONS, Coefficients, Conventions
 from softnlp.errors import InputError, nearest
 from softnlp.materials import Material, material_from_table
@@ -22,7 +22,8 @@ from softnlp.reading import LONGEST_NAME, one_line, read_text, shown
 from softnlp.robot import DIMENSIONS, ROBOTS, Robot, Violation, check, violations
 from softnlp.rod import Loads
 from softnlp.scenario_check import first_of, parse
-from softnlp.scenario_schema import BlockedForceFile, ContactTable, ForwardFile, RobotTable
+from softnlp.scenario_contact import contact_settings, contact_task
+from softnlp.scenario_schema import BlockedForceFile, ForwardFile, RobotTable
 from softnlp.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
@@ -35,7 +36,8 @@ class Scenario:
 
     path : the file as it was named. text : its content. title : the file's stem when it gives none.
     pressures : (steps, sets) gauge [Pa]. times : (steps,) [s], or None when the pressures have none.
-    contact : of a blocked force, else None. warnings : rules of manufacture that the robot breaks with leave.
+    contact, contact_task : of a blocked force, else None.
+    warnings : rules of manufacture that the robot breaks with leave.
     """
 
     path: Path
@@ -51,7 +53,16 @@ class Scenario:
     times: Array | None
     numerics: Numerics
     contact: ContactSettings | None
+    contact_task: ContactTask | None
     warnings: tuple[str, ...]
+
+    @property
+    def step_count(self) -> int:
+        """How many steps its run has when none is left out."""
+        task = self.contact_task
+        if task is not None and task.offsets is not None:
+            return len(task.offsets)
+        return 1 if task is not None and task.target_force is not None else len(self.pressures)
 
 
 def load_scenario(path: str | PathLike[str]) -> Scenario:
@@ -109,9 +120,10 @@ def _scenario(text: str, path: Path) -> Scenario:
     steps = made and _attempt(
         errors, "pressure", lambda: pressure_path(file.pressure, made[0].chamber_sets, path.parent)
     )
-    contact = None
+    contact = task = None
     if isinstance(file, BlockedForceFile):
-        contact = _attempt(errors, "contact", lambda: _contact(file.contact))
+        contact = _attempt(errors, "contact", lambda: contact_settings(file.contact))
+        task = steps and _attempt(errors, "contact", lambda: contact_task(file.contact, steps.pressures))
     if errors or made is None or chosen is None or steps is None:
         raise first_of(errors)
     robot, warnings = made
@@ -129,6 +141,7 @@ def _scenario(text: str, path: Path) -> Scenario:
         times=steps.times,
         numerics=Numerics(**dict(file.solver)),
         contact=contact,
+        contact_task=task or None,
         warnings=warnings,
     )
 
@@ -224,40 +237,3 @@ def _loads(file: ForwardFile) -> Loads:
     m_x, m_y, m_z = (component * NEWTON_MILLIMETRE for component in file.tip_load.moment_Nmm)
     g_x, g_y, g_z = (component * STANDARD_GRAVITY for component in file.gravity.direction)
     return Loads(tip_force=(float(f_x), float(f_y), float(f_z)), tip_moment=(m_x, m_y, m_z), gravity=(g_x, g_y, g_z))
-
-
-def _contact(table: ContactTable) -> ContactSettings:
-    """Return where the wall stands and how the problem is closed."""
-    if (table.wall_point_mm is None) != (table.wall_normal is None):
-        there, absent = "wall_point_mm", "wall_normal"
-        if table.wall_point_mm is None:
-            there, absent = absent, there
-        raise InputError(f"missing; expected together with {there}", key=absent)
-    if table.wall_point_mm is not None and table.offset_mm is not None:
-        raise InputError("expected either offset_mm or wall_point_mm and wall_normal, got both", key="offset_mm")
-    if table.closure != "weighted":
-        for key in ContactTable.model_fields:
-            if key.startswith("weight_") and getattr(table, key) is not None:
-                raise InputError(f"expected only with closure = 'weighted', got closure = {table.closure!r}", key=key)
-    point = None
-    if table.wall_point_mm is not None:
-        x, y, z = (component * MILLIMETRE for component in table.wall_point_mm)
-        point = (x, y, z)
-    return ContactSettings(
-        offset=(table.offset_mm or 0.0) * MILLIMETRE,
-        tip_cap=table.tip_cap_mm * MILLIMETRE,
-        closure=table.closure,
-        wall_point=point,
-        wall_normal=table.wall_normal,
-        weights=ClosureWeights(
-            force=table.weight_force_per_N,
-            moment=_per(table.weight_moment_per_Nmm, NEWTON_MILLIMETRE),
-            length=_per(table.weight_length_per_mm, MILLIMETRE),
-            position=_per(table.weight_position_per_mm, MILLIMETRE),
-        ),
-    )
-
-
-def _per(weight: float | None, unit: float) -> float | None:
-    """Convert a weight given per unit of the file."""
-    return None if weight is None else weight / unit

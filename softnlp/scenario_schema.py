@@ -181,10 +181,22 @@ class PressureTable(Table):
     file: FileName | None = None
 
 
+class OffsetRampTable(Table):
+    """[contact] offset_ramp."""
+
+    from_mm: float = Field(description="an offset in mm")
+    to_mm: float = Field(description="an offset in mm")
+    steps: Annotated[int, Field(ge=2, le=MOST_STEPS)] = Field(description="the number of poses")
+
+
 class ContactTable(Table):
     """[contact] of a blocked force."""
 
+    mode: Literal["blocked", "constrained"] = "blocked"
     offset_mm: float | None = None
+    offsets_mm: Annotated[list[float], Field(min_length=1)] | None = None
+    offset_ramp: OffsetRampTable | None = None
+    target_force_N: Positive | None = None
     tip_cap_mm: NotNegative = 0.0
     closure: Literal["free", "compliant", "weighted", "rigid"] = "compliant"
     chamber_reaction: NotNegative | None = None

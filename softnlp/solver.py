@@ -114,7 +114,8 @@ class Engine:
     def solve(self, p: Array, x_start: Array) -> Solution:
         """Solve at fixed values p from a first guess; judge the result by the residual, evaluated again."""
         x_start = np.asarray(x_start, dtype=float)
-        start_residual = violation(self.problem, x_start, p)
+        with self._lock:
+            start_residual = violation(self.problem, x_start, p)
         if self.problem.is_square and not start_residual < _DIVERGED:
             # A sparse factorisation of such numbers may take minutes, and Newton leads nowhere from them.
             return Solution(x_start, p, start_residual, 0, "the first guess is out of all proportion")

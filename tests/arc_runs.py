@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from softnlp.contact_settings import ContactSettings
 from softnlp.conventions import REPRODUCTION, Coefficients
 from softnlp.materials import material
 from softnlp.robot import Robot, robot
 from softnlp.rod import Loads
 from softnlp.solver import EquationResidual
 from softnlp.status import Status
-from softnlp.studies.step import Pose, Run, SectionRadii, Shape, Step
+from softnlp.studies.step import Contact, Pose, Run, SectionRadii, Shape, Step
 
 POINTS = 31
 BENDING_STIFFNESS = 7.1e-4  # [N m^2], of the order of a D25 robot's
@@ -128,3 +129,82 @@ def ramp_run(
         pressure = [level if n in sets else 0.0 for n in range(body.chamber_sets)]
         made.append(failed_step(pressure) if k in failed else arc_step(body, pressure))
     return run_of(made, name, **changes)
+
+
+def contact_of(
+    body: Robot, pressure: np.ndarray, *, force: float, offset: float = 0.0, tip_cap: float = 0.0, **changes: Any
+) -> Contact:
+    """Return a contact that holds the tip at x = offset and pushes along +x; its free shape is the pressures' arc."""
+    free = arc_pose(body, pressure)
+    reach = float((free.tip_position + tip_cap * free.tip_rotation[:, 2])[0])
+    contact = Contact(
+        force=force,
+        normal=np.array([1.0, 0.0, 0.0]),
+        wall_point=np.array([offset, 0.0, 0.0]),
+        tip_cap=tip_cap,
+        closure="compliant",
+        chamber_reaction=np.where(pressure[list(body.set_of_chamber)] > 0, 0.4 * force, 0.0),
+        free=free,
+        gap=reach - offset,
+        length_error=2e-3,
+    )
+    return replace(contact, **changes)
+
+
+def blocked_step(
+    body: Robot,
+    pressure: Sequence[float],
+    force: float,
+    *,
+    time: float | None = None,
+    solve_time: float = 0.0123,
+    **changes: Any,
+) -> Step:
+    """Return a solved blocked step; its shape is a bulge of no physics that ends at the wall."""
+    values = np.array(pressure, dtype=float)
+    contact = contact_of(body, values, force=force, **changes)
+    pose = contact.free
+    s = pose.shape.arc
+    bulge = 0.12 * body.length * np.sin(np.pi * s)
+    held = contact.wall_point[0] * s
+    position = np.column_stack([bulge + held, 0 * s, pose.stretch * body.length * s])
+    slope = np.gradient(position[:, 0], position[:, 2])
+    rotation = np.stack([_rotation(np.array([0.0, 1.0, 0.0]), a) for a in np.arctan(slope)])
+    position = position - contact.tip_cap * rotation[-1, 0, 2] * s[:, None] * np.array([1.0, 0, 0])
+    shape = replace(pose.shape, position=position, rotation=rotation)
+    blocked = replace(
+        pose, tip_position=position[-1], tip_rotation=rotation[-1], bending_angle=0.7 * pose.bending_angle, shape=shape
+    )
+    return arc_step(body, pressure, pose=blocked, contact=contact, time=time, solve_time=solve_time)
+
+
+def blocked_run(
+    steps: int = 6,
+    to: float = 1.5e5,
+    name: str = "D25L60",
+    force: float = 1.2,
+    failed: Sequence[int] = (),
+    **changes: Any,
+) -> Run:
+    """Return a blocked force that rises with the pressure of set 1; the steps in `failed` end in a fold."""
+    body = robot(name)
+    made = []
+    for k, level in enumerate(np.linspace(0, to, steps)):
+        pressure = [level, 0.0, 0.0]
+        if k in failed:
+            made.append(failed_step(pressure, status=Status.FOLD))
+        elif level == 0:
+            made.append(replace(blocked_step(body, pressure, 0.0, **changes), status=Status.NO_CONTACT))
+        else:
+            made.append(blocked_step(body, pressure, force * level / to, **changes))
+    return run_of(made, name, study="blocked-force", contact=ContactSettings())
+
+
+def offset_run(offsets: Sequence[float] = (0.0, -0.01, -0.02, -0.03), force: float = 1.2) -> Run:
+    """Return a characteristic curve at 1.5 bar: the force falls to 0 over the offsets [m]."""
+    body = robot("D25L60")
+    made = [
+        blocked_step(body, [1.5e5, 0, 0], force * (1 - k / (len(offsets) - 1)), offset=h) for k, h in enumerate(offsets)
+    ]
+    made[-1] = replace(made[-1], status=Status.NO_CONTACT)
+    return run_of(made, "D25L60", study="blocked-force", contact=ContactSettings())

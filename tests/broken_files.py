@@ -514,7 +514,39 @@ CONTACTS = [
         (("wall_normal = 'x'", "wall_point_mm = [0, 0, 0]"), ("wall_normal", "3 numbers")),
         (("offset_mm = 0.0", "wall_normal = [1, 0, 0]", "wall_point_mm = [0, 0, 0]"), ("offset_mm", "wall_normal")),
         (("weight_force_per_N = 1.0",), ("weight_force_per_N", "'weighted'")),
+        (("mode = 'constraint'",), ("mode", "did you mean 'constrained'?")),
+        (("mode = 'constrained'", "offset_mm = 0.0"), ("offset_mm", "'constrained'")),
+        (("mode = 'constrained' ", "tip_cap_mm = 3.0"), ("tip_cap_mm", "'constrained'")),
+        (("mode = 'constrained'  ", "target_force_N = 3.0"), ("target_force_N", "'constrained'")),
+        (("mode = 'constrained'   ", "closure = 'free'"), ("closure", "'compliant'", "forward")),
+        (("offsets_mm = []",), ("offsets_mm", "at least 1")),
+        (("offsets_mm = -1.0",), ("offsets_mm", "a list")),
+        (("offsets_mm = [0.0, nan]",), ("offsets_mm", "item 2", "finite")),
+        (("offsets_mm = [0.0, -1.0]",), ("offsets_mm", "one step in [pressure]", "got 3")),
+        (("offsets_mm = [0.0]", "offset_mm = 1.0"), ("offsets_mm", "at most one", "offset_mm and offsets_mm")),
+        (("offsets_mm = [1.0]", "target_force_N = 0.1"), ("target_force_N", "at most one")),
+        (("offsets_mm = [2.0]", "wall_normal = [1, 0, 0]", "wall_point_mm = [0, 0, 0]"), ("offsets_mm", "wall_normal")),
+        (("offset_ramp = -5.0",), ("offset_ramp", "a table")),
+        (("offset_ramp = { from_mm = 0, to_mm = -5 }",), ("offset_ramp.steps", "missing")),
+        (("offset_ramp = { from_mm = 0, to_mm = -5, steps = 1 }",), ("offset_ramp.steps", "at least 2")),
+        (("offset_ramp = { from_mm = 0, to_mm = -5, steps = 3 }",), ("offset_ramp", "one step in [pressure]")),
+        (("offset_ramp = { from_mm = 0, to = -5, steps = 3 }",), ("offset_ramp.to", "did you mean 'to_mm'?")),
+        (("target_force_N = 0.0",), ("target_force_N", "above 0")),
+        (("target_force_N = [0.1]",), ("target_force_N", "a number")),
+        (("target_force = 0.1",), ("target_force", "did you mean 'target_force_N'?")),
         (("weight_length_per_mm = 0", "closure = 'weighted'"), ("weight_length_per_mm", "above 0")),
+    )
+]
+
+CONTACTS += [
+    Broken(
+        f"contact: {name}",
+        scenario(top="study = 'blocked-force'\n", pressure=f"[pressure]\n{pressure}\n", more=f"[contact]\n{line}\n"),
+        ("[contact]", "target_force_N", "[pressure]"),
+    )
+    for name, pressure, line in (
+        ("a force without pressure", "sequence_bar = [[0, 0, 0]]", "target_force_N = 0.1"),
+        ("a force of unlike pressures", "sequence_bar = [[1.0, 0.5, 0]]", "target_force_N = 0.1"),
     )
 ]
 

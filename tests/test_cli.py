@@ -434,6 +434,32 @@ def test_ctrl_c_in_the_middle_of_a_long_run_in_a_terminal() -> None:
     assert out.splitlines()[-1] == "results in results/long"
 
 
+# --- branches ---
+
+
+def test_branches_belong_to_a_blocked_force_at_each_pressure(cli: Run) -> None:
+    status, out, err = cli("run", scenario(), "--branches", "3")
+    assert (status, out) == (2, "")
+    assert err == "softnlp: --branches: expected only for study 'blocked-force'; quick.toml is of study 'forward'\n"
+    curve = scenario("curve.toml", pressure="sequence_bar = [[1.0, 0, 0]]", more="[contact]\noffsets_mm = [0, -5]\n")
+    curve.write_text(curve.read_text().replace('"forward"', '"blocked-force"'))
+    status, out, err = cli("run", curve, "--branches", "3")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "offsets_mm" in err
+    status, out, err = cli("run", curve, "--branches", "-1")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert written() == {"quick.toml", "curve.toml"}
+
+
+def test_branches_of_a_blocked_force_leave_its_result(cli: Run) -> None:
+    path = scenario("blocked.toml", pressure="ramp = { sets = [1], to_bar = 1.0, steps = 3 }")
+    path.write_text(path.read_text().replace('"forward"', '"blocked-force"'))
+    plain, tried = (json.loads(cli("run", path, "--json", *more)[1]) for more in ((), ("--branches", "2")))
+    forces = [[step["blocked_force_N"] for step in document["steps"]] for document in (plain, tried)]
+    assert forces[0] == forces[1]
+    assert forces[0][2] > forces[0][1] > 0
+
+
 # --- the other commands ---
 
 
@@ -452,7 +478,7 @@ def test_help(words: list[str], cli: Run) -> None:
     assert out.startswith(f"Usage: {' '.join(['softnlp', *words])}")
     named = {
         "": ["run", "robots", "materials", "plot", "--version"],
-        "run": ["SCENARIO", "--out", "--json", "results/NAME"],
+        "run": ["SCENARIO", "--out", "--json", "--branches", "results/NAME"],
         "plot": ["section", "material", "run"],
         "plot section": ["ROBOT", "--stretch", "--out"],
         "plot material": ["NAMES", "--law", "--file", "--stretch", "--out"],

@@ -24,7 +24,7 @@ from softnlp.conventions import COEFFICIENT_SETS, CONVENTIONS
 from softnlp.formula import FUNCTIONS
 from softnlp.laws import LAWS
 from softnlp.scenario import scenario_from_text
-from softnlp.scenario_schema import SCHEMAS, BlockedForceFile, RampTable
+from softnlp.scenario_schema import SCHEMAS, BlockedForceFile, OffsetRampTable, RampTable
 from softnlp.status import Status
 
 ROOT = Path(__file__).parents[1]
@@ -128,7 +128,7 @@ def tables(model: type[BaseModel]) -> Iterator[tuple[str, type[BaseModel]]]:
 
 def keys_of_tables() -> set[str]:
     found = {key for _, table in tables(BlockedForceFile) for key in table.model_fields}
-    return found | set(RampTable.model_fields)
+    return found | set(RampTable.model_fields) | set(OffsetRampTable.model_fields)
 
 
 def test_every_table_and_key_of_a_scenario_is_documented() -> None:
@@ -142,7 +142,7 @@ def test_every_table_and_key_of_a_scenario_is_documented() -> None:
 
 def test_no_key_is_documented_that_is_not_there() -> None:
     """A key of a table in a table row of the documents."""
-    known = {*keys_of_tables(), "study", "title"}
+    known = {*keys_of_tables(), "study", "title", "set", *Status, *LAWS}
     scenario_part = SCENARIO.read_text().split("\n# Results")[0]
     first_cells = re.findall(r"^\| (`[^|]+`) \|(?: (`[^|]+`) \|)?", scenario_part, re.MULTILINE)
     keys = {key for cells in first_cells for cell in cells for key in re.findall(r"`([a-z]\w*)`", cell)}

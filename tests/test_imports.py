@@ -19,11 +19,21 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 # A module imports only what stands above it; the modules of MIXED may import each other within their package.
 LAYERS = (
     *("errors", "status", "units", "conventions", "numerics", "reading", "contact_settings"),
-    *("formula", "laws", "materials", "robot", "section", "rod", "transcription"),
+    *("formula", "laws", "materials", "robot", "section", "rod", "tip", "transcription"),
     *("quantities", "loadcase", "problem", "branch", "solver", "condensed", "continuation", "stability"),
-    *("studies", "studies.step", "studies.pose", "studies.statics", "studies.*"),
-    *("scenario_schema", "scenario_check", "pressures", "scenario"),
-    *("runner", "results", "plots", "cli", "__main__"),
+    *(
+        "studies",
+        "studies.step",
+        "studies.pose",
+        "studies.statics",
+        "studies.forward",
+        "studies.wall",
+        "studies.weighted",
+    ),
+    *("studies.free_shape", "studies.blocked_grid", "studies.blocked_step", "studies.blocked", "studies.multistart"),
+    *("studies.force_inversion", "studies.*"),
+    *("scenario_schema", "scenario_check", "pressures", "scenario_contact", "scenario"),
+    *("runner_blocked", "runner", "results", "plots", "cli", "__main__"),
 )
 MIXED = ("results", "plots", "cli")
 LONGEST_FILE = 400

@@ -12,7 +12,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 import pytest
-from arc_runs import arc_step, failed_step, ramp_run, run_of
+from arc_runs import arc_step, blocked_run, blocked_step, failed_step, offset_run, ramp_run, run_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
@@ -261,6 +261,116 @@ def test_figure_from_the_dataset_is_the_same() -> None:
 )
 def test_texts_of_a_run_s_figure_do_not_meet(run: Run) -> None:
     figure = drawn(run)
+    figure.canvas.draw()
+    flat = [*figure.texts, *(t for legend in figure.legends for t in legend.get_texts())]
+    for axes in figure.axes[1:]:
+        flat += [axes.xaxis.label, axes.yaxis.label]
+        flat += [t for t in axes.get_yticklabels() if axes.get_ylim()[0] <= t.get_position()[1] <= axes.get_ylim()[1]]
+    axes3d: Any = figure.axes[0]
+    flat += [axes3d.xaxis.label, axes3d.yaxis.label, axes3d.zaxis.label]
+    assert overlaps(flat) == []
+    assert outside(figure, flat) == []
+
+
+# --- the figure of a blocked force ---
+
+
+def test_force_and_both_bending_angles_are_drawn_against_pressure() -> None:
+    run = blocked_run(failed=(4,))
+    view = view_of_run(run)
+    assert view.contact is not None
+    _, force, bending = run_figure(view, [(1.5e5, 1.18), (0.75e5, 0.6)]).axes
+    assert force.get_ylabel() == "blocked force [N]"
+    assert bending.get_xlabel() == "pressure of set 1 [bar]"
+    assert np.allclose(force.lines[0].get_xdata(), np.linspace(0, 1.5, 6))
+    assert np.allclose(force.lines[0].get_ydata(), view.contact.force, equal_nan=True)
+    assert np.allclose(bending.lines[0].get_ydata(), np.degrees(view.bending_angle), equal_nan=True)
+    (free,) = labelled(bending, "free shape")
+    assert np.allclose(free.get_ydata(), np.degrees(view.contact.free_bending_angle), equal_nan=True)
+    (measured,) = labelled(force, "measured")
+    assert measured.get_xdata() == pytest.approx([1.5, 0.75])
+    assert measured.get_ydata() == pytest.approx([1.18, 0.6])
+    assert labelled(force, "no solution")[0].get_xdata() == pytest.approx([1.2])
+    low, high = bending.get_ylim()
+    assert low < np.nanmin(free.get_ydata())
+    assert high > np.nanmax(free.get_ydata())
+
+
+def test_a_characteristic_curve_is_drawn_against_the_wall_s_offset() -> None:
+    run = offset_run()
+    view = view_of_run(run)
+    figure = run_figure(view, [(-0.01, 0.7)])
+    _, force, bending = figure.axes
+    assert bending.get_xlabel() == "wall offset [mm]"
+    assert force.lines[0].get_xdata() == pytest.approx([0, -10, -20, -30])
+    assert labelled(force, "measured")[0].get_xdata() == pytest.approx([-10])
+    assert any("Step 1 cut open" in t for t in texts(figure))  # the largest force
+
+
+def test_the_wall_its_force_and_the_cap_are_where_the_contact_is() -> None:
+    run = blocked_run(tip_cap=0.006, offset=-0.004)
+    axes: Any = drawn(run).axes[0]
+    pose = run.steps[-1].pose
+    assert pose is not None
+    at = 1e3 * (pose.tip_position + 0.006 * pose.tip_rotation[:, 2])
+    assert at[0] == pytest.approx(-4, abs=0.2)
+    (arrow,) = labelled(axes, "wall's force")
+    start, end = np.array(arrow._segments3d[0])
+    assert end == pytest.approx(at)
+    assert (end - start) / np.linalg.norm(end - start) == pytest.approx([1, 0, 0])
+    (wall,) = labelled(axes, "wall")
+    corners = np.asarray(wall._faces[0])
+    assert corners[:, 0] == pytest.approx([-4] * 4)
+    assert corners.min(axis=0)[2] < at[2] < corners.max(axis=0)[2]
+    (cap,) = labelled(axes, "tip cap")
+    side = np.concatenate([np.asarray(face)[:4] for face in cap._faces[:-1]])
+    along = (side - 1e3 * pose.tip_position) @ pose.tip_rotation[:, 2]
+    assert (along.min(), along.max()) == pytest.approx((0, 6), abs=1e-9)
+    assert "$F_b$ = 1.2 N" in texts(axes.figure)
+    (free,) = labelled(axes, "free axis")
+    contact = run.steps[-1].contact
+    assert contact is not None
+    assert np.allclose(free._segments3d[0], 1e3 * contact.free.shape.position)
+    low, high = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()]).T
+    for seen in (corners, np.asarray(free._segments3d[0]), [start]):
+        assert (seen > low).all()
+        assert (seen < high).all()
+
+
+def test_no_force_no_arrow_and_no_cap_without_one() -> None:
+    axes = drawn(blocked_run(1, to=0.0)).axes[0]
+    assert labelled(axes, "wall")
+    assert not labelled(axes, "wall's force")
+    assert not labelled(axes, "tip cap")
+    assert len(drawn(blocked_run(3, failed=(0, 1, 2))).axes) == 3
+
+
+def leaning() -> Run:
+    normal = np.array([0.8, 0.0, 0.6])
+    steps = [blocked_step(robot("D25L60"), [p, 0, 0], p / 1e5, normal=normal, tip_cap=3e-3) for p in (5e4, 1e5)]
+    return run_of(steps, study="blocked-force", contact=None)
+
+
+def test_a_leaning_wall_is_drawn_perpendicular_to_its_normal() -> None:
+    axes: Any = drawn(leaning()).axes[0]
+    corners = np.asarray(labelled(axes, "wall")[0]._faces[0])
+    assert corners @ [0.8, 0, 0.6] == pytest.approx([0] * 4, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        blocked_run(failed=(5,), tip_cap=0.01),
+        blocked_run(name="D10L40", force=0.12),
+        blocked_run(1, to=0.0),
+        replace(blocked_run(3), loads=Loads((0.1, 0, 0), (0, 0, 0), (0, 0, -9.8))),
+        offset_run(),
+        leaning(),
+    ],
+    ids=["cap", "small", "single", "loads", "curve", "leaning"],
+)
+def test_texts_of_a_blocked_force_s_figure_do_not_meet(run: Run) -> None:
+    figure = run_figure(view_of_dataset(to_dataset(run)))
     figure.canvas.draw()
     flat = [*figure.texts, *(t for legend in figure.legends for t in legend.get_texts())]
     for axes in figure.axes[1:]:

@@ -19,11 +19,12 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from arc_runs import POINTS, arc_pose, arc_step, failed_step, ramp_run, run_of
+from arc_runs import POINTS, arc_pose, arc_step, blocked_run, blocked_step, failed_step, offset_run, ramp_run, run_of
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
+from softnlp.contact_settings import ClosureWeights, ContactSettings
 from softnlp.errors import InputError
 from softnlp.materials import Material, formula_law, material_from_table
 from softnlp.results import (
@@ -42,6 +43,9 @@ from softnlp.results import (
 )
 from softnlp.robot import DIMENSIONS, robot
 from softnlp.rod import Loads
+from softnlp.scenario_contact import contact_settings
+from softnlp.scenario_schema import ContactTable
+from softnlp.solver import EquationResidual
 from softnlp.status import Status
 from softnlp.studies.step import Run
 
@@ -442,6 +446,171 @@ def test_terminal_table_fits_100_columns(status: Status) -> None:
     lines = printed(run_of(steps))
     assert max(map(len, lines)) <= 100
     assert not any("…" in line for line in lines)
+
+
+# --- a blocked force ---
+
+CONTACT_KEYS = {
+    *("blocked_force_N", "closure", "chamber_reaction_N", "gap_mm", "wall_point_mm", "wall_normal", "tip_cap_mm"),
+    *("length_error_mm", "free_tip_position_mm", "free_bending_angle_deg"),
+}
+
+
+def weighted_run() -> Run:
+    """Two steps of the `weighted` closure, and one that failed."""
+    body = robot("D25L60")
+    left = (EquationResidual("e_n", 0.03, "N", 0.15), EquationResidual("e_m", 2e-3, "N m", 0.4))
+    made = [blocked_step(body, [p, 0, 0], 0.5, closure="weighted", weighted=left) for p in (5e4, 1e5)]
+    contact = ContactSettings(closure="weighted", weights=ClosureWeights(force=2.0, moment=30.0, length=4e3))
+    return run_of([*made, failed_step([1.5e5, 0, 0])], study="blocked-force", contact=contact)
+
+
+def test_json_of_a_blocked_force_has_its_keys_in_their_units() -> None:
+    run = blocked_run(failed=(4,), tip_cap=0.005, offset=-0.002)
+    document = to_json(run)
+    for entry, step in zip(document["steps"], run.steps, strict=True):
+        assert entry.keys() == STEP_KEYS | CONTACT_KEYS
+        contact = step.contact
+        if contact is None:
+            assert {entry[key] for key in CONTACT_KEYS - {"closure"}} == {None}
+            assert entry["closure"] == "compliant"  # it was asked for
+            continue
+        assert entry["blocked_force_N"] == contact.force
+        assert entry["chamber_reaction_N"] == contact.chamber_reaction.tolist()
+        assert len(entry["chamber_reaction_N"]) == 6
+        assert entry["gap_mm"] == pytest.approx(1e3 * contact.gap)
+        assert entry["wall_point_mm"] == [-2, 0, 0]
+        assert entry["wall_normal"] == [1, 0, 0]
+        assert entry["tip_cap_mm"] == 5
+        assert entry["length_error_mm"] == pytest.approx(2)
+        assert entry["free_tip_position_mm"] == pytest.approx((1e3 * contact.free.tip_position).tolist())
+        assert math.radians(entry["free_bending_angle_deg"]) == pytest.approx(contact.free.bending_angle)
+    assert document["steps"][0]["status"] == "no_contact"
+    assert document["steps"][0]["blocked_force_N"] == 0
+    assert len(run.failed) == 1
+    assert document["contact"] == {"closure": "compliant", "tip_cap_mm": 0, "offset_mm": 0}
+    assert not to_json(ramp_run(2))["steps"][0].keys() & CONTACT_KEYS
+
+
+def test_what_was_asked_of_the_wall_is_a_table_that_a_scenario_accepts() -> None:
+    settings = ContactSettings(
+        tip_cap=3e-3,
+        closure="weighted",
+        wall_point=(1e-3, 0.0, 0.0),
+        wall_normal=(0.8, 0.0, 0.6),
+        weights=ClosureWeights(force=2.0, moment=30.0, length=4e3, position=5e3),
+    )
+    table = to_json(replace(weighted_run(), contact=settings))["contact"]
+    again = contact_settings(ContactTable.model_validate(table))
+    assert again.closure == "weighted"
+    assert again.wall_normal == pytest.approx((0.8, 0, 0.6))
+    assert again.wall_point == pytest.approx((1e-3, 0, 0))
+    assert again.tip_cap == pytest.approx(3e-3)
+    for name in ("force", "moment", "length", "position"):
+        assert getattr(again.weights, name) == pytest.approx(getattr(settings.weights, name))
+
+
+def test_what_weighted_left_is_in_every_format_with_its_unit() -> None:
+    run = weighted_run()
+    entries = to_json(run)["steps"]
+    assert entries[0]["weighted_residual"][1] == {"equation": "e_m", "value": 2e-3, "unit": "N m", "scaled": 0.4}
+    assert entries[2]["weighted_residual"] == []
+    rows = list(csv.DictReader(io.StringIO(table_text(run))))
+    assert [row["weighted_residual_e_n_N"] for row in rows] == ["0.03", "0.03", ""]
+    assert [row["weighted_residual_e_m_Nm"] for row in rows] == ["0.002", "0.002", ""]
+    dataset = to_dataset(run)
+    assert dataset.weighted_residual.sel(step=2, weighted_equation="e_m") == 2e-3
+    assert np.isnan(dataset.weighted_residual.sel(step=3)).all()
+    assert dataset.weighted_residual_unit.values.tolist() == ["N", "N m"]
+    assert "weighted_residual" not in to_dataset(blocked_run())
+
+
+def test_csv_and_netcdf_of_a_blocked_force_agree_with_json(tmp_path: Path) -> None:
+    run = blocked_run(failed=(4,), tip_cap=0.005)
+    path = write_whole(tmp_path / "r.nc", netcdf_bytes(run))
+    rows = list(csv.DictReader(io.StringIO(table_text(run))))
+    with xr.open_dataset(path, engine="h5netcdf") as dataset:
+        for k, entry in enumerate(to_json(run)["steps"]):
+            assert rows[k]["closure"] == dataset.closure.values[k] == entry["closure"]
+            cells = {
+                "blocked_force_N": ["blocked_force_N"],
+                "gap_mm": ["gap_mm"],
+                "chamber_reaction_N": [f"chamber_reaction_{n}_N" for n in range(1, 7)],
+                "wall_normal": ["wall_normal_x", "wall_normal_y", "wall_normal_z"],
+                "free_tip_position_mm": [f"free_tip_position_{axis}_mm" for axis in "xyz"],
+            }
+            for key, columns in cells.items():
+                found = [rows[k][column] for column in columns]
+                if entry[key] is None:
+                    assert set(found) == {""}
+                    assert np.isnan(dataset[key].values[k]).all()
+                else:
+                    assert [float(v) for v in found] == np.ravel(entry[key]).tolist()
+                    assert np.array_equal(dataset[key].values[k], entry[key])
+        for name, variable in dataset.variables.items():
+            assert variable.attrs.get("units"), name
+            assert variable.attrs.get("long_name"), name
+        contact = run.steps[5].contact
+        assert contact is not None
+        assert np.allclose(dataset.free_position_mm.values[5], 1e3 * contact.free.shape.position)
+        assert np.array_equal(dataset.free_rotation.values[5], contact.free.shape.rotation)
+
+
+@pytest.mark.parametrize(
+    "run", [blocked_run(failed=(4,), tip_cap=0.005), offset_run(), weighted_run()], ids=["ramp", "curve", "weighted"]
+)
+def test_the_wall_reads_back_from_the_file(run: Run, tmp_path: Path) -> None:
+    save(run, tmp_path)
+    one, other = view_of_run(run), load_run(tmp_path)
+    assert_same_view(one, other)
+    assert one.contact is not None
+    assert other.contact is not None
+    assert one.contact.closure == other.contact.closure
+    assert one.contact.tip_cap == pytest.approx(other.contact.tip_cap)
+    for name in ("force", "gap", "wall_point", "normal", "free_bending_angle"):
+        a, b = getattr(one.contact, name), getattr(other.contact, name)
+        assert np.allclose(a, b, rtol=1e-13, atol=0, equal_nan=True), name
+    for mine, read in zip(one.contact.free, other.contact.free, strict=True):
+        assert (mine is None) == (read is None)
+        if mine is not None and read is not None:
+            assert np.allclose(mine.position, read.position, rtol=1e-14, atol=0)
+            assert np.array_equal(mine.rotation, read.rotation)
+            assert mine.radii.outer == pytest.approx(read.radii.outer)
+
+
+def test_a_blocked_force_without_a_wall_or_a_solution_can_be_kept(tmp_path: Path) -> None:
+    """The chambers alone are constrained, or every step failed."""
+    no_wall = replace(ramp_run(2), study="blocked-force")
+    for run in (no_wall, blocked_run(3, failed=(0, 1, 2))):
+        save(run, tmp_path)
+        assert load_run(tmp_path).contact is view_of_run(run).contact is None
+        assert to_json(run)["steps"][0]["blocked_force_N"] is None
+        assert any(line.split()[:1] == ["1"] for line in printed(run))
+
+
+def test_terminal_table_of_a_blocked_force() -> None:
+    run = blocked_run(failed=(4,))
+    lines = printed(run)
+    contact = run.steps[5].contact
+    assert contact is not None
+    row = next(line.split() for line in lines if line.split()[:1] == ["6"])
+    assert row[1:7] == ["1.5", "0.0", "0.0", "solved", "1.2000", f"{1e3 * contact.gap:.2f}"]
+    assert next(line.split() for line in lines if line.split()[:1] == ["5"])[5:11] == ["-"] * 6
+    header = " ".join(lines[:2])
+    assert "force" in header
+    assert "gap" in header
+    assert "[N]" in header
+    curve = printed(offset_run())
+    assert "offset" in curve[0]
+    assert next(line.split() for line in curve if line.split()[:1] == ["2"])[5:7] == ["-10.00", "0.8000"]
+    assert max(map(len, curve)) <= 100
+    body = robot("D25L60")
+    wide = [
+        blocked_step(body, [1.2345e5, 0.0, 1.1111e5], 12.34567, time=1234.56, solve_time=12.3) if k else
+        replace(blocked_step(body, [0, 0, 0], 0.0), status=Status.NO_CONTACT, time=0.01)
+        for k in range(2)
+    ]  # fmt: skip
+    assert max(map(len, printed(replace(run, steps=tuple(wide))))) <= 100
 
 
 # --- imports ---

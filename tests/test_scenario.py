@@ -12,7 +12,7 @@ from broken_files import MATERIAL, OWN_ROBOT, PRESSURE, ROBOT, scenario
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softnlp.contact_settings import ClosureWeights, ContactSettings
+from softnlp.contact_settings import ClosureWeights, ContactSettings, ContactTask
 from softnlp.conventions import AS_PRINTED, COEFFICIENT_SETS, REPRODUCTION
 from softnlp.errors import InputError, MaterialError, RobotError
 from softnlp.materials import material
@@ -421,6 +421,25 @@ def test_closures(closure: str) -> None:
     found = blocked(f"closure = '{closure}'").contact
     assert found is not None
     assert found.closure == closure
+
+
+def blocked_task(contact: str, pressure: str = PRESSURE) -> tuple[ContactTask | None, int]:
+    found = read(scenario(top="study = 'blocked-force'\n", pressure=pressure, more=f"[contact]\n{contact}\n"))
+    return found.contact_task, found.step_count
+
+
+def test_what_is_asked_of_the_wall() -> None:
+    one = "[pressure]\nsequence_bar = [[1.5, 0, 0]]\n"
+    assert blocked_task("") == (ContactTask(), 3)
+    assert blocked_task("mode = 'blocked'") == (ContactTask(), 3)
+    assert blocked_task("mode = 'constrained'") == (ContactTask(constrained=True), 3)
+    assert blocked_task("target_force_N = 0.3") == (ContactTask(target_force=0.3), 1)
+    assert blocked_task("offsets_mm = [0, -5]", one) == (ContactTask(offsets=(0.0, -0.005)), 2)
+    task, steps = blocked_task("offset_ramp = { from_mm = 0, to_mm = -30, steps = 4 }", one)
+    assert steps == 4
+    assert task is not None
+    assert task.offsets == pytest.approx((0, -0.01, -0.02, -0.03))
+    assert read(scenario()).contact_task is None
 
 
 # --- the file itself -------------------------------------------------------------------------------------------------

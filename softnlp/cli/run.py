@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say
+from softnlp.contact_settings import ContactTask
 from softnlp.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ class _StopRun(Exception):
     """Ends a run between two steps."""
 
 
-def run(scenario: Path, /, *, out: Path | None = None, json: bool = False) -> int:
+def run(scenario: Path, /, *, out: Path | None = None, json: bool = False, branches: int = 0) -> int:
     """Solve every step of a scenario file in order, each started from the last.
 
     Prints a table and writes results.nc, table.csv, results.json, versions.json, figure.png and a copy of the scenario.
@@ -35,15 +36,19 @@ def run(scenario: Path, /, *, out: Path | None = None, json: bool = False) -> in
         Folder for the results; by default results/NAME, where NAME is that of the scenario file.
     json
         Print one JSON document and nothing else; no files are written unless --out is given.
+    branches
+        Of a blocked force only: start each step from so many other places as well, and warn where that finds another
+        equilibrium. The result stays the one followed from zero pressure.
     """
     from softnlp.results import json_text
     from softnlp.scenario import load_scenario
 
     asked = load_scenario(scenario)
+    _require_branches(asked, branches)
     folder = out if out is not None or json else Path("results") / scenario.stem
     if folder is not None:
         _require_writable(folder)
-    done, stopped = _solve(asked)
+    done, stopped = _solve(asked, branches)
     try:
         if folder is not None:
             _write(done, folder, asked)
@@ -53,16 +58,35 @@ def run(scenario: Path, /, *, out: Path | None = None, json: bool = False) -> in
         say(f"results in {folder}")
     if stopped:
         kept = "" if folder is None else f"; those are in {folder}"
-        complain(f"stopped after {len(done.steps)} of {len(asked.pressures)} steps{kept}")
+        complain(f"stopped after {len(done.steps)} of {asked.step_count} steps{kept}")
         return STOPPED
     return SOME_UNSOLVED if done.failed else SOLVED
 
 
-def _solve(asked: Scenario) -> tuple[Run, bool]:
+def _require_branches(asked: Scenario, branches: int) -> None:
+    """Refuse --branches where it means nothing."""
+    if branches < 0:
+        raise InputError(f"expected a number of at least 0, got {branches}", key="--branches")
+    if not branches:
+        return
+    task = asked.contact_task
+    if task is None:
+        raise InputError(
+            f"expected only for study 'blocked-force'; {asked.path} is of study {asked.study!r}", key="--branches"
+        )
+    if task != ContactTask():
+        raise InputError(
+            "expected only for the force at each pressure, not with offsets_mm, offset_ramp, target_force_N or "
+            f"mode = 'constrained' as in {asked.path}",
+            key="--branches",
+        )
+
+
+def _solve(asked: Scenario, branches: int) -> tuple[Run, bool]:
     """Run a scenario with a progress bar; return the steps that were done and whether it was stopped before the end."""
     from softnlp.runner import partial_run, run_scenario
 
-    total = len(asked.pressures)
+    total = asked.step_count
     steps: list[Step] = []
     with progress(total, asked.title) as (advance, stop_asked):
 
@@ -73,7 +97,7 @@ def _solve(asked: Scenario) -> tuple[Run, bool]:
                 raise _StopRun
 
         try:
-            return run_scenario(asked, keep), False
+            return run_scenario(asked, keep, branches), False
         except _StopRun:
             return partial_run(asked, steps), True
 

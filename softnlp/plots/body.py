@@ -59,31 +59,21 @@ def view_azimuth(view: RunView) -> float:
         return -60.0
     body = view.bodies[view.solved[-1]]
     assert body is not None
-    x, y = body.position[-1, :2]
-    if np.hypot(x, y) < 0.02 * view.robot.length:
-        return -60.0
-    return float(np.degrees(np.arctan2(y, x))) - 90.0 + 20.0
+    return side_azimuth(body.position[-1, :2], 0.02 * view.robot.length)
+
+
+def side_azimuth(towards: Array, least: float, turn: float = 20.0) -> float:
+    """Return the azimuth [deg] from which a horizontal vector points right, turned by so much; -60 if it is short."""
+    x, y = towards
+    return -60.0 if np.hypot(x, y) < least else float(np.degrees(np.arctan2(y, x))) - 90.0 + turn
 
 
 def body_panel(figure: Figure, centre: tuple[float, float], view: RunView) -> Any:
     """Draw the 3-D panel of a run about a point of the figure [inch] and return its axes."""
     from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-    width, height = figure.get_size_inches()
-    left, bottom = centre[0] - _CANVAS / 2, centre[1] - _CANVAS / 2
-    box = (left / width, bottom / height, _CANVAS / width, _CANVAS / height)
-    axes: Any = figure.add_axes(box, projection="3d", computed_zorder=False)
-    axes.patch.set_visible(False)
     azimuth = view_azimuth(view)
-    axes.view_init(elev=ELEVATION, azim=azimuth)
-    axes.set_proj_type("ortho")
-
-    plate = disc(0.75 * view.robot.outer_diameter / MILLIMETRE, 40, 0.0)
-    axes.add_collection3d(
-        Poly3DCollection(plate, facecolors="#EEEEEE", edgecolors=GREY, linewidths=0.6, zorder=1, label="base")
-    )
-    reach = [plate.reshape(-1, 3), np.array([[0.0, 0.0, view.robot.length / MILLIMETRE]])]
-
+    axes, reach = standing_on_base(figure, centre, view, azimuth)
     solved = view.solved
     shades = step_colours(len(view.bodies))
     light = direction(azimuth - 50, 40)
@@ -91,7 +81,7 @@ def body_panel(figure: Figure, centre: tuple[float, float], view: RunView) -> An
         body = view.bodies[k]
         assert body is not None
         quads, normals = tube(body, body.radii.outer, (0, 0), GHOST_FACETS, GHOST_STATIONS)
-        pale = _shaded(normals, GHOST_TINT * shades[k][:3] + (1 - GHOST_TINT), light, contrast=0.06)
+        pale = shaded(normals, GHOST_TINT * shades[k][:3] + (1 - GHOST_TINT), light, contrast=0.06)
         axes.add_collection3d(
             Poly3DCollection(quads, facecolors=pale, edgecolors=pale, linewidths=0.4, zorder=2, label="earlier step")
         )
@@ -102,10 +92,30 @@ def body_panel(figure: Figure, centre: tuple[float, float], view: RunView) -> An
             Line3DCollection(lines, colors=shades[list(solved)], linewidths=1.4, zorder=3, label="axes of the steps")
         )
         reach += lines
-        reach += _draw_last(axes, view, solved[-1], direction(azimuth, ELEVATION), light)
-        reach += _draw_loads(axes, view, lines[-1][-1], np.vstack(reach), azimuth)
-    _frame(axes, np.vstack(reach))
+        reach += draw_cut_open(axes, view, solved[-1], direction(azimuth, ELEVATION), light)
+        reach += draw_loads(axes, view, lines[-1][-1], np.vstack(reach), azimuth)
+    frame(axes, np.vstack(reach))
     return axes
+
+
+def standing_on_base(
+    figure: Figure, centre: tuple[float, float], view: RunView, azimuth: float
+) -> tuple[Any, list[Array]]:
+    """Return 3-D axes about a point of the figure [inch] with the base plate alone, and the points it reaches [mm]."""
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    width, height = figure.get_size_inches()
+    left, bottom = centre[0] - _CANVAS / 2, centre[1] - _CANVAS / 2
+    box = (left / width, bottom / height, _CANVAS / width, _CANVAS / height)
+    axes: Any = figure.add_axes(box, projection="3d", computed_zorder=False)
+    axes.patch.set_visible(False)
+    axes.view_init(elev=ELEVATION, azim=azimuth)
+    axes.set_proj_type("ortho")
+    plate = disc(0.75 * view.robot.outer_diameter / MILLIMETRE, 40, 0.0)
+    axes.add_collection3d(
+        Poly3DCollection(plate, facecolors="#EEEEEE", edgecolors=GREY, linewidths=0.6, zorder=1, label="base")
+    )
+    return axes, [plate.reshape(-1, 3), np.array([[0.0, 0.0, view.robot.length / MILLIMETRE]])]
 
 
 def _ghosts(solved: Sequence[int]) -> list[int]:
@@ -115,7 +125,7 @@ def _ghosts(solved: Sequence[int]) -> list[int]:
     return sorted({solved[round(j)] for j in np.linspace(0, len(solved) - 1, MOST_GHOSTS + 1)[:-1]})
 
 
-def _draw_last(axes: Any, view: RunView, k: int, eye: Array, light: Array) -> list[Array]:
+def draw_cut_open(axes: Any, view: RunView, k: int, eye: Array, light: Array, *, tip_frame: bool = True) -> list[Array]:
     """Draw step k's body opened towards the viewer, chambers and tip frame; return points that it reaches [mm].
 
     The half of the skin that faces the viewer is left out, so that the chambers are seen and nothing is transparent.
@@ -128,7 +138,7 @@ def _draw_last(axes: Any, view: RunView, k: int, eye: Array, light: Array) -> li
     assert body is not None
     skin, normals = tube(body, body.radii.outer, (0, 0), BODY_FACETS, BODY_STATIONS)
     behind = normals @ eye < 0
-    quads, colours = [skin[behind]], [_shaded(-normals[behind], SILICONE, light, contrast=0.14)]
+    quads, colours = [skin[behind]], [shaded(-normals[behind], SILICONE, light, contrast=0.14)]
     for theta, chamber_set in zip(robot.chamber_angles(), robot.set_of_chamber, strict=True):
         r_cp = body.radii.chamber_circle
         offset = (r_cp * float(np.cos(theta)), r_cp * float(np.sin(theta)))
@@ -137,7 +147,7 @@ def _draw_last(axes: Any, view: RunView, k: int, eye: Array, light: Array) -> li
         if view.pressure[k, chamber_set] == 0:
             rgb = IDLE_TINT * rgb + (1 - IDLE_TINT)
         quads.append(chamber)
-        colours.append(_shaded(outward, rgb, light))
+        colours.append(shaded(outward, rgb, light))
     edges = _outline(skin, behind)
     quads.append(edges)
     colours.append(np.tile(to_rgb(GREY), (len(edges), 1)))
@@ -151,6 +161,8 @@ def _draw_last(axes: Any, view: RunView, k: int, eye: Array, light: Array) -> li
     rim = skin.reshape(-1, BODY_FACETS, 4, 3)[-1, :, 1]
     axes.plot(*np.vstack([rim, rim[:1]]).T, color=GREY, linewidth=0.8, zorder=5, label="tip rim")
 
+    if not tip_frame:
+        return [skin.reshape(-1, 3)]
     tip, R = body.position[-1] / MILLIMETRE, body.rotation[-1]
     size = 0.2 * robot.length / MILLIMETRE
     arms = [(tip, tip + size * R[:, j]) for j in range(3)]
@@ -168,7 +180,7 @@ def _outline(skin: Array, behind: NDArray[np.bool_]) -> Array:
     return edges
 
 
-def _shaded(normals: Array, rgb: Any, light: Array, contrast: float = 0.28) -> Array:
+def shaded(normals: Array, rgb: Any, light: Array, contrast: float = 0.28) -> Array:
     """Return (n, 3) colours, lighter where a face looks at the light."""
     brightness = 1 - contrast + contrast * (normals @ light)
     return np.clip(np.asarray(rgb) * brightness[:, None], 0, 1)
@@ -180,15 +192,12 @@ def direction(azimuth: float, elevation: float) -> Array:
     return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
 
 
-def _draw_loads(axes: Any, view: RunView, tip: Array, reach: Array, azimuth: float) -> list[Array]:
+def draw_loads(axes: Any, view: RunView, tip: Array, reach: Array, azimuth: float) -> list[Array]:
     """Draw tip force, tip moment and gravity as arrows of one length with their size beside; return their ends [mm].
 
     Gravity stands to the left of everything drawn so far, `reach`, as seen from the azimuth [deg].
     """
-    from matplotlib.patheffects import withStroke
-    from mpl_toolkits.mplot3d.art3d import Line3DCollection
-
-    eye, right = direction(azimuth, ELEVATION), direction(azimuth + 90, 0)
+    right = direction(azimuth + 90, 0)
     size = _ARROW * view.robot.length / MILLIMETRE
     force, moment, gravity = (
         np.asarray(x, dtype=float) for x in (view.loads.tip_force, view.loads.tip_moment, view.loads.gravity)
@@ -201,26 +210,44 @@ def _draw_loads(axes: Any, view: RunView, tip: Array, reach: Array, azimuth: flo
         (aside, gravity, "g", "gravity"),
     ]
     ends = []
-    halo = [withStroke(linewidth=2.5, foreground="white")]
     for start, vector, text, label in arrows:
         norm = float(np.linalg.norm(vector))
-        if norm == 0:
-            continue
-        step = size * vector / norm
-        across = np.cross(step, eye)
-        across = 0.4 * across / np.linalg.norm(across) if np.linalg.norm(across) > 0.1 * size else 0.4 * right
-        tail, side = start + 0.74 * step, 0.28 * size * across
-        lines = [(start, start + step), (tail + side, start + step), (tail - side, start + step)]
-        axes.add_collection3d(Line3DCollection(lines, colors=INK, linewidths=1.6, zorder=6, label=label))
-        sideways = float(step @ right) / size
-        place, away = ("center", 1.22) if abs(sideways) < 0.4 else ("left" if sideways > 0 else "right", 1.05)
-        end = start + away * step
-        axes.text(*end, text, size=TEXT, color=INK, zorder=8, ha=place, va="center", path_effects=halo)
-        ends += [start[None], end[None]]
+        if norm > 0:
+            ends += draw_arrow(axes, start, size * vector / norm, text, label, azimuth)
     return ends
 
 
-def _frame(axes: Any, points: Array) -> None:
+def draw_arrow(
+    axes: Any,
+    start: Array,
+    step: Array,
+    text: str,
+    label: str,
+    azimuth: float,
+    *,
+    ink: str = INK,
+    at_tail: bool = False,
+) -> list[Array]:
+    """Draw an arrow [mm], its head flat towards the viewer and its text beyond one end; return points it reaches."""
+    from matplotlib.patheffects import withStroke
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+    eye, right = direction(azimuth, ELEVATION), direction(azimuth + 90, 0)
+    size = float(np.linalg.norm(step))
+    across = np.cross(step, eye)
+    across = 0.4 * across / np.linalg.norm(across) if np.linalg.norm(across) > 0.1 * size else 0.4 * right
+    tail, side = start + 0.74 * step, 0.28 * size * across
+    lines = [(start, start + step), (tail + side, start + step), (tail - side, start + step)]
+    axes.add_collection3d(Line3DCollection(lines, colors=ink, linewidths=1.6, zorder=6, label=label))
+    sideways = float(step @ right) / size * (-1 if at_tail else 1)
+    place, away = ("center", 0.22) if abs(sideways) < 0.4 else ("left" if sideways > 0 else "right", 0.05)
+    end = start - away * step if at_tail else start + (1 + away) * step
+    halo = [withStroke(linewidth=2.5, foreground="white")]
+    axes.text(*end, text, size=TEXT, color=ink, zorder=8, ha=place, va="center", path_effects=halo)
+    return [start[None], end[None]]
+
+
+def frame(axes: Any, points: Array) -> None:
     """Set limits with equal scales on the three axes and one tick distance for all."""
     low, high = points.min(axis=0), points.max(axis=0)
     widest = float((high - low).max())

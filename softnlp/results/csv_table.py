@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from softnlp.results.fields import DOCUMENT_FIELDS, Field, solved_pose
+from softnlp.results.fields import BLOCKED_FORCE, Field, closure_of, document_fields, left_by_weights, solved_pose
 from softnlp.results.files import write_whole
 from softnlp.results.inputs import pressure_bar, tidy
 from softnlp.robot import Robot
@@ -32,14 +32,18 @@ def write_table(run: Run, path: str | PathLike[str]) -> Path:
 def table_text(run: Run) -> str:
     """Return the text of `write_table`."""
     timed = any(step.time is not None for step in run.steps)
+    weighted = {line.equation: line.unit for step in run.steps for line in left_by_weights(step)}
     header = ["step"] + ["t_s"] * timed
     header += [f"p{k + 1}_bar" for k in range(run.robot.chamber_sets)]
-    header += ["status", *(name for f in DOCUMENT_FIELDS for name in _columns(f, run.robot))]
+    header += ["status", *(name for f in document_fields(run) for name in _columns(f, run.robot))]
+    header += ["closure"] * (run.study == BLOCKED_FORCE)
+    header += ["_".join(["weighted_residual", *name.split(), unit.replace(" ", "")]) for name, unit in weighted.items()]
     header += ["residual", "message", "warnings"]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)
-    writer.writerows(list(_row(k, step, run.robot, timed)) for k, step in enumerate(run.steps, start=1))
+    for number, step in enumerate(run.steps, start=1):
+        writer.writerow(list(_row(number, step, run, timed, list(weighted))))
     return text.getvalue()
 
 
@@ -47,26 +51,34 @@ def _columns(field: Field, robot: Robot) -> list[str]:
     """Return the column names of a field: the index goes before the unit suffix, tip_x_mm for instance."""
     if not field.dims:
         return [field.name]
-    stem, _, unit = field.name.rpartition("_")
+    stem, unit = field.name, ""
+    if field.unit != "1":
+        stem, _, unit = field.name.rpartition("_")
+        unit = f"_{unit}"
     if field.dims == ("axis",):
-        return [f"{stem}_{axis}_{unit}" for axis in "xyz"]
+        return [f"{stem}_{axis}{unit}" for axis in "xyz"]
     if field.dims == ("chamber",):
-        return [f"{stem}_{n + 1}_{unit}" for n in range(robot.chambers)]
+        return [f"{stem}_{n + 1}{unit}" for n in range(robot.chambers)]
     return [f"{field.name}_{row}{col}" for row in "xyz" for col in "xyz"]
 
 
-def _row(number: int, step: Step, robot: Robot, timed: bool) -> Iterator[Any]:
+def _row(number: int, step: Step, run: Run, timed: bool, weighted: list[str]) -> Iterator[Any]:
     pose = solved_pose(step)
     yield number
     if timed:
         yield "" if step.time is None else tidy(step.time)
     yield from pressure_bar(step.pressure)
     yield step.status.value
-    for field in DOCUMENT_FIELDS:
-        if pose is None:
-            yield from [""] * len(_columns(field, robot))
+    for field in document_fields(run):
+        value = None if pose is None else field.of(step, pose)
+        if value is None:
+            yield from [""] * len(_columns(field, run.robot))
         else:
-            yield from (_cell(v) for v in np.ravel(field.of(step, pose)).tolist())
+            yield from (_cell(v) for v in np.ravel(value).tolist())
+    if run.study == BLOCKED_FORCE:
+        yield closure_of(run, step) or ""
+    left = {line.equation: line.value for line in left_by_weights(step)}
+    yield from (_cell(left.get(equation)) for equation in weighted)
     yield _cell(step.residual)
     yield step.message
     yield "; ".join(step.warnings)

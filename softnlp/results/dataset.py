@@ -11,15 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.results.fields import (
-    DOCUMENT_FIELDS,
-    SECTION_FIELDS,
-    SHAPE_FIELDS,
+    BLOCKED_FORCE,
     STABLE,
     Field,
+    closure_of,
+    dataset_fields,
+    left_by_weights,
     solved_pose,
 )
 from softnlp.results.inputs import (
     coefficients_table,
+    contact_table,
     conventions_table,
     loads_table,
     material_table,
@@ -27,6 +29,7 @@ from softnlp.results.inputs import (
     robot_table,
     versions,
 )
+from softnlp.solver import EquationResidual
 from softnlp.studies.step import Run, Step
 
 if TYPE_CHECKING:
@@ -54,7 +57,7 @@ def to_dataset(run: Run) -> xr.Dataset:
         "row": 3,
         "col": 3,
         "chamber": run.robot.chambers,
-        "s": max((p.shape.arc.size for step in steps if (p := solved_pose(step))), default=0),
+        "s": max((_points(step) for step in steps), default=0),
     }
     variables: dict[str, Variable] = {
         "pressure_bar": (
@@ -75,9 +78,13 @@ def to_dataset(run: Run) -> xr.Dataset:
             _attributes("1", "warnings of the step"),
         ),
     }
-    for field in (*DOCUMENT_FIELDS, *SECTION_FIELDS, *SHAPE_FIELDS):
+    for field in dataset_fields(run):
         variables[field.name] = _variable(field, steps, sizes)
     variables |= _certificate(steps)
+    if run.study == BLOCKED_FORCE:
+        closures = _text([closure_of(run, step) or "" for step in steps])
+        variables["closure"] = (("step",), closures, _attributes("1", "which equations close the blocked shape"))
+        variables |= _weighted(steps)
     return xr.Dataset(variables, coords=_coordinates(run, variables["arc"][1]), attrs=_global_attributes(run))
 
 
@@ -123,14 +130,45 @@ def _variable(field: Field, steps: Sequence[Step], sizes: dict[str, int]) -> Var
     return dims, array, _attributes(field.unit, field.meaning)
 
 
-def _certificate(steps: Sequence[Step]) -> dict[str, Variable]:
-    """Return the certificates as (step, equation), the equations in order of first appearance."""
-    units = {line.equation: line.unit for step in steps for line in step.certificate}
+def _points(step: Step) -> int:
+    """Return the points of a step's longest shape."""
+    if (pose := solved_pose(step)) is None:
+        return 0
+    return max(pose.shape.arc.size, 0 if step.contact is None else step.contact.free.shape.arc.size)
+
+
+def _spread(lines: Sequence[tuple[EquationResidual, ...]]) -> tuple[Array, dict[str, str]]:
+    """Return (2, step, equation) value and scaled value, and each equation's unit, in order of first appearance."""
+    units = {line.equation: line.unit for step in lines for line in step}
     column = {equation: k for k, equation in enumerate(units)}
-    values = np.full((2, len(steps), len(units)), np.nan)
-    for k, step in enumerate(steps):
-        for line in step.certificate:
+    values = np.full((2, len(lines), len(units)), np.nan)
+    for k, step in enumerate(lines):
+        for line in step:
             values[:, k, column[line.equation]] = line.value, line.scaled
+    return values, units
+
+
+def _weighted(steps: Sequence[Step]) -> dict[str, Variable]:
+    """Return what the `weighted` closure left as (step, weighted_equation); nothing for other closures."""
+    values, units = _spread([left_by_weights(step) for step in steps])
+    if not units:
+        return {}
+    dims, line = ("step", "weighted_equation"), ("weighted_equation",)
+    return {
+        "weighted_residual": (
+            dims,
+            values[0],
+            _attributes("see weighted_residual_unit", "what `weighted` left of each equation"),
+        ),
+        "weighted_residual_scaled": (dims, values[1], _attributes("1", "the same, scaled as the certificate")),
+        "weighted_residual_unit": (line, _text(list(units.values())), _attributes("1", "unit of what was left")),
+        "weighted_equation": (line, _text(list(units)), _attributes("1", "equation that `weighted` weighs")),
+    }
+
+
+def _certificate(steps: Sequence[Step]) -> dict[str, Variable]:
+    """Return the certificates as (step, equation)."""
+    values, units = _spread([step.certificate for step in steps])
     dims = ("step", "equation")
     return {
         "certificate": (dims, values[0], _attributes("see equation_unit", "largest error of each equation")),
@@ -176,6 +214,7 @@ def _global_attributes(run: Run) -> dict[str, str]:
         "versions": versions(),
         "conventions_in_full": conventions_table(run.conventions),
         "warnings": list(run.warnings),
+        **({} if run.contact is None else {"contact": contact_table(run.contact)}),
     }
     return {
         "title": run.title,

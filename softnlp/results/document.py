@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from softnlp.results.fields import DOCUMENT_FIELDS, solved_pose
+from softnlp.results.fields import BLOCKED_FORCE, closure_of, document_fields, left_by_weights, solved_pose
 from softnlp.results.inputs import (
     coefficients_table,
+    contact_table,
     loads_table,
     material_table,
     package_version,
@@ -19,6 +20,7 @@ from softnlp.results.inputs import (
     robot_table,
     tidy,
 )
+from softnlp.solver import EquationResidual
 from softnlp.studies.step import Run, Step
 
 
@@ -28,6 +30,7 @@ def to_json(run: Run) -> dict[str, Any]:
     A step without a solution keeps pressure, time, status, message, residual, certificate and warnings; its other
     numbers are None.
     """
+    contact = {} if run.contact is None else {"contact": contact_table(run.contact)}
     return {
         "softnlp": package_version(),
         "title": run.title,
@@ -37,8 +40,9 @@ def to_json(run: Run) -> dict[str, Any]:
         "material": material_table(run.material),
         "coefficients": coefficients_table(run.coefficients),
         "loads": loads_table(run.loads),
+        **contact,
         "warnings": list(run.warnings),
-        "steps": [_step(step) for step in run.steps],
+        "steps": [_step(run, step) for step in run.steps],
     }
 
 
@@ -49,22 +53,31 @@ def json_text(run: Run) -> str:
     return re.sub(r"\[\n\s+([^\[\]{}\"]*?)\n\s+\]", lambda m: f"[{' '.join(m[1].split())}]", text) + "\n"
 
 
-def _step(step: Step) -> dict[str, Any]:
+def _step(run: Run, step: Step) -> dict[str, Any]:
     pose = solved_pose(step)
     table: dict[str, Any] = {"pressure_bar": pressure_bar(step.pressure)}
     if step.time is not None:
         table["t_s"] = tidy(step.time)
     table["status"] = step.status.value
     table["message"] = step.message
-    for field in DOCUMENT_FIELDS:
+    for field in document_fields(run):
         table[field.name] = None if pose is None else _plain(field.of(step, pose))
+    if run.study == BLOCKED_FORCE:
+        table["closure"] = closure_of(run, step)
+        if table["closure"] == "weighted":
+            table["weighted_residual"] = _lines(left_by_weights(step))
     table["residual"] = _plain(step.residual)
-    table["certificate"] = [
-        {"equation": line.equation, "value": _plain(line.value), "unit": line.unit, "scaled": _plain(line.scaled)}
-        for line in step.certificate
-    ]
+    table["certificate"] = _lines(step.certificate)
     table["warnings"] = list(step.warnings)
     return table
+
+
+def _lines(residuals: tuple[EquationResidual, ...]) -> list[dict[str, Any]]:
+    """Return errors of equations, each with its unit."""
+    return [
+        {"equation": line.equation, "value": _plain(line.value), "unit": line.unit, "scaled": _plain(line.scaled)}
+        for line in residuals
+    ]
 
 
 def _plain(value: Any) -> Any:

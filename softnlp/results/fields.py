@@ -9,8 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from softnlp.studies.step import Pose, Step
+from softnlp.solver import EquationResidual
+from softnlp.studies.step import Contact, Pose, Run, Step
 from softnlp.units import DEGREE, MILLIMETRE, NEWTON_MILLIMETRE
+
+BLOCKED_FORCE = "blocked-force"
 
 
 @dataclass(frozen=True)
@@ -133,5 +136,102 @@ SHAPE_FIELDS: tuple[Field, ...] = (
     Field("curvature_per_m", ("s", "axis"), "m-1", "curvature u in the body frame", lambda s, p: p.shape.curvature),
 )
 
-DOCUMENT_FIELDS = (*POSE_FIELDS, *SOLVE_FIELDS)
-"""What JSON and CSV hold of a step, in order."""
+
+def _contact(of: Callable[[Contact], Any]) -> Callable[[Step, Pose], Any]:
+    """Take a number from the contact of a step; None without one."""
+    return lambda s, p: None if s.contact is None else of(s.contact)
+
+
+def _wall(of: Callable[[Contact], Any]) -> Callable[[Step, Pose], Any]:
+    """Take a number of the wall; None where the chambers alone are constrained, whose contact has no normal."""
+    return _contact(lambda c: of(c) if c.normal.any() else None)
+
+
+CONTACT_FIELDS: tuple[Field, ...] = (
+    Field(
+        "blocked_force_N",
+        (),
+        "N",
+        "force with which the wall pushes the tip, not negative",
+        _contact(lambda c: c.force),
+    ),
+    Field(
+        "chamber_reaction_N",
+        ("chamber",),
+        "N",
+        "reaction T_i of each chamber, without the pressure's P A_c",
+        _contact(lambda c: c.chamber_reaction),
+    ),
+    Field(
+        "gap_mm",
+        (),
+        "mm",
+        "distance of the free shape's contact point in front of the wall, negative beyond it",
+        _wall(lambda c: c.gap / MILLIMETRE),
+    ),
+    Field("wall_point_mm", ("axis",), "mm", "a point of the wall", _wall(lambda c: c.wall_point / MILLIMETRE)),
+    Field("wall_normal", ("axis",), "1", "direction in which the wall pushes the robot", _wall(lambda c: c.normal)),
+    Field("tip_cap_mm", (), "mm", "length L_t of the rigid cap on the tip", _contact(lambda c: c.tip_cap / MILLIMETRE)),
+    Field(
+        "length_error_mm",
+        (),
+        "mm",
+        "sum over the pressurised chambers of free length minus length, Eq. (14)",
+        _contact(lambda c: c.length_error / MILLIMETRE),
+    ),
+    Field(
+        "free_tip_position_mm",
+        ("axis",),
+        "mm",
+        "tip position of the free shape at the same pressure",
+        _contact(lambda c: c.free.tip_position / MILLIMETRE),
+    ),
+    Field(
+        "free_bending_angle_deg",
+        (),
+        "degree",
+        "bending angle of the free shape at the same pressure",
+        _contact(lambda c: c.free.bending_angle / DEGREE),
+    ),
+)
+
+FREE_SHAPE_FIELDS: tuple[Field, ...] = (
+    Field(
+        "free_position_mm",
+        ("s", "axis"),
+        "mm",
+        "position of the free shape's axis in the world frame",
+        _contact(lambda c: c.free.shape.position / MILLIMETRE),
+    ),
+    Field(
+        "free_rotation",
+        ("s", "row", "col"),
+        "1",
+        "rotation of the free shape's section; columns are the body axes",
+        _contact(lambda c: c.free.shape.rotation),
+    ),
+)
+
+
+def document_fields(run: Run) -> tuple[Field, ...]:
+    """Return what JSON and CSV hold of a step, in order."""
+    contact = CONTACT_FIELDS if run.study == BLOCKED_FORCE else ()
+    return (*POSE_FIELDS, *contact, *SOLVE_FIELDS)
+
+
+def dataset_fields(run: Run) -> tuple[Field, ...]:
+    """Return what netCDF holds of a step: the same, the section, and shapes along the rod."""
+    free = FREE_SHAPE_FIELDS if run.study == BLOCKED_FORCE else ()
+    return (*document_fields(run), *SECTION_FIELDS, *SHAPE_FIELDS, *free)
+
+
+def closure_of(run: Run, step: Step) -> str | None:
+    """Return the closure of a step, known of a failed one by what was asked."""
+    if step.contact is not None:
+        return step.contact.closure
+    return None if run.contact is None else run.contact.closure
+
+
+def left_by_weights(step: Step) -> tuple[EquationResidual, ...]:
+    """Return what `weighted` left of its equations, nothing for other closures and failed steps."""
+    return step.contact.weighted if step.contact is not None and step.status.has_solution else ()

@@ -8,6 +8,7 @@ from dataclasses import asdict, fields
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from softnlp.contact_settings import ContactSettings
 from softnlp.conventions import Coefficients, Conventions
 from softnlp.materials import Material
 from softnlp.robot import DIMENSIONS, Robot
@@ -57,6 +58,26 @@ def material_table(material: Material) -> dict[str, Any]:
 def coefficients_table(coefficients: Coefficients) -> dict[str, float]:
     """Return the dimensionless coefficients by name."""
     return {f.name: tidy(getattr(coefficients, f.name)) for f in fields(coefficients)}
+
+
+def contact_table(contact: ContactSettings) -> dict[str, Any]:
+    """Return the wall and the closure as the `[contact]` table of a scenario; what is left to the study is absent."""
+    table: dict[str, Any] = {"closure": contact.closure, "tip_cap_mm": tidy(contact.tip_cap, MILLIMETRE)}
+    if contact.wall_point is None or contact.wall_normal is None:
+        table["offset_mm"] = tidy(contact.offset, MILLIMETRE)
+    else:
+        table["wall_point_mm"] = [tidy(x, MILLIMETRE) for x in contact.wall_point]
+        table["wall_normal"] = [float(x) for x in contact.wall_normal]
+    weights = contact.weights
+    for key, weight, unit in (
+        ("weight_force_per_N", weights.force, 1.0),
+        ("weight_moment_per_Nmm", weights.moment, NEWTON_MILLIMETRE),
+        ("weight_length_per_mm", weights.length, MILLIMETRE),
+        ("weight_position_per_mm", weights.position, MILLIMETRE),
+    ):
+        if weight is not None:
+            table[key] = tidy(weight * unit)
+    return table
 
 
 def conventions_table(conventions: Conventions) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from softnlp.results.fields import solved_pose
+from softnlp.results.fields import BLOCKED_FORCE, solved_pose
 from softnlp.studies.step import Run, Step
 from softnlp.units import BAR, DEGREE, MILLIMETRE
 
@@ -35,18 +35,10 @@ def table_lines(run: Run) -> Group:
     for header in headers:
         table.add_column(Text(header), justify="right", no_wrap=True)
     table.add_column("status", overflow="fold", min_width=6)
-    numbers = [
-        "bending\n[deg]",
-        "tip x\n[mm]",
-        "y\n[mm]",
-        "z\n[mm]",
-        "stretch",
-        "stable",
-        "resid.",
-        "error",
-        "time\n[s]",
-    ]
-    for header in numbers:
+    blocked = run.study == BLOCKED_FORCE
+    moving = blocked and _wall_moves(run)
+    numbers = _blocked_numbers if blocked else _numbers
+    for header in [*["offset\n[mm]"] * moving, *(_BLOCKED_HEADERS if blocked else _HEADERS)]:
         table.add_column(Text(header), justify="right", no_wrap=True)
 
     pressures = _alike([p / BAR for step in steps for p in step.pressure], most=3)
@@ -57,10 +49,15 @@ def table_lines(run: Run) -> Group:
             cells.append(NONE if step.time is None else format(step.time, times))
         cells += [format(p / BAR, pressures) for p in step.pressure]
         style = "" if step.status.has_solution else "red"
-        table.add_row(*cells, Text(step.status.value, style), *_numbers(step))
+        table.add_row(*cells, Text(step.status.value, style), *[_offset(step)] * moving, *numbers(step))
 
     lines = [Text(line, style) for line, style in _notes(run)]
     return Group(table, *lines)
+
+
+_TIP = ("bending\n[deg]", "tip x\n[mm]", "y\n[mm]", "z\n[mm]")
+_HEADERS = (*_TIP, "stretch", "stable", "resid.", "error", "time\n[s]")
+_BLOCKED_HEADERS = ("force\n[N]", "gap\n[mm]", *_TIP, "stable", "resid.", "time\n[s]")
 
 
 def _numbers(step: Step) -> list[str]:
@@ -78,6 +75,27 @@ def _numbers(step: Step) -> list[str]:
         _short(step.discretisation_error),
         f"{step.solve_time:.3f}",
     ]
+
+
+def _blocked_numbers(step: Step) -> list[str]:
+    """Return what follows the status of a blocked force; dashes where there is no wall."""
+    plain = _numbers(step)
+    wall = [NONE, NONE]
+    if step.contact is not None and step.status.has_solution:
+        gap = _millimetres(step.contact.gap) if step.contact.normal.any() else NONE
+        wall = [f"{step.contact.force:.4f}", gap]
+    return [*wall, *plain[:4], *plain[5:7], plain[8]]
+
+
+def _wall_moves(run: Run) -> bool:
+    """Whether steps differ in where the wall stands."""
+    points = [step.contact.wall_point for step in run.steps if step.contact is not None and step.contact.normal.any()]
+    return any((point != points[0]).any() for point in points)
+
+
+def _offset(step: Step) -> str:
+    """Return where the wall stands along x."""
+    return NONE if step.contact is None else _millimetres(float(step.contact.wall_point[0]))
 
 
 def _notes(run: Run) -> Iterator[tuple[str, str]]:

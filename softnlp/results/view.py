@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.results.dataset import STABLE_FLAGS
-from softnlp.results.fields import solved_pose
+from softnlp.results.fields import BLOCKED_FORCE, solved_pose
 from softnlp.results.inputs import loads_of_table, robot_of_table
 from softnlp.robot import Robot
 from softnlp.rod import Loads
 from softnlp.status import Status
-from softnlp.studies.step import Run, SectionRadii
+from softnlp.studies.step import Contact, Run, SectionRadii
 from softnlp.units import BAR, DEGREE, MILLIMETRE
 
 if TYPE_CHECKING:
@@ -38,12 +38,35 @@ class Body:
 
 
 @dataclass(frozen=True, eq=False)
+class ContactView:
+    """The wall of a blocked force, S steps; NaN and None where a step has no solution.
+
+    force, gap : (S,) [N], [m]. wall_point, normal : (S, 3) [m], unit. tip_cap : L_t [m].
+    free_bending_angle : (S,) [rad]. free : the free shapes, S entries.
+    """
+
+    closure: str
+    force: Array
+    gap: Array
+    wall_point: Array
+    normal: Array
+    tip_cap: float
+    free_bending_angle: Array
+    free: tuple[Body | None, ...]
+
+    @property
+    def has_wall(self) -> bool:
+        """Whether there is a wall; without one the chambers alone are constrained."""
+        return bool(np.isfinite(self.normal).any())
+
+
+@dataclass(frozen=True, eq=False)
 class RunView:
     """A run as figures see it; S steps, NaN and None where a step has no solution.
 
     material : its name and law. pressure : (S, sets) [Pa]. time : (S,) [s] or None.
     stable : (S,), False where unsolved. stretch : (S,). bending_angle : (S,) [rad]. backbone_length : (S,) [m].
-    bodies : S entries.
+    bodies : S entries. contact : of a blocked force, else None.
     """
 
     title: str
@@ -60,6 +83,7 @@ class RunView:
     bending_angle: Array
     backbone_length: Array
     bodies: tuple[Body | None, ...]
+    contact: ContactView | None = None
 
     @property
     def solved(self) -> tuple[int, ...]:
@@ -90,6 +114,32 @@ def view_of_run(run: Run) -> RunView:
         bending_angle=series("bending_angle"),
         backbone_length=series("backbone_length"),
         bodies=tuple(None if p is None else Body(p.shape.position, p.shape.rotation, p.radii) for p in poses),
+        contact=_contact_of_run(run) if run.study == BLOCKED_FORCE else None,
+    )
+
+
+def _contact_of_run(run: Run) -> ContactView | None:
+    """Return the contact of a run; None where no solved step has a wall."""
+    contacts = [step.contact if solved_pose(step) is not None else None for step in run.steps]
+    known = [contact for contact in contacts if contact is not None]
+    if not known:
+        return None
+
+    def series(of: Callable[[Contact], Any], size: tuple[int, ...] = ()) -> Array:
+        nothing = np.full(size, np.nan)
+        return np.array([nothing if c is None else of(c) for c in contacts], dtype=float)
+
+    return ContactView(
+        closure=known[0].closure,
+        force=series(lambda c: c.force),
+        gap=series(lambda c: c.gap if c.normal.any() else np.nan),
+        wall_point=series(lambda c: c.wall_point if c.normal.any() else np.full(3, np.nan), (3,)),
+        normal=series(lambda c: c.normal if c.normal.any() else np.full(3, np.nan), (3,)),
+        tip_cap=known[0].tip_cap,
+        free_bending_angle=series(lambda c: c.free.bending_angle),
+        free=tuple(
+            None if c is None else Body(c.free.shape.position, c.free.shape.rotation, c.free.radii) for c in contacts
+        ),
     )
 
 
@@ -121,18 +171,38 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
         bending_angle=values["bending_angle_deg"] * DEGREE,
         backbone_length=values["backbone_length_mm"] * MILLIMETRE,
         bodies=tuple(_body(values, k) if status[k].has_solution else None for k in steps),
+        contact=_contact_of_values(values) if str(attributes["study"]) == BLOCKED_FORCE else None,
     )
 
 
-def _body(values: Mapping[str, Any], k: int) -> Body | None:
-    points = np.isfinite(values["arc"][k])
+def _contact_of_values(values: Mapping[str, Any]) -> ContactView | None:
+    """Return the contact of a dataset; None where no solved step has a wall."""
+    force = values["blocked_force_N"]
+    known = np.flatnonzero(np.isfinite(force))
+    if not known.size:
+        return None
+    return ContactView(
+        closure=str(values["closure"][known[0]]),
+        force=force,
+        gap=values["gap_mm"] * MILLIMETRE,
+        wall_point=values["wall_point_mm"] * MILLIMETRE,
+        normal=values["wall_normal"],
+        tip_cap=float(values["tip_cap_mm"][known[0]]) * MILLIMETRE,
+        free_bending_angle=values["free_bending_angle_deg"] * DEGREE,
+        free=tuple(_body(values, k, "free_") if np.isfinite(f) else None for k, f in enumerate(force)),
+    )
+
+
+def _body(values: Mapping[str, Any], k: int, shape: str = "") -> Body | None:
+    position = values[f"{shape}position_mm"][k]
+    points = np.isfinite(position).all(axis=1)
     if not points.any():
         return None
     radii = {
         name: float(values[f"{name}_radius_mm"][k]) * MILLIMETRE
         for name in ("outer", "lumen", "chamber_circle", "chamber", "bore")
     }
-    return Body(values["position_mm"][k][points] * MILLIMETRE, values["rotation"][k][points], SectionRadii(**radii))
+    return Body(position[points] * MILLIMETRE, values[f"{shape}rotation"][k][points], SectionRadii(**radii))
 
 
 def _material_label(name: str, law: str) -> str:

@@ -22,7 +22,7 @@ _SUBSTEPS = 4
 
 def shape_function(field: ca.Function) -> ca.Function:
     """Return (state, c, h) -> [state a step h further, strains (v, u)], scaled, for the field of a load case."""
-    x, c, h = ca.SX.sym("x", rod.STATE_SIZE), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("h")
+    x, c, h = ca.SX.sym("x", field.size1_in(0)), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("h")
     step = rk_step(field, RK4)
     end = x
     for _ in range(_SUBSTEPS):

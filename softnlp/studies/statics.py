@@ -120,26 +120,28 @@ def pose_distance(change: Array) -> float:
 class PoseSolver:
     """Solves poses of one model; compiled grids are kept between poses, so a sequence pays for each once.
 
-    model : robot, silicone, coefficients, conventions, all numbers.
+    model : robot, silicone, coefficients, conventions, all numbers. unloaded_accuracy : estimate to aim for, times 3,
+    where no load acts, if it is below that of the numerics.
     """
 
-    def __init__(self, model: Model, numerics: Numerics) -> None:
+    def __init__(self, model: Model, numerics: Numerics, *, unloaded_accuracy: float = UNLOADED_ACCURACY * 3) -> None:
         self.model = model
         self.numerics = numerics
-        self._quantities = quantities(model)
-        self._branch = branch_function(model)
-        self._functions = rod_functions(model)
-        self._shape = shape_function(self._functions.field)
-        self._transition, self._tip_variation = transition_functions(self._functions.field)
+        self._unloaded_accuracy = unloaded_accuracy
+        self.quantities = quantities(model)
+        self.branch = branch_function(model)
+        self.functions = rod_functions(model)
+        self.shape = shape_function(self.functions.field)
+        self._transition, self._tip_variation = transition_functions(self.functions.field)
         self._grids: dict[int, Grid] = {}
 
     def grid(self, intervals: int) -> Grid:
         """Return the compiled problem on a grid, building it at first use."""
         if intervals not in self._grids:
             method = method_named(self.numerics.transcription, intervals)
-            case = load_case("pose", self._functions, self._quantities, method)
-            problem = compile_problem(list(self._quantities.values()), [case])
-            linear = CondensedSolver(self._functions, method) if isinstance(method, MultipleShooting) else None
+            case = load_case("pose", self.functions, self.quantities, method)
+            problem = compile_problem(list(self.quantities.values()), [case])
+            linear = CondensedSolver(self.functions, method) if isinstance(method, MultipleShooting) else None
             self._grids[intervals] = Grid(
                 case=case,
                 engine=Engine(problem, linear=linear),
@@ -167,14 +169,14 @@ class PoseSolver:
         began = time.perf_counter()
         pressure = np.asarray(pressure, dtype=float)
         values = self.values(pressure, loads)
-        column = self._column(values)
-        branch = stretch_on_branch(self._branch, column, pressure)
+        column = self.column(values)
+        branch = stretch_on_branch(self.branch, column, pressure)
         if branch.status is not Status.SOLVED:
             return Step(pressure, branch.status, branch.message, solve_time=time.perf_counter() - began), None
 
-        first = self.numerics.intervals or self._first_intervals(column, branch.stretch)
+        first = self.numerics.intervals or self.first_intervals(column, branch.stretch)
         intervals = warm.intervals if warm else first
-        target = self._target_accuracy(loads)
+        target = self.target_accuracy(loads)
         iterations = 0
         found: Solved | None = warm
         while True:
@@ -194,7 +196,7 @@ class PoseSolver:
                 )
                 return step, None
             found = attempt
-            wanted = self._next_intervals(found, target)
+            wanted = self.next_intervals(found.refinement_error, intervals, target)
             if wanted is None:
                 break
             if intervals >= MOST_INTERVALS:
@@ -210,28 +212,28 @@ class PoseSolver:
             intervals = min(wanted, MOST_INTERVALS)
         return self._finished(pressure, loads, found, iterations, began), found
 
-    def _first_intervals(self, column: Array, stretch: float) -> int:
+    def first_intervals(self, column: Array, stretch: float) -> int:
         """Return a grid coarse enough to be quick and fine enough for the curl of the unloaded robot."""
         first = FIRST_INTERVALS[self.numerics.transcription]
-        straight = np.asarray(self._functions.arc(column, stretch, 0.01)).ravel()
+        straight = np.asarray(self.functions.arc(column, stretch, 0.01)).ravel()
         curl = 100 * float(np.hypot(straight[9], straight[10]))  # of the axis, R e3, over the first hundredth
         turn = _TURN * FIRST_INTERVALS["multiple-shooting"] / first
         return min(next_size(max(first, curl / turn)), MOST_INTERVALS)
 
-    def _target_accuracy(self, loads: Loads) -> float:
+    def target_accuracy(self, loads: Loads) -> float:
         """Return the estimate to aim for: a third of the accuracy, since estimates are good to a factor of 3."""
         accuracy = self.numerics.accuracy
         if not np.any([loads.tip_force, loads.tip_moment, loads.gravity]):
-            accuracy = min(accuracy, UNLOADED_ACCURACY * 3)
+            accuracy = min(accuracy, self._unloaded_accuracy)
         return accuracy / 3
 
-    def _next_intervals(self, solved: Solved, target: float) -> int | None:
+    def next_intervals(self, error: float, intervals: int, target: float) -> int | None:
         """Return the finer grid that should meet the target, or None where this one does or the grid is given."""
-        if self.numerics.intervals is not None or solved.refinement_error <= target:
+        if self.numerics.intervals is not None or error <= target:
             return None
         order = method_named(self.numerics.transcription, 1).order
-        factor = 1.1 * (solved.refinement_error / target) ** (1 / order)
-        return next_size(max(factor, 1.3) * solved.intervals)
+        factor = 1.1 * (error / target) ** (1 / order)
+        return next_size(max(factor, 1.3) * intervals)
 
     def _solve_on(
         self, intervals: int, values: dict[str, Any], branch: BranchPoint, near: Solved | None, *, refining: bool
@@ -239,8 +241,8 @@ class PoseSolver:
         """Try, in order: the neighbour, the unloaded arc, loads applied after the pressure, and after part of it.
 
         The first stable solution wins; an unstable one is kept in case there is no other. When refining, `near` is this
-        pose on a coarser grid, and its like is the answer. Returns it, the iterations
-        spent and how far continuation came.
+        pose on a coarser grid, and its like is the answer. Returns it, the iterations spent and how far continuation
+        came.
         """
         grid = self.grid(intervals)
         p = grid.problem.pack(values)
@@ -252,7 +254,7 @@ class PoseSolver:
         def attempts() -> Iterator[tuple[Solution, float]]:
             if near is not None:
                 yield grid.engine.solve(p, self._transfer(near, grid, p, branch.stretch)), 1.0
-            yield grid.engine.solve(p, self._arc_guess(grid, p, branch.stretch)), 1.0
+            yield grid.engine.solve(p, self.arc_guess(grid, p, branch.stretch)), 1.0
             if not any(np.any(values[name]) for name in _LOADS):
                 return  # the arc is the answer; a grid that does not show it is too coarse
             yield from self._along(grid, [unloaded, values])
@@ -279,7 +281,7 @@ class PoseSolver:
         every equilibrium at the end that it passes is offered.
         """
         problem = grid.problem
-        x = self._arc_guess(grid, problem.pack(waypoints[0]), self._stretch(waypoints[0]))
+        x = self.arc_guess(grid, problem.pack(waypoints[0]), self._stretch(waypoints[0]))
         p_end = problem.pack(waypoints[-1])
         legs = len(waypoints) - 1
         spent = 0
@@ -302,19 +304,23 @@ class PoseSolver:
         final = grid.engine.solve(p_end, x)
         yield replace(final, iterations=spent + final.iterations), 1.0
 
-    def _column(self, values: dict[str, Any]) -> Array:
+    def column(self, values: dict[str, Any]) -> Array:
         """Return every quantity in its order, SI."""
-        return np.concatenate([np.ravel(values.get(name, q.nominal)) for name, q in self._quantities.items()])
+        return np.concatenate([np.ravel(values.get(name, q.nominal)) for name, q in self.quantities.items()])
 
     def _stretch(self, values: dict[str, Any]) -> float:
         """Return the stretch on the branch from zero pressure at the pressure in `values`."""
-        return stretch_on_branch(self._branch, self._column(values), values["pressure"]).stretch
+        return stretch_on_branch(self.branch, self.column(values), values["pressure"]).stretch
 
-    def _arc_guess(self, grid: Grid, p: Array, stretch: float) -> Array:
+    def arc_guess(self, grid: Grid, p: Array, stretch: float) -> Array:
         """Return x of the unloaded circular arc at this pressure."""
         s = grid.case.transcribed.points
-        states = np.asarray(self._functions.arc(p, stretch, s[None, :]))
+        states = np.asarray(self.functions.arc(p, stretch, s[None, :]))
         return np.concatenate([[stretch], states.T.ravel()])
+
+    def transfer(self, solved: Solved, grid: Grid) -> Array:
+        """Return x of a solution on another grid."""
+        return self._transfer(solved, grid, solved.solution.p, float(solved.solution.x[0]))
 
     def _transfer(self, solved: Solved, grid: Grid, p: Array, stretch: float) -> Array:
         """Return a solution's states on a grid, moved by what the unloaded arc moves between the two poses."""
@@ -322,9 +328,9 @@ class PoseSolver:
         if solved.grid is grid:
             states = solved.solution.x[1:]
         else:
-            states = between_nodes(self._shape, solved.nodes, solved.constants, s)[:STATE_SIZE].T.ravel()
+            states = between_nodes(self.shape, solved.nodes, solved.constants, s)[:STATE_SIZE].T.ravel()
         x_old, p_old = solved.solution.x, solved.solution.p
-        moved = self._arc_guess(grid, p, stretch) - self._arc_guess(grid, p_old, x_old[0])
+        moved = self.arc_guess(grid, p, stretch) - self.arc_guess(grid, p_old, x_old[0])
         return np.concatenate([[x_old[0]], states]) + moved
 
     def _examine(self, grid: Grid, solution: Solution) -> Solved:
@@ -352,8 +358,8 @@ class PoseSolver:
         result = outputs(problem, solution)
         L_0, F_0 = (float(v) for v in np.asarray(grid.problem.units(solution.x, solution.p)).ravel())
         s = np.linspace(0, 1, SHAPE_POINTS)
-        shape = shape_of(between_nodes(self._shape, solved.nodes, solved.constants, s), s, L_0, F_0)
-        unloaded_tip = np.asarray(self._functions.arc(solution.p, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
+        shape = shape_of(between_nodes(self.shape, solved.nodes, solved.constants, s), s, L_0, F_0)
+        unloaded_tip = np.asarray(self.functions.arc(solution.p, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
         pose = pose_of(self.model, result, shape, unloaded_tip, solved.stable)
         warnings = list(pose_warnings(self.model, pose))
         if solved.error > self.numerics.accuracy:

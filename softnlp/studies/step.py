@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.contact_settings import ContactSettings
 from softnlp.conventions import Coefficients, Conventions
 from softnlp.materials import Material
 from softnlp.robot import Robot
@@ -69,11 +70,35 @@ class Pose:
 
 
 @dataclass(frozen=True, eq=False)
+class Contact:
+    """The wall and what it does to the tip in one step of a blocked force; SI, world frame.
+
+    force : what the wall pushes with, not negative [N]. normal : (3,) unit, the direction in which it pushes the robot.
+    wall_point : (3,) a point of the wall [m]. tip_cap : L_t [m]. closure : which equations closed the problem.
+    chamber_reaction : (N,) T_i, without P A_c [N]. free : the free shape at the same pressure and loads.
+    gap : distance of the free shape's contact point in front of the wall, negative beyond it [m].
+    length_error : e_L, Eq. (14) [m]. weighted : what `weighted` left of e_n, e_m, e_L, e_h.
+    """
+
+    force: float
+    normal: Array
+    wall_point: Array
+    tip_cap: float
+    closure: str
+    chamber_reaction: Array
+    free: Pose
+    gap: float
+    length_error: float
+    weighted: tuple[EquationResidual, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
 class Step:
     """One step of a run: its input, how it ended, and the pose when it was solved (else None).
 
     pressure : (sets,) [Pa]. residual : largest scaled equation error, or None when nothing was evaluated.
     discretisation_error : estimated tip position error over L_0. solve_time : [s].
+    contact : of a blocked force, whose `pose` is the blocked shape; else None.
     """
 
     pressure: Array
@@ -88,11 +113,12 @@ class Step:
     iterations: int = 0
     solve_time: float = 0.0
     warnings: tuple[str, ...] = ()
+    contact: Contact | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A finished study: what was asked and its steps, in order."""
+    """A finished study: what was asked and its steps, in order. contact : of a blocked force, else None."""
 
     study: str
     robot: Robot
@@ -103,6 +129,7 @@ class Run:
     steps: tuple[Step, ...]
     title: str = ""
     warnings: tuple[str, ...] = field(default=())
+    contact: ContactSettings | None = None
 
     @property
     def failed(self) -> tuple[Step, ...]:

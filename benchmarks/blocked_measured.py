@@ -1,0 +1,88 @@
+"""The simulated blocked force beside the eight measured ones (Ecoflex 00-50, one set, tip held at x = 0).
+
+    python -m benchmarks.blocked_measured
+
+Three models: the `free` closure (no constraint of the chambers) and the `compliant` one with the coefficients of the
+set `reproduction`, and `compliant` with the set `calibrated`. Forces at 1.5 bar, then mean absolute percentage errors
+there and over the curve from 0.3 to 1.5 bar in steps of 0.3, where the measured force is taken as linear in pressure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.contact_settings import ContactSettings
+from softnlp.conventions import COEFFICIENT_SETS
+from softnlp.materials import material
+from softnlp.robot import robot
+from softnlp.studies.blocked_force import blocked_force
+from softnlp.units import BAR
+
+Array = NDArray[np.float64]
+
+MEASURED_AT = 1.5  # [bar]
+MEASURED: Mapping[str, float] = {  # [N] at 1.5 bar
+    **{"D25L60": 1.18, "D25L40": 1.27, "D20L60": 0.71, "D20L40": 0.82},
+    **{"D15L60": 0.34, "D15L40": 0.39, "D10L60": 0.10, "D10L40": 0.12},
+}
+PRESSURES = np.linspace(0.3, MEASURED_AT, 5)  # [bar]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A model of the comparison: closure and set of coefficients."""
+
+    closure: str
+    coefficients: str
+
+    @property
+    def label(self) -> str:
+        """The model in words."""
+        return f"{self.closure}, {self.coefficients}"
+
+
+MODELS = (Compared("free", "reproduction"), Compared("compliant", "reproduction"), Compared("compliant", "calibrated"))
+
+
+def forces(name: str, model: Compared) -> Array:
+    """Return the simulated force of a robot at each of PRESSURES [N], NaN where a step has no solution."""
+    P = np.zeros((len(PRESSURES), 3))
+    P[:, 0] = PRESSURES * BAR
+    contact = ContactSettings(closure=model.closure)  # type: ignore[arg-type]
+    run = blocked_force(
+        robot(name), material("Ecoflex 00-50"), P, contact, coefficients=COEFFICIENT_SETS[model.coefficients]
+    )
+    return np.array([s.contact.force if s.contact and s.status.has_solution else np.nan for s in run.steps])
+
+
+def measured_curve(name: str) -> Array:
+    """Return the measured force at each of PRESSURES [N], linear in pressure."""
+    return np.asarray(MEASURED[name] * PRESSURES / MEASURED_AT)
+
+
+def percent_errors(simulated: Mapping[str, Array]) -> tuple[float, float]:
+    """Return the mean absolute percentage errors at 1.5 bar and over the whole curve, robots counting alike."""
+    errors = np.array([100 * np.abs(f / measured_curve(name) - 1) for name, f in simulated.items()])
+    return float(errors[:, -1].mean()), float(errors.mean())
+
+
+def main(models: Sequence[Compared] = MODELS) -> None:
+    """Print the comparison."""
+    found = {model: {name: forces(name, model) for name in MEASURED} for model in models}
+    width = max(len(model.label) for model in models) + 2
+    header = "".join(model.label.rjust(width) for model in models)
+    print(f"blocked force at {MEASURED_AT} bar [N]\n{'robot':8}{'measured':>10}{header}")
+    for name, measured in MEASURED.items():
+        print(f"{name:8}{measured:10.2f}" + "".join(f"{found[m][name][-1]:{width}.3f}" for m in models))
+    errors = [percent_errors(found[m]) for m in models]
+    print("\nmean absolute percentage error")
+    print(f"{'at 1.5 bar':18}" + "".join(f"{at_end:{width}.1f}" for at_end, _ in errors))
+    print(f"{'0.3 to 1.5 bar':18}" + "".join(f"{curve:{width}.1f}" for _, curve in errors))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,86 @@
+"""From a scenario of `blocked-force` to a run: the force at each pressure, or what else was asked of the wall."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from softnlp.contact_settings import ContactTask
+from softnlp.scenario import Scenario
+from softnlp.studies.blocked_force import blocked_force, constrained_pose, force_against_offset
+from softnlp.studies.force_inversion import pressure_for_force
+from softnlp.studies.step import Run, Step
+
+Progress = Callable[[int, Step], None]
+
+
+def run_blocked(scenario: Scenario, progress: Progress | None, branches: int = 0) -> Run:
+    """Run a blocked force; `branches` other starts a step are tried for other equilibria.
+
+    Raises
+    ------
+    InputError
+        For pressures or loads that the study refuses.
+    """
+    contact, task = scenario.contact, scenario.contact_task or ContactTask()
+    assert contact is not None
+    model = (scenario.robot, scenario.material)
+    settings: dict[str, Any] = {
+        "coefficients": scenario.coefficients,
+        "conventions": scenario.conventions,
+        "numerics": scenario.numerics,
+    }
+    if task.constrained:
+        return _constrained(scenario, progress, settings)
+    settings["loads"] = scenario.loads
+    if task.target_force is not None:
+        bound = scenario.pressures[-1]
+        sets = np.flatnonzero(bound).tolist()
+        _, step = pressure_for_force(*model, sets, task.target_force, contact, highest=float(bound.max()), **settings)
+        if progress is not None:
+            progress(0, step)
+        return _run(scenario, (step,))
+    settings |= {"title": scenario.title, "progress": progress}
+    if task.offsets is not None:
+        return force_against_offset(*model, scenario.pressures[0], task.offsets, contact, **settings)
+    times = None if scenario.times is None else scenario.times.tolist()
+    return blocked_force(*model, scenario.pressures, contact, times=times, branches=branches, **settings)
+
+
+def _constrained(scenario: Scenario, progress: Progress | None, settings: dict[str, Any]) -> Run:
+    """Run the loaded poses whose chambers are held at their free lengths."""
+    assert scenario.contact is not None
+    steps = []
+    for k, pressure in enumerate(scenario.pressures):
+        step = constrained_pose(
+            scenario.robot,
+            scenario.material,
+            pressure,
+            scenario.loads,
+            scenario.contact.closure,
+            weights=scenario.contact.weights,
+            **settings,
+        )
+        if scenario.times is not None:
+            step = replace(step, time=float(scenario.times[k]))
+        steps.append(step)
+        if progress is not None:
+            progress(k, step)
+    return _run(scenario, tuple(steps))
+
+
+def _run(scenario: Scenario, steps: tuple[Step, ...]) -> Run:
+    return Run(
+        study=scenario.study,
+        robot=scenario.robot,
+        material=scenario.material,
+        coefficients=scenario.coefficients,
+        conventions=scenario.conventions,
+        loads=scenario.loads,
+        steps=steps,
+        title=scenario.title,
+        contact=scenario.contact,
+    )

@@ -1,0 +1,226 @@
+"""Blocked tip force: how hard the tip pushes against a wall, by pressure or by the wall's offset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.contact_settings import ClosureWeights, ContactSettings
+from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.errors import InputError
+from softnlp.materials import Material
+from softnlp.numerics import Numerics
+from softnlp.quantities import Model
+from softnlp.robot import LOWERABLE_RULES, Robot, check
+from softnlp.rod import Loads
+from softnlp.studies.blocked import BlockedSolver
+from softnlp.studies.blocked_grid import Blocked
+from softnlp.studies.force_inversion import pressure_for_force
+from softnlp.studies.forward import checked_loads, pressure_table
+from softnlp.studies.multistart import other_equilibria
+from softnlp.studies.step import Run, Step
+from softnlp.studies.wall import Wall, checked_contact, standing_wall
+
+Array = NDArray[np.float64]
+
+__all__ = [
+    "WeightSensitivity",
+    "blocked_force",
+    "constrained_pose",
+    "force_against_offset",
+    "pressure_for_force",
+    "weight_sensitivity",
+]
+
+
+def blocked_force(
+    robot: Robot,
+    material: Material,
+    pressures: Any,
+    contact: ContactSettings = ContactSettings(),
+    *,
+    loads: Loads = Loads(),
+    coefficients: Coefficients = Coefficients(),
+    conventions: Conventions = REPRODUCTION,
+    numerics: Numerics = Numerics(),
+    times: Sequence[float] | None = None,
+    title: str = "",
+    progress: Callable[[int, Step], None] | None = None,
+    branches: int = 0,
+) -> Run:
+    """Solve the blocked tip force at each pressure in order, each followed from zero pressure or from the last.
+
+    Parameters
+    ----------
+    robot, material, pressures, loads, coefficients, conventions, numerics, times, title, progress
+        As `softnlp.forward`; k_c of `compliant` is `coefficients.chamber_reaction`.
+    contact
+        The wall, the tip's cap and the closure.
+    branches
+        How many other first guesses are tried at each step; other equilibria found are warnings of the step.
+
+    Returns
+    -------
+    Run
+        Its steps carry the blocked shape and `contact`, or a named status where there is none.
+
+    Raises
+    ------
+    RobotError
+        For a robot that is geometrically impossible.
+    InputError
+        For pressures, loads or a contact of the wrong shape, not finite, or out of range.
+
+    """
+    warnings = check(robot, allow=LOWERABLE_RULES)
+    P = pressure_table(pressures, robot.chamber_sets)
+    loads, contact = checked_loads(loads), checked_contact(contact)
+    if times is not None and len(times) != len(P):
+        raise InputError(f"expected one time a step, got {len(times)} times for {len(P)} steps", key="times")
+    if branches < 0:
+        raise InputError(f"expected a number that is not negative, got {branches}", key="branches")
+    solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
+    wall = standing_wall(solver.poses, solver.contact, P, loads)
+    steps: list[Step] = []
+    near: Blocked | None = None
+    for k, pressure in enumerate(P):
+        step, solved = solver.solve(pressure, loads, wall, near)
+        near = solved or near
+        if solved is not None and branches:
+            step = replace(step, warnings=(*step.warnings, *other_equilibria(solver, solved, branches)))
+        if times is not None:
+            step = replace(step, time=float(times[k]))
+        steps.append(step)
+        if progress is not None:
+            progress(k, step)
+    return Run(
+        "blocked-force", robot, material, coefficients, conventions, loads, tuple(steps), title, warnings, contact
+    )
+
+
+def force_against_offset(
+    robot: Robot,
+    material: Material,
+    pressure: Any,
+    offsets: Any,
+    contact: ContactSettings = ContactSettings(),
+    *,
+    loads: Loads = Loads(),
+    coefficients: Coefficients = Coefficients(),
+    conventions: Conventions = REPRODUCTION,
+    numerics: Numerics = Numerics(),
+    title: str = "",
+    progress: Callable[[int, Step], None] | None = None,
+) -> Run:
+    """Solve the characteristic curve: the blocked force at one pressure against where the wall stands.
+
+    pressure : (sets,) [Pa]. offsets : (steps,) h [m], along x; for a wall given by a point, how far it is moved
+    from it in the direction in which it pushes. Each is followed from the last while there is contact.
+    The rest is as for `blocked_force`; one step an offset.
+    """
+    warnings = check(robot, allow=LOWERABLE_RULES)
+    P = pressure_table(pressure, robot.chamber_sets)
+    loads, contact = checked_loads(loads), checked_contact(contact)
+    h = np.asarray(offsets, float)
+    if len(P) != 1:
+        raise InputError(f"expected one pressure a set, got {len(P)} steps", key="pressure")
+    if h.ndim != 1 or h.size == 0 or not np.all(np.isfinite(h)):
+        raise InputError("expected a list of finite offsets", key="offsets")
+    solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
+    given = contact.wall_point is not None
+    first = standing_wall(solver.poses, contact if given else replace(contact, offset=0.0), P, loads)
+    steps: list[Step] = []
+    near: Blocked | None = None
+    for k, offset in enumerate(h):
+        point = first.point + offset * first.normal if given else np.array([offset, 0.0, 0.0])
+        step, near = solver.solve(P[0], loads, Wall(point, first.normal), near)
+        steps.append(step)
+        if progress is not None:
+            progress(k, step)
+    return Run(
+        "blocked-force", robot, material, coefficients, conventions, loads, tuple(steps), title, warnings, contact
+    )
+
+
+def constrained_pose(
+    robot: Robot,
+    material: Material,
+    pressure: Any,
+    loads: Loads,
+    closure: str = "compliant",
+    *,
+    weights: ClosureWeights = ClosureWeights(),
+    coefficients: Coefficients = Coefficients(),
+    conventions: Conventions = REPRODUCTION,
+    numerics: Numerics = Numerics(),
+) -> Step:
+    """Solve the pose under dead loads whose pressurised chambers are held at the lengths they have without loads.
+
+    This is the paper's constrained loaded kinematics; the closure says how they are held, as for a wall. The step's
+    `contact` carries the chamber reactions and the shape without loads; its force and normal are 0.
+    """
+    check(robot, allow=LOWERABLE_RULES)
+    P = pressure_table(pressure, robot.chamber_sets)
+    if len(P) != 1:
+        raise InputError(f"expected one pressure a set, got {len(P)} steps", key="pressure")
+    contact = checked_contact(ContactSettings(closure=closure, weights=weights))  # type: ignore[arg-type]
+    solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact, wall=False)
+    return solver.solve(P[0], checked_loads(loads), None)[0]
+
+
+@dataclass(frozen=True)
+class WeightSensitivity:
+    """How the force of `weighted` answers to one weight: d ln F / d ln W at the weight used, in `unit`."""
+
+    weight: str
+    value: float
+    unit: str
+    elasticity: float
+
+
+def weight_sensitivity(
+    robot: Robot,
+    material: Material,
+    pressure: Any,
+    contact: ContactSettings,
+    *,
+    loads: Loads = Loads(),
+    coefficients: Coefficients = Coefficients(),
+    conventions: Conventions = REPRODUCTION,
+    numerics: Numerics = Numerics(),
+    factor: float = 1.1,
+) -> tuple[Step, tuple[WeightSensitivity, ...]]:
+    """Return the step of `weighted` and how its force changes with each weight that is given, by central differences.
+
+    Raises
+    ------
+    InputError
+        When the closure is not `weighted`, or no weight is given.
+    """
+    contact = checked_contact(contact)
+    names = {"force": "1/N", "moment": "1/(N m)", "length": "1/m", "position": "1/m"}
+    given = {name: value for name in names if (value := getattr(contact.weights, name)) is not None}
+    if contact.closure != "weighted":
+        raise InputError(f"expected closure = 'weighted', got {contact.closure!r}", key="closure")
+    if not given:
+        raise InputError("expected at least one weight", key="weights")
+
+    P, loads = pressure_table(pressure, robot.chamber_sets), checked_loads(loads)
+    solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
+    wall = standing_wall(solver.poses, solver.contact, P, loads)
+
+    def solved(weights: ClosureWeights) -> Step:
+        return solver.with_contact(replace(contact, weights=weights)).solve(P[-1], loads, wall)[0]
+
+    step = solved(contact.weights)
+    found = []
+    for name, value in given.items():
+        pair = [solved(replace(contact.weights, **{name: value * f})).contact for f in (factor, 1 / factor)]
+        forces = [c.force if c is not None and c.force > 0 else np.nan for c in pair]
+        slope = float(np.log(forces[0] / forces[1]) / (2 * np.log(factor)))
+        found.append(WeightSensitivity(name, value, names[name], slope))
+    return step, tuple(found)

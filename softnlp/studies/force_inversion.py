@@ -1,0 +1,168 @@
+"""Which pressure gives a blocked force: the free and the blocked shape in one problem that shares a free pressure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.contact_settings import ContactSettings
+from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.errors import InputError
+from softnlp.loadcase import load_case
+from softnlp.materials import Material
+from softnlp.numerics import Numerics
+from softnlp.problem import CompiledProblem, Constraint, compile_problem
+from softnlp.quantities import Model, quantity
+from softnlp.robot import LOWERABLE_RULES, Robot, check
+from softnlp.rod import Loads
+from softnlp.solver import Engine
+from softnlp.status import Status
+from softnlp.studies.blocked import BlockedSolver
+from softnlp.studies.blocked_grid import Blocked
+from softnlp.studies.forward import checked_loads
+from softnlp.studies.step import Step
+from softnlp.studies.wall import checked_contact, standing_wall
+from softnlp.transcription import method_named
+from softnlp.units import BAR
+
+Array = NDArray[np.float64]
+
+_STEPS = 6
+_SECANTS = 30
+
+
+def pressure_for_force(
+    robot: Robot,
+    material: Material,
+    sets: Sequence[int],
+    force: float,
+    contact: ContactSettings = ContactSettings(),
+    *,
+    highest: float = 1.5 * BAR,
+    loads: Loads = Loads(),
+    coefficients: Coefficients = Coefficients(),
+    conventions: Conventions = REPRODUCTION,
+    numerics: Numerics = Numerics(),
+) -> tuple[Array, Step]:
+    """Return the pressures (sets,) [Pa] that give a blocked force, and the step.
+
+    The pressure is the same in each of `sets` and 0 in others.
+
+    sets : counted from 0. force : [N], above 0. highest : the largest pressure allowed [Pa]. The branch from zero
+    pressure is followed until it passes the force; there both shapes are solved at once with the pressure free. Where
+    the force is not reached the step is `out_of_reach`, or says how the branch ended before, and the pressures are nan.
+
+    Raises
+    ------
+    InputError
+        For sets that the robot does not have, a force or a pressure that is not above 0.
+    """
+    check(robot, allow=LOWERABLE_RULES)
+    loads, contact = checked_loads(loads), checked_contact(contact)
+    chosen = sorted(set(sets))
+    if not chosen or any(k not in range(robot.chamber_sets) for k in chosen):
+        raise InputError(f"expected sets out of 0 to {robot.chamber_sets - 1}, got {list(sets)}", key="sets")
+    for key, value in (("force", force), ("highest", highest)):
+        if not (np.isfinite(value) and value > 0):
+            raise InputError(f"expected a number above 0, got {value}", key=key)
+    direction = np.zeros(robot.chamber_sets)
+    direction[chosen] = 1.0
+    solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
+    wall = standing_wall(solver.poses, solver.contact, (direction * highest)[None, :], loads)
+
+    def solve(P: float, near: Blocked | None) -> tuple[Step, Blocked | None, float]:
+        step, solved = solver.solve(direction * P, loads, wall, near)
+        return step, solved, step.contact.force if step.contact is not None else np.nan
+
+    low, low_force, near = 0.0, 0.0, None
+    for P in np.linspace(0, highest, _STEPS + 1):
+        step, solved, found = solve(float(P), near)
+        if not step.status.has_solution:
+            return np.full_like(direction, np.nan), step
+        if found >= force:
+            break
+        low, low_force, near = float(P), found, solved or near
+    else:
+        message = f"{Status.OUT_OF_REACH.advice}: {found:.4g} N at {highest / BAR:.4g} bar, {force:.4g} N wanted"
+        lost = Step(direction * highest, Status.OUT_OF_REACH, message, solve_time=step.solve_time)
+        return np.full_like(direction, np.nan), lost
+    exact = contact.closure == "weighted"
+    pressure, step, solved = _bracketed(
+        solve, (low, low_force), (float(P), found), force, near, 1e-10 if exact else 1e-3
+    )
+    if solved is not None and not exact:
+        refined = _jointly(solver, solved, direction, pressure, force)
+        if refined is not None and abs(refined - pressure) < 0.05 * pressure:
+            again, on_branch, _ = solve(refined, near)
+            if on_branch is not None:
+                pressure, step = refined, again
+    return direction * pressure, step
+
+
+def _bracketed(
+    solve: Callable[[float, Blocked | None], tuple[Step, Blocked | None, float]],
+    low: tuple[float, float],
+    high: tuple[float, float],
+    force: float,
+    near: Blocked | None,
+    accuracy: float,
+) -> tuple[float, Step, Blocked | None]:
+    """Return the pressure between two that gives the force, by the Illinois method, with its step and solution."""
+    (a, f_a), (b, f_b) = (low[0], low[1] - force), (high[0], high[1] - force)
+    for _ in range(_SECANTS):
+        P = b if f_b == f_a else (a * f_b - b * f_a) / (f_b - f_a)
+        step, solved, found = solve(P, near)
+        error = found - force
+        if not abs(error) > accuracy * force:
+            break
+        if error * f_b < 0:
+            a, f_a = b, f_b
+        else:
+            f_a /= 2
+        b, f_b = P, error
+    return P, step, solved
+
+
+def joint_problem(solver: BlockedSolver, intervals: int) -> CompiledProblem:
+    """Return the problem of the free and the blocked shape with shared geometry, material and a free pressure.
+
+    Free is "pressure scale", of the fixed "pressure"; the constraint is that the wall's force is "target force". The
+    blocked shape takes its free chamber lengths from the free shape's states.
+    """
+    method = method_named(solver.numerics.transcription, intervals)
+    declared = solver.functions.declared()
+    free_lengths = declared.pop("contact.free_lengths")
+    scale = quantity("pressure scale", "1", 1.0, lower=0.0)
+    target = quantity("target force", "N", 0.0)
+    shared = {**declared, "pressure": replace(declared["pressure"], symbol=scale.symbol * declared["pressure"].symbol)}
+    free = load_case("free", solver.poses.functions, shared, method)
+    lengths = replace(free_lengths, symbol=free.outputs["chamber_lengths"])
+    order = {name: lengths if name == "contact.free_lengths" else shared[name] for name in solver.functions.declared()}
+    blocked = load_case("blocked", solver.functions, order, method)
+    wanted = Constraint(
+        "blocked force",
+        blocked.outputs["tip_forces"][0] - target.symbol,
+        unit="N",
+        scale=blocked.force_unit,
+    )
+    return compile_problem(
+        [*declared.values(), scale, target], [free, blocked], free=["pressure scale"], constraints=[wanted]
+    )
+
+
+def _jointly(solver: BlockedSolver, near: Blocked, direction: Array, pressure: float, force: float) -> float | None:
+    """Solve both shapes with the pressure free, from a blocked solution nearby; return the pressure [Pa]."""
+    intervals = near.grid.intervals
+    problem = joint_problem(solver, intervals)
+    values = solver.values(near.situation, near.pressed, np.zeros(0))
+    values.pop("contact.free_lengths")
+    p = problem.pack({**values, "pressure": direction * pressure, "target force": force})
+    grid = solver.poses.grid(intervals)
+    free = grid.engine.solve(near.free.solution.p, solver.poses.transfer(near.free, grid))
+    solution = Engine(problem).solve(p, np.concatenate([[1.0], free.x, near.solution.x]))
+    if not solution.holds(solver.numerics.tolerance):
+        return None
+    return float(problem.free_values(solution.x)["pressure scale"][0]) * pressure

@@ -1,0 +1,323 @@
+"""Blocked tip force: closures against the witness, contact, work, inversion, folds, other walls."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from witness_blocked import Loads as WitnessLoads
+from witness_blocked import Wall as WitnessWall
+from witness_blocked import Weights, follow
+from witness_section import BODIES, published, section
+
+from softnlp import BAR, InputError, Loads, Numerics, material, robot
+from softnlp.condensed import CondensedSolver
+from softnlp.contact_settings import ClosureWeights, ContactSettings
+from softnlp.loadcase import load_case, rod_functions
+from softnlp.problem import compile_problem
+from softnlp.quantities import Model
+from softnlp.status import Status
+from softnlp.studies.blocked_force import (
+    blocked_force,
+    constrained_pose,
+    force_against_offset,
+    pressure_for_force,
+    weight_sensitivity,
+)
+from softnlp.studies.forward import forward
+from softnlp.studies.step import Run, Step
+from softnlp.tip import tip_conditions
+from softnlp.transcription import MultipleShooting
+
+ECOFLEX = material("Ecoflex 00-50")
+WITNESS_ECOFLEX = published("Ecoflex 00-50")
+D25L60 = robot("D25L60")
+NAMES = ("D25L60", "D25L40", "D20L60", "D20L40", "D15L60", "D15L40", "D10L60", "D10L40")
+EXPECTED = (1.21725, 1.38355, 0.79424, 0.86719, 0.33538, 0.36157, 0.10107, 0.10467)  # of the witness, 1.5 bar [N]
+SIX_STEPS = np.linspace(0, 1.5 * BAR, 6)[:, None] * np.array([1.0, 0.0, 0.0])
+DOWN = (0.0, 0.0, -9.80665)
+
+
+@cache
+def sequence(name: str, closure: str) -> Run:
+    return blocked_force(robot(name), ECOFLEX, SIX_STEPS, ContactSettings(closure=closure))  # type: ignore[arg-type]
+
+
+def one(bar: float, contact: ContactSettings = ContactSettings(), name: str = "D25L60", **more: object) -> Step:
+    return blocked_force(robot(name), ECOFLEX, [bar * BAR, 0, 0], contact, **more).steps[0]  # type: ignore[arg-type]
+
+
+def force(step: Step) -> float:
+    assert step.contact is not None, step.message
+    return step.contact.force
+
+
+@pytest.mark.parametrize("closure", ["free", "compliant"])
+@pytest.mark.parametrize("name", NAMES)
+def test_every_robot_is_solved_up_to_full_pressure(name: str, closure: str) -> None:
+    steps = sequence(name, closure).steps
+    assert [s.status for s in steps] == [Status.SOLVED] * 6
+    forces = [force(s) for s in steps]
+    assert forces[0] == 0
+    assert np.all(np.diff(forces) > 0)
+    assert max(s.residual for s in steps if s.residual is not None) < 1e-8
+    if closure == "compliant":
+        assert forces[-1] == pytest.approx(EXPECTED[NAMES.index(name)], abs=6e-6)
+
+
+def test_the_published_force_without_the_chamber_constraint() -> None:
+    assert 0.72 <= force(sequence("D25L60", "free").steps[-1]) <= 0.80
+
+
+@pytest.mark.parametrize(
+    ("name", "bar", "cap"),
+    [
+        ("D25L60", 0.9, 0.0),
+        ("D25L40", 1.1, 4e-3),
+        ("D20L60", 0.6, 0.0),
+        ("D20L40", 1.2, 3e-3),
+        ("D15L60", 0.8, 0.0),
+        ("D15L40", 1.0, 5e-3),
+        ("D10L60", 0.5, 2e-3),
+        ("D10L40", 1.3, 0.0),
+    ],
+)
+def test_closures_agree_with_the_witness(name: str, bar: float, cap: float) -> None:
+    for closure in ("free", "compliant", "rigid"):
+        ours = one(bar, ContactSettings(closure=closure, tip_cap=cap), name)  # type: ignore[arg-type]
+        exact = follow(
+            BODIES[name],
+            WITNESS_ECOFLEX,
+            [bar * BAR, 0, 0],
+            [1.0],
+            WitnessWall(closure, L_t=cap),
+            first_step=0.5,
+            tolerance=1e-6,
+        )[0]
+        assert ours.contact is not None
+        assert ours.contact.force == pytest.approx(exact.force, rel=1e-5)
+        np.testing.assert_allclose(ours.contact.chamber_reaction, exact.reaction, rtol=1e-5, atol=1e-8)
+
+
+@pytest.mark.parametrize("weights", [(1.0, 1.0, 1.0, None), (1.0, 1.0, 5.0, 1e3), (2.0, 100.0, 30.0, None)])
+def test_weighted_agrees_with_the_witness(weights: tuple[float, float, float, float | None]) -> None:
+    ours = one(0.9, ContactSettings(closure="weighted", weights=ClosureWeights(*weights))).contact
+    wall = WitnessWall("weighted", weights=Weights(*weights))
+    exact = follow(BODIES["D25L60"], WITNESS_ECOFLEX, [0.9 * BAR, 0, 0], [1.0], wall, first_step=0.5, tolerance=1e-6)[0]
+    assert ours is not None
+    assert ours.force == pytest.approx(exact.force, rel=1e-5)
+    left = {line.equation: line.value for line in ours.weighted}
+    assert left["e_m"] == pytest.approx(np.abs(exact.e_m).max(), rel=1e-4)
+    assert left["e_L"] == pytest.approx(abs(exact.e_L), rel=1e-4)
+    assert (left["e_h"] == 0) == (weights[3] is None)
+
+
+def test_loads_act_as_in_the_witness() -> None:
+    F, M, cap = (0.02, 0.0, -0.05), (0.0, 1e-3, 0.0), 4e-3
+    ours = one(0.9, ContactSettings(tip_cap=cap), loads=Loads(tip_force=F, tip_moment=M, gravity=DOWN))
+    exact = follow(
+        BODIES["D25L60"],
+        WITNESS_ECOFLEX,
+        [0.9 * BAR, 0, 0],
+        [1.0],
+        WitnessWall(L_t=cap),
+        loads=WitnessLoads(F, M, DOWN),
+        first_step=0.25,
+    )[0]
+    assert force(ours) == pytest.approx(exact.force, rel=1e-5)
+
+
+def test_the_wall_at_the_free_tip_carries_nothing() -> None:
+    tip = forward(D25L60, ECOFLEX, [1.2 * BAR, 0, 0]).steps[0].pose
+    assert tip is not None
+    for beyond in (-1e-8, 0.0, 1e-8):
+        step = one(1.2, ContactSettings(offset=float(tip.tip_position[0]) + beyond))
+        assert step.status.has_solution
+        assert force(step) < 1e-6
+
+
+def test_a_wall_out_of_reach_leaves_the_free_shape_alone() -> None:
+    step = one(0.6, ContactSettings(offset=-30e-3))
+    free = forward(D25L60, ECOFLEX, [0.6 * BAR, 0, 0]).steps[0].pose
+    assert step.status is Status.NO_CONTACT
+    assert force(step) == 0
+    assert step.pose is not None
+    assert free is not None
+    assert step.contact is not None
+    assert step.contact.gap > 0
+    np.testing.assert_allclose(step.pose.tip_position, free.tip_position, atol=1e-6 * 60e-3)
+
+
+def energy(step: Step) -> float:
+    """V of the rod by quadrature of its strains: elastic energy less the work of the pressure's moment [J].
+
+    With n = K v + F_P R e3 and m = R (K u) in Eq. (5), the equilibria without tip load are those of V, with density
+    1/2 (v - e3) K (v - e3) + 1/2 u K u - u . M_P, at a fixed position of the contact point.
+    """
+    assert step.pose is not None
+    shape = step.pose.shape
+    sec = section(BODIES["D25L60"], WITNESS_ECOFLEX, step.pressure)
+    v, u = shape.shear_extension - [0, 0, 1], shape.curvature
+    density = 0.5 * (v**2 @ [sec.GA, sec.GA, sec.EA]) + 0.5 * (u**2 @ [*sec.EI, sec.GJ]) - u @ sec.M_P
+    h = 1 / (len(density) - 1)
+    simpson = np.ones(len(density))
+    simpson[1:-1:2], simpson[2:-1:2] = 4, 2
+    return float(density @ simpson) * h / 3 * sec.L
+
+
+@pytest.mark.parametrize("cap", [0.0, 5e-3])
+def test_the_characteristic_curve_is_the_derivative_of_the_energy(cap: float) -> None:
+    # At constant pressure dead loads and pressure do no other work: dV/dh along the wall's normal is the wall's force.
+    contact = ContactSettings(closure="free", tip_cap=cap)
+    h = -10e-3 + np.array([-2, -1, 0, 1, 2]) * 1e-3
+    run = force_against_offset(D25L60, ECOFLEX, [1.2 * BAR, 0, 0], h, contact, numerics=Numerics(intervals=40))
+    V = np.array([energy(s) for s in run.steps])
+    slope = (8 * (V[3] - V[1]) - (V[4] - V[0])) / (12 * 1e-3)
+    assert slope == pytest.approx(force(run.steps[2]), rel=1e-5)
+
+
+def test_the_characteristic_curve_falls_to_the_free_tip() -> None:
+    h = np.array([0.0, -0.02, -0.04, -0.05])
+    run = force_against_offset(D25L60, ECOFLEX, [1.2 * BAR, 0, 0], h)
+    forces = [force(s) for s in run.steps]
+    assert np.all(np.diff(forces) < 0)
+    assert run.steps[-1].status is Status.NO_CONTACT
+    assert forces[1] == pytest.approx(force(one(1.2, ContactSettings(offset=-0.02))), rel=1e-5)
+
+
+@pytest.mark.parametrize("closure", ["free", "compliant", "rigid", "weighted"])
+def test_a_force_gives_back_its_pressure(closure: str) -> None:
+    contact = ContactSettings(closure=closure)  # type: ignore[arg-type]
+    P, step = pressure_for_force(D25L60, ECOFLEX, [0], force(one(0.777, contact)), contact)
+    assert step.status is Status.SOLVED
+    np.testing.assert_allclose(P, [0.777 * BAR, 0, 0], rtol=1e-6)
+
+
+def test_a_force_out_of_reach_says_so() -> None:
+    P, step = pressure_for_force(D25L60, ECOFLEX, [0], 5.0)
+    assert step.status is Status.OUT_OF_REACH
+    assert "1.217 N" in step.message
+    assert np.all(np.isnan(P))
+
+
+@pytest.mark.parametrize(("name", "bar"), [("D25L60", 1.47), ("D20L60", 1.30), ("D15L60", 1.40)])
+def test_rigid_chambers_fold(name: str, bar: float) -> None:
+    step = one(1.5, ContactSettings(closure="rigid"), name)
+    assert step.status is Status.FOLD
+    assert step.pose is None
+    last = float(step.message.split(" is at ")[1].split(",")[0])
+    assert last == pytest.approx(bar, abs=0.01)
+
+
+def test_a_wall_turned_with_the_pressures_changes_nothing() -> None:
+    angle = 2 * np.pi / 3
+    normal = (float(np.cos(angle)), float(np.sin(angle)), 0.0)
+    contact = ContactSettings(wall_point=(0.0, 0.0, 0.01), wall_normal=normal)
+    turned = blocked_force(D25L60, ECOFLEX, [0, BAR, 0], contact).steps[0]
+    straight = one(1.0)
+    assert force(turned) == pytest.approx(force(straight), rel=1e-9)
+    assert turned.pose is not None
+    assert straight.pose is not None
+    R = np.array([[normal[0], -normal[1], 0], [normal[1], normal[0], 0], [0, 0, 1]])
+    np.testing.assert_allclose(turned.pose.tip_position, R @ straight.pose.tip_position, atol=1e-10)
+
+
+def test_a_flipped_normal_is_the_same_wall() -> None:
+    forces = [
+        force(one(1.0, ContactSettings(wall_point=(-0.01, 0.0, 0.0), wall_normal=(sign, 0.0, 0.0))))
+        for sign in (1.0, -2.0)
+    ]
+    assert forces[0] == forces[1] == pytest.approx(force(one(1.0, ContactSettings(offset=-0.01))), rel=1e-9)
+
+
+def test_in_space_forces_balance() -> None:
+    step = blocked_force(D25L60, ECOFLEX, [BAR, 0.5 * BAR, 0], ContactSettings(closure="free")).steps[0]
+    assert step.pose is not None
+    assert step.contact is not None
+    shape = step.pose.shape
+    assert abs(step.pose.tip_position[0]) < 1e-9
+    # the wall is free of friction: what the base holds beside the pressure is along its normal
+    np.testing.assert_allclose(shape.force[0][:2], step.contact.force * step.contact.normal[:2], atol=1e-6)
+
+
+def test_planar_shapes_stay_planar_and_warn_where_they_may_slip() -> None:
+    steps = sequence("D15L60", "compliant").steps
+    assert all(s.pose is not None and np.all(s.pose.shape.position[:, 1] == 0) for s in steps)
+    told = [any("slip sideways" in w for w in s.warnings) for s in steps]
+    assert told[-1]
+    assert not told[1]
+
+
+def test_a_preloading_wall_and_loads_at_rest_are_reached() -> None:
+    pushed = one(0.5, ContactSettings(offset=5e-3))
+    assert force(pushed) > force(one(0.5))
+    loaded = one(0.5, loads=Loads(tip_force=(-0.05, 0.0, 0.0)))
+    assert force(loaded) > force(one(0.5))
+
+
+def test_the_condensed_equations_are_the_whole_ones() -> None:
+    functions = rod_functions(Model(D25L60, ECOFLEX), tip_conditions("rigid"))
+    method = MultipleShooting(4)
+    declared = functions.declared()
+    problem = compile_problem(list(declared.values()), [load_case("blocked", functions, declared, method)])
+    p = problem.pack({"pressure": [1e5, 2e4, 0], "contact.pressed": [1, 1, 1, 1, 0, 0], "contact.tip_cap": 3e-3})
+    rng = np.random.default_rng(3)
+    states = np.asarray(functions.arc(p[: functions.section.size1_in(0)], 1.2, np.linspace(0, 1, 5)[None, :]))
+    x = np.concatenate([[1.2], (states + 0.05 * rng.normal(size=states.shape)).T.ravel(), [0.3, 0.1]])
+    g = rng.normal(size=x.size)
+    dx = CondensedSolver(functions, method).solve(x, p, g)
+    np.testing.assert_allclose(np.asarray(problem.jacobian(x, p)) @ dx, -g, atol=1e-9)
+
+
+def test_collocation_gives_the_same_force() -> None:
+    step = one(0.6, numerics=Numerics(transcription="collocation"))
+    assert force(step) == pytest.approx(force(one(0.6)), rel=1e-5)
+
+
+def test_constrained_chambers_resist_a_tip_load() -> None:
+    loads = Loads(tip_force=(0.1, 0.0, -0.05))
+    free, compliant, rigid, weighted = (
+        constrained_pose(D25L60, ECOFLEX, [BAR, 0, 0], loads, closure)
+        for closure in ("free", "compliant", "rigid", "weighted")
+    )
+    bare = forward(D25L60, ECOFLEX, [BAR, 0, 0], loads=loads).steps[0].pose
+    errors = []
+    for step in (free, weighted, compliant, rigid):
+        assert step.contact is not None, step.message
+        errors.append(abs(step.contact.length_error))
+    assert errors[0] > max(errors[1:3])
+    assert errors[3] < 1e-12
+    assert free.pose is not None
+    assert bare is not None
+    np.testing.assert_allclose(free.pose.tip_position, bare.tip_position, atol=1e-7)
+
+
+def test_weights_matter_as_they_are_said_to() -> None:
+    contact = ContactSettings(closure="weighted", weights=ClosureWeights(1.0, 1.0, 5.0, None))
+    step, found = weight_sensitivity(D25L60, ECOFLEX, [0.9 * BAR, 0, 0], contact)
+    by_name = {s.weight: s.elasticity for s in found}
+    assert step.status is Status.SOLVED
+    # all weights scaled alike change nothing
+    assert sum(by_name.values()) == pytest.approx(0, abs=2e-3)
+    assert by_name["length"] > 0 > by_name["moment"]
+
+
+def test_other_starts_do_not_replace_the_followed_shape() -> None:
+    plain, checked = (one(0.5, branches=n) for n in (0, 20))
+    assert force(plain) == force(checked)
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"closure": "stiff"}, "closure"),
+        ({"tip_cap": -1e-3}, "tip_cap"),
+        ({"offset": float("nan")}, "offset"),
+        ({"wall_point": (0.0, 0.0, 0.0)}, "wall_normal"),
+        ({"wall_point": (0.0, 0.0, 0.0), "wall_normal": (0.0, 0.0, 0.0)}, "wall_normal"),
+    ],
+)
+def test_bad_settings_are_refused(change: dict[str, object], word: str) -> None:
+    with pytest.raises(InputError, match=word):
+        one(0.5, ContactSettings(**change))  # type: ignore[arg-type]
