@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 _LARGEST_STRETCH = 10.0
 _GRID = 1500
+_ZOOMS, _ZOOM_GRID = 10, 42  # an interval of the first grid is cut 41-fold ten times, which is past round-off
 
 
 @dataclass(frozen=True)
@@ -87,12 +88,12 @@ def stretch_on_branch(function: ca.Function, column: Array, pressures: Array) ->
     j = int(events[0])
     low, high = grid[max(j - 1, 0)], grid[min(j + 1, _GRID - 1)]
 
-    def bisect(beyond: Callable[[float], bool], a: float, b: float) -> float:
-        while b - a > 4e-16 * b:
-            middle = (a + b) / 2
-            if middle in (a, b):
-                break
-            a, b = (a, middle) if beyond(middle) else (middle, b)
+    def first_beyond(beyond: Callable[[Array], NDArray[np.bool_]], a: float, b: float) -> float:
+        """Return the first stretch in (a, b] where `beyond` holds, which it does at b, to round-off."""
+        for _ in range(_ZOOMS):
+            inside = np.linspace(a, b, _ZOOM_GRID)
+            k = int(np.argmax(np.append(beyond(inside[1:-1]), True))) + 1
+            a, b = float(inside[k - 1]), float(inside[k])
         return b
 
     if falls[j] and t[j] < 1.0 and k[j] > 0:
@@ -112,10 +113,10 @@ def stretch_on_branch(function: ca.Function, column: Array, pressures: Array) ->
         values = sample(np.array([stretch]))
         return float(values[0][0]), float(values[1][0])
 
-    root = bisect(lambda s: at(s)[0] >= 1.0, low, high) if at(high)[0] >= 1.0 else high
+    root = first_beyond(lambda s: sample(s)[0] >= 1.0, low, high) if at(high)[0] >= 1.0 else high
     if at(root)[1] > 0:
         return BranchPoint(Status.SOLVED, root, 1.0, "on the branch from zero pressure")
-    lost = bisect(lambda s: not at(s)[1] > 0, low, root)
+    lost = first_beyond(lambda s: ~(sample(s)[1] > 0), low, root)
     how = "meets a tangent stiffness that loses its sign"
     return _ended(Status.UNSTABLE_MATERIAL, lost, at(lost)[0], pressures, how)
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from softnlp.errors import InputError
-from softnlp.reading import choices
 from softnlp.runner_blocked import run_blocked
 from softnlp.scenario import Scenario
 from softnlp.studies.forward import forward
@@ -23,15 +21,9 @@ def run_scenario(scenario: Scenario, progress: Progress | None = None, branches:
     Raises
     ------
     InputError
-        For a study that can be described but not yet run.
+        For pressures or loads that the study refuses.
     """
-    if scenario.study not in _STUDIES:
-        raise InputError(
-            f"expected {choices(_STUDIES)}: this version reads {scenario.study!r} but does not run it yet",
-            source=str(scenario.path),
-            key="study",
-        )
-    return replace(_STUDIES[scenario.study](scenario, progress, branches), warnings=scenario.warnings)
+    return replace(STUDIES[scenario.study](scenario, progress, branches), warnings=scenario.warnings)
 
 
 def partial_run(scenario: Scenario, steps: Sequence[Step]) -> Run:
@@ -66,7 +58,7 @@ def _forward(scenario: Scenario, progress: Progress | None, branches: int) -> Ru
     )
 
 
-_STUDIES: Mapping[str, Callable[[Scenario, Progress | None, int], Run]] = {
+STUDIES: Mapping[str, Callable[[Scenario, Progress | None, int], Run]] = {
     "forward": _forward,
     "blocked-force": run_blocked,
 }

@@ -114,17 +114,17 @@ class Engine:
     def solve(self, p: Array, x_start: Array) -> Solution:
         """Solve at fixed values p from a first guess; judge the result by the residual, evaluated again."""
         x_start = np.asarray(x_start, dtype=float)
-        with self._lock:
-            start_residual = violation(self.problem, x_start, p)
-        if self.problem.is_square and not start_residual < _DIVERGED:
-            # A sparse factorisation of such numbers may take minutes, and Newton leads nowhere from them.
-            return Solution(x_start, p, start_residual, 0, "the first guess is out of all proportion")
         spent = 0
         if self.linear is not None:
             quick = self._newton(self.linear, p, x_start)
             if self.newton_only or quick.holds(self.tolerance * _SLACK):
                 return quick
             spent = quick.iterations
+        with self._lock:
+            start_residual = violation(self.problem, x_start, p)
+        if self.problem.is_square and not start_residual < _DIVERGED:
+            # A sparse factorisation of such numbers may take minutes and leads nowhere.
+            return Solution(x_start, p, start_residual, spent, "the first guess is out of all proportion")
         reference = self._ipopt(p, x_start)
         return replace(reference, iterations=reference.iterations + spent)
 
@@ -135,6 +135,8 @@ class Engine:
         with self._lock:
             g = np.asarray(problem.residual(x, p)).ravel()
             size = _size(g)
+            if not size < _DIVERGED:
+                return Solution(x, p, size, 0, "the first guess is out of all proportion")
             for k in range(_NEWTON_STEPS):
                 if size <= self.tolerance:
                     return Solution(x, p, size, k, "Newton converged")
