@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cases import pose
 from designs import GRAVITY, body_of, random_loads, random_material, random_pressures, random_robot, rubber_of, silicone
 from witness import NoConvergence, shoot
 from witness_section import Section, section
@@ -16,10 +17,12 @@ from softnlp.numerics import Numerics
 from softnlp.quantities import Model
 from softnlp.robot import ROBOTS, Robot
 from softnlp.rod import Loads
+from softnlp.stability import conjugate_points, transition_functions
 from softnlp.status import Status
 from softnlp.studies.forward import forward
 from softnlp.studies.statics import PoseSolver
 from softnlp.studies.step import Step
+from softnlp.transcription import MultipleShooting
 
 SOFT, FIRM = silicone("Ecoflex 00-10"), silicone("Ecoflex 00-50")
 GREENHILL = 7.8373  # rho A g L^3 / EI of a column that buckles under its weight
@@ -99,6 +102,34 @@ def test_a_column_buckles_under_a_tip_load_at_euler_s(pressure: float) -> None:
         return stands(solver.solve(P, Loads(tip_force=(0, 0, -factor * euler)))[0])
 
     assert critical(stable_at, 0.9, 1.1, 10) == pytest.approx(expected, abs=4e-4)
+
+
+@pytest.mark.parametrize("intervals", [20, 60])
+def test_the_index_counts_every_mode_of_a_straight_column(intervals: int) -> None:
+    # a round clamped-free column loses one mode in each plane at 1, 9, 25, ... times Euler's load
+    model = Model(replace(TALL, length=1.0), FIRM)
+    sec = at_rest(model.robot, FIRM)
+    euler = np.pi**2 / 4 * sec.EI[0] / sec.L**2
+    posed = pose(model, method=MultipleShooting(intervals))
+    transition, tip_variation = transition_functions(posed.functions.field)
+    for factor, expected in [
+        (-5, 0),
+        (0, 0),
+        (0.99, 0),
+        (1.01, 2),
+        (8.8, 2),
+        (9.2, 4),
+        (24, 4),
+        (26, 6),
+        (48, 6),
+        (50, 8),
+    ]:
+        solution = posed.solve({"tip_force": (0, 0, -factor * euler)})
+        assert solution.holds(1e-10)
+        nodes = solution.x[1:].reshape(-1, 18).T
+        assert np.abs(nodes[:2]).max() < 1e-12  # straight
+        constants = np.asarray(posed.problem.case_constants(solution.x, solution.p)).ravel()
+        assert conjugate_points(transition.map(intervals), tip_variation, nodes, constants) == expected, factor
 
 
 @pytest.mark.parametrize("seed", range(8))
