@@ -52,3 +52,9 @@ class ContactTask:
     offsets: tuple[float, ...] | None = None
     target_force: float | None = None
     constrained: bool = False
+
+    def step_count(self, pressures: int) -> int:
+        """Return how many steps the run has, for so many pressures of the scenario."""
+        if self.offsets is not None:
+            return len(self.offsets)
+        return 1 if self.target_force is not None else pressures

@@ -25,8 +25,9 @@ def run_blocked(scenario: Scenario, progress: Progress | None, branches: int = 0
     InputError
         For pressures or loads that the study refuses.
     """
-    contact, task = scenario.contact, scenario.contact_task or ContactTask()
+    contact, task = scenario.contact, scenario.task
     assert contact is not None
+    assert isinstance(task, ContactTask)
     model = (scenario.robot, scenario.material)
     settings: dict[str, Any] = {
         "coefficients": scenario.coefficients,

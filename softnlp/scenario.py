@@ -3,31 +3,39 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.contact_settings import ContactSettings, ContactTask
+from softnlp.contact_settings import ContactSettings
 from softnlp.conventions import COEFFICIENT_SETS, CONVENTIONS, Coefficients, Conventions
 from softnlp.errors import InputError, nearest
 from softnlp.materials import Material, material_from_table
 from softnlp.numerics import Numerics
-from softnlp.pressures import pressure_path
+from softnlp.pressures import PressurePath, pressure_path
 from softnlp.reading import LONGEST_NAME, one_line, read_text, shown
 from softnlp.robot import DIMENSIONS, ROBOTS, Robot, Violation, check, violations
 from softnlp.rod import Loads
 from softnlp.scenario_check import first_of, parse
 from softnlp.scenario_contact import contact_settings, contact_task
-from softnlp.scenario_schema import BlockedForceFile, ForwardFile, RobotTable
+from softnlp.scenario_schema import RobotTable, ScenarioFile
 from softnlp.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
+
+
+class Task(Protocol):
+    """What a study is asked beyond the pressures, as frozen data in SI units."""
+
+    def step_count(self, pressures: int) -> int:
+        """Return how many steps the run has, for so many pressures of the scenario."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +43,8 @@ class Scenario:
     """Everything that a scenario file asks for, in SI units.
 
     path : the file as it was named. text : its content. title : the file's stem when it gives none.
-    pressures : (steps, sets) gauge [Pa]. times : (steps,) [s], or None when the pressures have none.
-    contact, contact_task : of a blocked force, else None.
+    pressures : (steps, sets) gauge [Pa], no steps where the study has none. times : (steps,) [s], or None when the
+    pressures have none. contact : the wall, where there may be one, else None. task : what else the study is asked.
     warnings : rules of manufacture that the robot breaks with leave.
     """
 
@@ -53,16 +61,28 @@ class Scenario:
     times: Array | None
     numerics: Numerics
     contact: ContactSettings | None
-    contact_task: ContactTask | None
+    task: Task | None
     warnings: tuple[str, ...]
 
     @property
     def step_count(self) -> int:
         """How many steps its run has when none is left out."""
-        task = self.contact_task
-        if task is not None and task.offsets is not None:
-            return len(task.offsets)
-        return 1 if task is not None and task.target_force is not None else len(self.pressures)
+        return len(self.pressures) if self.task is None else self.task.step_count(len(self.pressures))
+
+
+class Read(NamedTuple):
+    """What the reader of a study's own tables may use.
+
+    file : the tables as checked. data : as they were parsed. steps : without rows where the study has no [pressure].
+    folder : where files that the scenario names are looked for.
+    """
+
+    file: Any
+    data: dict[str, Any]
+    robot: Robot
+    material: Material
+    steps: PressurePath
+    folder: Path
 
 
 def load_scenario(path: str | PathLike[str]) -> Scenario:
@@ -117,13 +137,14 @@ def _scenario(text: str, path: Path) -> Scenario:
     errors: list[InputError] = []
     made = _attempt(errors, "robot", lambda: _robot(file.robot))
     chosen = _attempt(errors, "material", lambda: material_from_table(data["material"], folder=path.parent))
-    steps = made and _attempt(
-        errors, "pressure", lambda: pressure_path(file.pressure, made[0].chamber_sets, path.parent)
-    )
+    steps = made and _attempt(errors, "pressure", lambda: _steps(file, made[0].chamber_sets, path.parent))
     contact = task = None
-    if isinstance(file, BlockedForceFile):
-        contact = _attempt(errors, "contact", lambda: contact_settings(file.contact))
-        task = steps and _attempt(errors, "contact", lambda: contact_task(file.contact, steps.pressures))
+    if (wall := getattr(file, "contact", None)) is not None:
+        contact = _attempt(errors, "contact", lambda: contact_settings(wall))
+    if file.study in TASKS and made is not None and chosen is not None and steps is not None:
+        table, read_task = TASKS[file.study]
+        given = Read(file, data, made[0], chosen, steps, path.parent)
+        task = _attempt(errors, table, lambda: read_task(given))
     if errors or made is None or chosen is None or steps is None:
         raise first_of(errors)
     robot, warnings = made
@@ -141,9 +162,15 @@ def _scenario(text: str, path: Path) -> Scenario:
         times=steps.times,
         numerics=Numerics(**dict(file.solver)),
         contact=contact,
-        contact_task=task or None,
+        task=task,
         warnings=warnings,
     )
+
+
+def _steps(file: ScenarioFile, sets: int, folder: Path) -> PressurePath:
+    """Return the pressures of a study that has them, else none."""
+    table = getattr(file, "pressure", None)
+    return PressurePath(np.zeros((0, sets)), None) if table is None else pressure_path(table, sets, folder)
 
 
 def _attempt(errors: list[InputError], table: str, build: Callable[[], T]) -> T | None:
@@ -216,7 +243,7 @@ def _dimensions(table: RobotTable) -> Robot:
     raise InputError("missing; expected a robot of the library, or every dimension in full", key="name")
 
 
-def _coefficients(file: ForwardFile) -> Coefficients:
+def _coefficients(file: ScenarioFile) -> Coefficients:
     """Take the coefficients of the named set, and the file's own where it gives them."""
     given = {
         "elongation": file.stiffening.elongation,
@@ -225,15 +252,25 @@ def _coefficients(file: ForwardFile) -> Coefficients:
         "inertia": file.corrections.inertia,
         "bore_fraction": file.corrections.bore_fraction,
     }
-    if isinstance(file, BlockedForceFile):
-        given["chamber_reaction"] = file.contact.chamber_reaction
+    if (wall := getattr(file, "contact", None)) is not None:
+        given["chamber_reaction"] = wall.chamber_reaction
     own: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
     return replace(COEFFICIENT_SETS[file.stiffening.set], **own)
 
 
-def _loads(file: ForwardFile) -> Loads:
+def _loads(file: ScenarioFile) -> Loads:
     """Return tip load and gravity."""
     f_x, f_y, f_z = file.tip_load.force_N
     m_x, m_y, m_z = (component * NEWTON_MILLIMETRE for component in file.tip_load.moment_Nmm)
     g_x, g_y, g_z = (component * STANDARD_GRAVITY for component in file.gravity.direction)
     return Loads(tip_force=(float(f_x), float(f_y), float(f_z)), tip_moment=(m_x, m_y, m_z), gravity=(g_x, g_y, g_z))
+
+
+def _contact_task(given: Read) -> Task:
+    return contact_task(given.file.contact, given.steps.pressures)
+
+
+TASKS: Mapping[str, tuple[str, Callable[[Read], Task]]] = {
+    "blocked-force": ("contact", _contact_task),
+}
+"""For each study with tables of its own: the table that its errors are about, and what reads them."""

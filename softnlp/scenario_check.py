@@ -10,12 +10,21 @@ from pydantic_core import ErrorDetails
 
 from softnlp.errors import InputError, nearest
 from softnlp.reading import choices, did_you_mean, one_line, shown
-from softnlp.scenario_schema import OTHER_TABLES, SCHEMAS, STUDIES, BlockedForceFile, ForwardFile
+from softnlp.scenario_schema import BlockedForceFile, ForwardFile, ScenarioFile
 
-_TABLES = (*(name for name in BlockedForceFile.model_fields if name not in ("title", "study")), *OTHER_TABLES)
+SCHEMAS: Mapping[str, type[ScenarioFile]] = {
+    "forward": ForwardFile,
+    "blocked-force": BlockedForceFile,
+}
+"""The studies that this version runs, and the file of each."""
+
+STUDIES = ("forward", "blocked-force", "workspace", "inverse", "identify", "design")
+
+_OTHER_TABLES = ("workspace", "target", "bounds")  # of studies in STUDIES that are not in SCHEMAS
+_TABLES = {name for schema in SCHEMAS.values() for name in schema.model_fields} - {"title", "study"} | {*_OTHER_TABLES}
 
 
-def parse(data: Mapping[str, Any]) -> ForwardFile:
+def parse(data: Mapping[str, Any]) -> ScenarioFile:
     """Return the tables of a scenario, checked one by one.
 
     Raises
@@ -51,7 +60,7 @@ def _study(data: Mapping[str, Any]) -> str:
     return study
 
 
-def _errors(schema: type[ForwardFile], details: list[ErrorDetails]) -> Iterator[InputError]:
+def _errors(schema: type[ScenarioFile], details: list[ErrorDetails]) -> Iterator[InputError]:
     """Yield an error of ours for each of pydantic's: unknown keys first, they explain missing ones."""
     meant = set()
     for detail in (d for d in details if d["type"] == "extra_forbidden"):
@@ -69,12 +78,12 @@ def _errors(schema: type[ForwardFile], details: list[ErrorDetails]) -> Iterator[
             yield _placed(detail, _message(schema, detail))
 
 
-def _study_of(schema: type[ForwardFile]) -> str:
+def _study_of(schema: type[ScenarioFile]) -> str:
     """Return the study of a schema."""
     return next(study for study, known in SCHEMAS.items() if known is schema)
 
 
-def _message(schema: type[ForwardFile], detail: ErrorDetails) -> str:
+def _message(schema: type[ScenarioFile], detail: ErrorDetails) -> str:
     """Say what was expected and what was found."""
     kind, value, limits = detail["type"], detail["input"], detail.get("ctx", {})
     if kind == "own":

@@ -217,8 +217,8 @@ class SolverTable(Table):
     tolerance: Annotated[float, Field(gt=0, le=1e-4)] = Numerics.tolerance
 
 
-class ForwardFile(Table):
-    """A whole scenario of `forward`."""
+class ScenarioFile(Table):
+    """What every scenario may hold; each study adds its own tables."""
 
     title: Label | None = None
     study: str
@@ -228,18 +228,16 @@ class ForwardFile(Table):
     corrections: CorrectionsTable = CorrectionsTable()
     gravity: GravityTable = GravityTable()
     tip_load: TipLoadTable = TipLoadTable()
-    pressure: PressureTable = Field(description="a table with one of sequence_bar, ramp, file")
     solver: SolverTable = SolverTable()
+
+
+class ForwardFile(ScenarioFile):
+    """A whole scenario of `forward`."""
+
+    pressure: PressureTable = Field(description="a table with one of sequence_bar, ramp, file")
 
 
 class BlockedForceFile(ForwardFile):
     """A whole scenario of `blocked-force`."""
 
     contact: ContactTable = ContactTable()
-
-
-SCHEMAS: Mapping[str, type[ForwardFile]] = {"forward": ForwardFile, "blocked-force": BlockedForceFile}
-"""The studies that this version runs, and the file of each."""
-
-STUDIES = ("forward", "blocked-force", "workspace", "inverse", "identify", "design")
-OTHER_TABLES = ("workspace", "target", "bounds")  # of studies in STUDIES that are not in SCHEMAS

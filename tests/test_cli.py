@@ -21,7 +21,7 @@ from softnlp.cli import console, main
 from softnlp.results import load_run
 from softnlp.robot import ROBOTS
 from softnlp.runner import STUDIES
-from softnlp.scenario_schema import SCHEMAS
+from softnlp.scenario_check import SCHEMAS
 
 PROGRAM = [sys.executable, "-m", "softnlp"]
 FILES = {"results.nc", "table.csv", "results.json", "versions.json", "figure.png", "scenario.toml"}

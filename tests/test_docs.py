@@ -24,7 +24,8 @@ from softnlp.conventions import COEFFICIENT_SETS, CONVENTIONS
 from softnlp.formula import FUNCTIONS
 from softnlp.laws import LAWS
 from softnlp.scenario import scenario_from_text
-from softnlp.scenario_schema import SCHEMAS, BlockedForceFile, OffsetRampTable, RampTable
+from softnlp.scenario_check import SCHEMAS
+from softnlp.scenario_schema import BlockedForceFile, OffsetRampTable, RampTable
 from softnlp.status import Status
 
 ROOT = Path(__file__).parents[1]

@@ -425,7 +425,7 @@ def test_closures(closure: str) -> None:
 
 def blocked_task(contact: str, pressure: str = PRESSURE) -> tuple[ContactTask | None, int]:
     found = read(scenario(top="study = 'blocked-force'\n", pressure=pressure, more=f"[contact]\n{contact}\n"))
-    return found.contact_task, found.step_count
+    return found.task, found.step_count
 
 
 def test_what_is_asked_of_the_wall() -> None:
@@ -439,7 +439,7 @@ def test_what_is_asked_of_the_wall() -> None:
     assert steps == 4
     assert task is not None
     assert task.offsets == pytest.approx((0, -0.01, -0.02, -0.03))
-    assert read(scenario()).contact_task is None
+    assert read(scenario()).task is None
 
 
 # --- the file itself -------------------------------------------------------------------------------------------------

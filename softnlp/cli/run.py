@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +15,9 @@ from softnlp.errors import InputError
 if TYPE_CHECKING:
     from softnlp.scenario import Scenario
     from softnlp.studies.step import Run, Step
+
+_COMMANDS: Mapping[str, str] = {}
+"""Studies whose result is no list of steps: which module of this package has the `run_study` that runs a scenario."""
 
 _TABLE_WIDTH = 100
 _SET_WIDTH = 12  # of what each chamber set beyond the third adds to the table
@@ -45,6 +50,8 @@ def run(scenario: Path, /, *, out: Path | None = None, json: bool = False, branc
 
     asked = load_scenario(scenario)
     _require_branches(asked, branches)
+    if asked.study in _COMMANDS:
+        return int(import_module(f"softnlp.cli.{_COMMANDS[asked.study]}").run_study(asked, out, json))
     folder = out if out is not None or json else Path("results") / scenario.stem
     if folder is not None:
         _require_writable(folder)
@@ -69,8 +76,8 @@ def _require_branches(asked: Scenario, branches: int) -> None:
         raise InputError(f"expected a number of at least 0, got {branches}", key="--branches")
     if not branches:
         return
-    task = asked.contact_task
-    if task is None:
+    task = asked.task
+    if asked.study != "blocked-force":
         raise InputError(
             f"expected only for study 'blocked-force'; {asked.path} is of study {asked.study!r}", key="--branches"
         )
