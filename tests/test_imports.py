@@ -32,6 +32,7 @@ LAYERS = (
     ),
     *("studies.free_shape", "studies.blocked_grid", "studies.blocked_step", "studies.blocked", "studies.multistart"),
     *("studies.force_inversion", "studies.*"),
+    *("workspace", "workspace.poses", "workspace.plan", "workspace.chunk", "workspace.*"),
     *("scenario_schema", "scenario_check", "pressures", "scenario_contact", "scenario"),
     *("runner_blocked", "runner", "results", "plots", "cli", "__main__"),
 )

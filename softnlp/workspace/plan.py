@@ -1,0 +1,139 @@
+"""What a sweep solves and in what order: a table of poses cut into chunks of neighbours."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.contact_settings import ContactSettings
+from softnlp.numerics import Numerics
+from softnlp.quantities import Model, Quantity, contact_quantities, quantities
+from softnlp.rod import Loads
+from softnlp.workspace.poses import row_type
+
+Array = NDArray[np.float64]
+
+CHUNK = 512
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The poses of a sweep.
+
+    model, loads, contact : what every pose shares; contact None sweeps poses without a wall.
+    varied : names of the quantities (`softnlp.quantities`) that differ between poses, "pressure" among them.
+    values : (poses, columns) of those, SI, a column an entry in the order of `varied`.
+    order : (poses,) numbers of the poses, neighbours next to each other. Each `chunk` of them is one piece of work,
+    whose result depends on nothing outside it.
+    times : (poses,) [s] of poses that were read with a time, or None.
+    """
+
+    model: Model
+    loads: Loads
+    numerics: Numerics
+    contact: ContactSettings | None
+    varied: tuple[str, ...]
+    values: Array
+    order: NDArray[np.int64]
+    chunk: int = CHUNK
+    times: Array | None = None
+
+    @property
+    def poses(self) -> int:
+        """The number of poses."""
+        return len(self.values)
+
+    @property
+    def chunks(self) -> int:
+        """The number of chunks."""
+        return -(-self.poses // self.chunk)
+
+    def members(self, chunk: int) -> NDArray[np.int64]:
+        """Return the numbers of the poses of a chunk, in its order."""
+        return self.order[chunk * self.chunk : (chunk + 1) * self.chunk]
+
+    @property
+    def row_type(self) -> np.dtype[Any]:
+        """The type of a row of the result."""
+        return row_type(self.model.robot.chambers, wall=self.contact is not None)
+
+    def declared(self) -> dict[str, Quantity]:
+        """Return every quantity of a pose by name, with the plan's loads as nominal values."""
+        declared = quantities(self.model)
+        for name in ("tip_force", "tip_moment", "gravity"):
+            declared[name] = replace(declared[name], nominal=np.asarray(getattr(self.loads, name), float))
+        return declared
+
+    def columns_of(self, name: str) -> slice:
+        """Return where a varied quantity stands in `values`."""
+        declared = self.declared()
+        start = 0
+        for other in self.varied:
+            size = declared[other].size
+            if other == name:
+                return slice(start, start + size)
+            start += size
+        raise KeyError(name)
+
+    def pressures(self) -> Array:
+        """Return the pressures of every pose (poses, sets) [Pa]."""
+        return self.values[:, self.columns_of("pressure")]
+
+    def full_values(self, numbers: NDArray[np.int64]) -> Array:
+        """Return every quantity of some poses as (quantities, poses), in the order of `softnlp.quantities`, SI."""
+        declared = self.declared()
+        table = np.repeat(np.concatenate([q.nominal for q in declared.values()])[:, None], numbers.size, axis=1)
+        start = 0
+        for name, q in declared.items():
+            if name in self.varied:
+                table[start : start + q.size] = self.values[numbers][:, self.columns_of(name)].T
+            start += q.size
+        return table
+
+    def fingerprint(self) -> str:
+        """Return a digest of everything that the result depends on."""
+        told: Mapping[str, Any] = {
+            "robot": self.model.robot.name,
+            "sets": [self.model.robot.chamber_sets, self.model.robot.chambers_per_set],
+            "material": self.model.material.name,
+            "law": self.model.material.law.functions.true_stress.serialize(),
+            "quantities": {name: [float(v).hex() for v in q.nominal] for name, q in self.declared().items()},
+            "wall": {n: [float(v).hex() for v in q.nominal] for n, q in contact_quantities(self.model).items()},
+            "conventions": asdict(self.model.conventions),
+            "numerics": asdict(self.numerics),
+            "contact": None if self.contact is None else asdict(self.contact),
+            "varied": list(self.varied),
+            "chunk": self.chunk,
+        }
+        digest = hashlib.sha256(json.dumps(told, sort_keys=True).encode())
+        for part in (self.values, self.order, *(() if self.times is None else (self.times,))):
+            digest.update(np.ascontiguousarray(part).tobytes())
+        return digest.hexdigest()
+
+
+def cells(values: Array, chunk: int) -> NDArray[np.int64]:
+    """Return an order in which every chunk is a compact cell: the table is halved across its widest column till it fits.
+
+    values : (poses, columns); columns are compared by the part of their whole range that a cell spans.
+    """
+    span = np.ptp(values, axis=0)
+    scaled = values / np.where(span > 0, span, 1.0)
+    done: list[NDArray[np.int64]] = []
+    waiting = [np.arange(len(values), dtype=np.int64)]
+    while waiting:
+        cell = waiting.pop()
+        if cell.size <= chunk:
+            done.append(cell)
+            continue
+        widest = int(np.argmax(np.ptp(scaled[cell], axis=0)))
+        ranked = cell[np.argsort(scaled[cell, widest], kind="stable")]
+        # a whole number of chunks on the left keeps every chunk but the last full
+        cut = chunk * max(1, round(cell.size / chunk / 2))
+        waiting += [ranked[cut:], ranked[:cut]]
+    return np.concatenate(done)
