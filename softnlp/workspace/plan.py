@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,14 @@ from numpy.typing import NDArray
 
 from softnlp.contact_settings import ContactSettings
 from softnlp.numerics import Numerics
-from softnlp.quantities import Model, Quantity, contact_quantities, quantities
+from softnlp.quantities import Model, contact_quantities, quantities
 from softnlp.rod import Loads
 from softnlp.workspace.poses import row_type
 
 Array = NDArray[np.float64]
 
-CHUNK = 512
+CHUNK = 1024
+LOADS = ("tip_force", "tip_moment", "gravity")
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,23 +65,17 @@ class Plan:
         """The type of a row of the result."""
         return row_type(self.model.robot.chambers, wall=self.contact is not None)
 
-    def declared(self) -> dict[str, Quantity]:
-        """Return every quantity of a pose by name, with the plan's loads as nominal values."""
-        declared = quantities(self.model)
-        for name in ("tip_force", "tip_moment", "gravity"):
-            declared[name] = replace(declared[name], nominal=np.asarray(getattr(self.loads, name), float))
-        return declared
+    @cached_property
+    def nominal(self) -> dict[str, Array]:
+        """Every quantity of a pose by name, in the order of `softnlp.quantities`, with the plan's loads [SI]."""
+        values = {name: q.nominal for name, q in quantities(self.model).items()}
+        return values | {name: np.asarray(getattr(self.loads, name), float) for name in LOADS}
 
     def columns_of(self, name: str) -> slice:
         """Return where a varied quantity stands in `values`."""
-        declared = self.declared()
-        start = 0
-        for other in self.varied:
-            size = declared[other].size
-            if other == name:
-                return slice(start, start + size)
-            start += size
-        raise KeyError(name)
+        before = self.varied[: self.varied.index(name)]
+        start = sum(self.nominal[other].size for other in before)
+        return slice(start, start + self.nominal[name].size)
 
     def pressures(self) -> Array:
         """Return the pressures of every pose (poses, sets) [Pa]."""
@@ -87,13 +83,13 @@ class Plan:
 
     def full_values(self, numbers: NDArray[np.int64]) -> Array:
         """Return every quantity of some poses as (quantities, poses), in the order of `softnlp.quantities`, SI."""
-        declared = self.declared()
-        table = np.repeat(np.concatenate([q.nominal for q in declared.values()])[:, None], numbers.size, axis=1)
+        table = np.repeat(np.concatenate(list(self.nominal.values()))[:, None], numbers.size, axis=1)
+        own = self.values[numbers].T
         start = 0
-        for name, q in declared.items():
+        for name, nominal in self.nominal.items():
             if name in self.varied:
-                table[start : start + q.size] = self.values[numbers][:, self.columns_of(name)].T
-            start += q.size
+                table[start : start + nominal.size] = own[self.columns_of(name)]
+            start += nominal.size
         return table
 
     def fingerprint(self) -> str:
@@ -103,7 +99,7 @@ class Plan:
             "sets": [self.model.robot.chamber_sets, self.model.robot.chambers_per_set],
             "material": self.model.material.name,
             "law": self.model.material.law.functions.true_stress.serialize(),
-            "quantities": {name: [float(v).hex() for v in q.nominal] for name, q in self.declared().items()},
+            "quantities": {name: [float(v).hex() for v in values] for name, values in self.nominal.items()},
             "wall": {n: [float(v).hex() for v in q.nominal] for n, q in contact_quantities(self.model).items()},
             "conventions": asdict(self.model.conventions),
             "numerics": asdict(self.numerics),
@@ -118,7 +114,7 @@ class Plan:
 
 
 def cells(values: Array, chunk: int) -> NDArray[np.int64]:
-    """Return an order in which every chunk is a compact cell: the table is halved across its widest column till it fits.
+    """Return an order in which every chunk is a compact cell: tables are halved across their widest column.
 
     values : (poses, columns); columns are compared by the part of their whole range that a cell spans.
     """

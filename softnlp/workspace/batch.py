@@ -1,0 +1,265 @@
+"""Newton's method on the base moments of many poses at once, judged by the equations of the problem itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.loadcase import RodFunctions
+from softnlp.rod import STATE_SIZE
+from softnlp.workspace.csource import WIDTH
+from softnlp.workspace.predictor import predicted
+from softnlp.workspace.reduced import MOMENT, POSITION, ROTATION, STATE
+from softnlp.workspace.shooting import Shooting
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_PASSES = 10
+_CONVERGED = 1e-11  # scaled residual of the tip
+_DIVERGED = 1e3
+_LEVELS = np.unique(np.round(6 * 2 ** (np.arange(60) / 6)).astype(np.int64))  # grid sizes, 12 % apart
+_MOST_INTERVALS = 400
+_SAMPLE = 16  # a pose in so many is solved first, and predicts the others
+_MARGIN = 1.05  # on the number of intervals
+_RICHARDSON = 16 / 15  # a fourth-order method's error over its change from halving every step
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Poses of one rod as the shooting takes them, (fields, poses), in the units of the load case.
+
+    data : constants, tip force and tip moment. bend : angle of the unloaded arc [rad].
+    """
+
+    data: Array
+    bend: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """What came of the poses of a batch; scaled units.
+
+    base : m(0) (3, poses). slopes : its derivative by the tip residual, for the next guess. tip : [p, R, n, m] (18,
+    poses). integrals : chamber lengths, bending angle, backbone length. residual : the largest of the tip equations and
+    of the full equations between nodes. error, turn_error : estimated error of the tip's position and rotation.
+    certain : whether no conjugate point and a positive definite tip show that the pose is stable.
+    """
+
+    base: Array
+    tip: Array
+    integrals: Array
+    residual: Array
+    error: Array
+    turn_error: Array
+    certain: Mask
+    intervals: NDArray[np.int64]
+    iterations: NDArray[np.int64]
+
+    @property
+    def refinement_error(self) -> Array:
+        """What refinement holds against the accuracy, as `softnlp.studies.statics` does."""
+        return np.maximum(self.error, self.turn_error / 5)
+
+
+class BatchSolver:
+    """Solves batches of one rod; accuracy is of the length, None for a given number of intervals."""
+
+    def __init__(self, functions: RodFunctions, shooting: Shooting, target: float, intervals: int | None) -> None:
+        self._constants = functions.field.size1_in(1)
+        self._shooting = shooting
+        self._target = target
+        self._intervals = intervals
+        self._chambers = functions.model.robot.chambers
+
+    def solve(self, batch: Batch, features: Array) -> Shot:
+        """Solve every pose, on a grid that meets the target; poses that did not converge keep a large residual.
+
+        features : (poses, columns) of what differs between the poses, for the predictor.
+        """
+        n = batch.data.shape[1]
+        arcs = np.zeros((3, n))
+        arcs[:2] = batch.data[6:8]
+        sample = np.arange(0, n, _SAMPLE)
+        first = self._shoot(batch, sample, arcs[:, sample], self._first_grids(batch.bend[sample]))
+        solved = first.residual < _CONVERGED * 1e3
+        good = sample[solved]
+        guess = arcs + predicted(features, good, first.base[:, solved] - arcs[:, good])
+        grids = self._first_grids(batch.bend)
+        if self._intervals is None and good.size:
+            # RK4's error is C / K^4; log C is what varies smoothly
+            constant = np.log(first.refinement_error[solved] * first.intervals[solved].astype(float) ** 4 + 1e-300)
+            expected = np.exp(predicted(features, good, constant[None, :])[0])
+            grids = _level(_MARGIN * (expected / self._target) ** 0.25)
+        shot = self._shoot(batch, np.arange(n), guess, grids)
+        if self._intervals is not None:
+            return shot
+        for _ in range(4):
+            error = shot.refinement_error
+            coarse = np.flatnonzero((error > self._target) & (shot.intervals < _MOST_INTERVALS) & np.isfinite(error))
+            if coarse.size == 0:
+                break
+            wanted = _MARGIN * shot.intervals[coarse] * (error[coarse] / self._target) ** 0.25
+            again = self._shoot(batch, coarse, shot.base[:, coarse], _level(np.maximum(wanted, shot.intervals[coarse])))
+            shot = _merged(shot, coarse, again)
+        return shot
+
+    def _first_grids(self, bend: Array) -> NDArray[np.int64]:
+        """Return the number of intervals of each pose, as far as its unloaded bend tells."""
+        if self._intervals is not None:
+            return np.full(bend.size, self._intervals, np.int64)
+        return _level(np.maximum(10.0, 6 * bend))
+
+    def _shoot(self, batch: Batch, poses: NDArray[np.intp], guess: Array, intervals: NDArray[np.int64]) -> Shot:
+        """Solve some poses on given grids."""
+        slots, counts = _groups(intervals)
+        data, base = batch.data[:, poses][:, slots], guess[:, slots].copy()
+        width = slots.size
+        state = np.zeros((4 * STATE + 1, width))
+        system = np.zeros((3, 3, width))
+        residual, passes = np.full(width, np.inf), np.zeros(width, np.int64)
+        active = np.ones(width, bool)
+        for _ in range(_PASSES):
+            groups = np.flatnonzero(active.reshape(-1, WIDTH).any(axis=1))
+            chosen = (groups[:, None] * WIDTH + np.arange(WIDTH)).ravel()
+            reached = self._shooting.run("directions", counts[groups], data[:, chosen], _start(base[:, chosen]))
+            off, J = self._tip(reached, data[:, chosen])
+            state[:, chosen], system[..., chosen], residual[chosen] = reached, J, np.abs(off).max(axis=0)
+            passes[chosen] += active[chosen]
+            active &= (residual > _CONVERGED) & (residual < _DIVERGED)  # nan is neither
+            if not active.any():
+                break
+            moving = active[chosen]
+            change = _solved(J[..., moving], -off[:, moving])
+            base[:, chosen[moving]] += change
+        shot = self._judged(data, base, state, system, residual, counts, passes)
+        back = np.empty(poses.size, np.intp)
+        back[slots] = np.arange(width)  # of the copies that fill a group, the last
+        return _chosen(shot, back)
+
+    def _tip(self, reached: Array, data: Array) -> tuple[Array, Array]:
+        """Return the tip's moment residual (3, poses) and its derivative by m(0) (3, 3, poses)."""
+        M_x, M_y, moment = data[6], data[7], data[self._constants + 3 :]
+        R, m = reached[ROTATION], reached[MOMENT]
+        off = m - moment - R[0:3] * M_x - R[3:6] * M_y
+        V = reached[STATE : 4 * STATE].reshape(3, STATE, -1)
+        J = V[:, MOMENT] - V[:, ROTATION][:, 0:3] * M_x - V[:, ROTATION][:, 3:6] * M_y
+        return off, J.transpose(1, 0, 2)
+
+    def _judged(
+        self,
+        data: Array,
+        base: Array,
+        state: Array,
+        system: Array,
+        residual: Array,
+        counts: NDArray[np.int64],
+        passes: NDArray[np.int64],
+    ) -> Shot:
+        """Evaluate the full equations, the discretisation error and the stability of converged base moments."""
+        width = base.shape[1]
+        start = np.zeros((self._chambers + STATE + 3, width))
+        start[:STATE] = _start(base)[:STATE]
+        checked = self._shooting.run("check", counts, data, start)
+        ends = self._shooting.apply("ends", np.vstack([checked[:STATE], data]))
+        tip, off = ends[:STATE_SIZE], ends[STATE_SIZE:]
+        residual = np.maximum(residual, np.maximum(checked[STATE], np.abs(off).max(axis=0)))
+
+        fine = self._shooting.run("value", 2 * counts, data, _start(base)[:STATE])
+        tangents = state[STATE : 4 * STATE].reshape(3, STATE, -1)
+        moved = np.zeros((4 * STATE + 1, width))
+        moved[:STATE] = fine
+        with np.errstate(invalid="ignore", over="ignore"):
+            correction = _solved(system, -self._tip(moved, data)[0])
+            change = fine - state[:STATE] + np.einsum("jfn,jn->fn", tangents, correction)
+            U = _turns(state[ROTATION], tangents[:, ROTATION])
+            form = np.einsum("kin,kjn->ijn", U, system)
+            certain = (state[4 * STATE] > 0) & (_smallest_minor(form + form.transpose(1, 0, 2)) > 0)
+        return Shot(
+            base=base,
+            tip=tip,
+            integrals=checked[STATE + 1 :],
+            residual=residual,
+            error=_RICHARDSON * np.sqrt((change[POSITION] ** 2).sum(axis=0)),
+            turn_error=_RICHARDSON * np.sqrt((change[ROTATION] ** 2).sum(axis=0) / 2),
+            certain=certain,
+            intervals=np.repeat(counts, WIDTH),
+            iterations=passes,
+        )
+
+
+def _level(wanted: Array) -> NDArray[np.int64]:
+    """Return the next grid size of a list, so that many poses share one."""
+    capped = np.minimum(np.where(np.isfinite(wanted), wanted, _LEVELS[0]), _MOST_INTERVALS)
+    return _LEVELS[np.searchsorted(_LEVELS, capped)]
+
+
+def _groups(intervals: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.int64]]:
+    """Return which pose stands in each slot of groups of equal grids, and the grid of each group."""
+    slots, counts = [], []
+    for K in np.unique(intervals):
+        poses = np.flatnonzero(intervals == K)
+        groups = -(-poses.size // WIDTH)
+        slots.append(np.concatenate([poses, np.full(groups * WIDTH - poses.size, poses[-1])]))
+        counts.append(np.full(groups, K))
+    return np.concatenate(slots), np.concatenate(counts)
+
+
+def _start(base: Array) -> Array:
+    """Return the state at the base for m(0), with its derivatives by m(0)."""
+    state = np.zeros((4 * STATE + 1, base.shape[1]))
+    state[[3, 7, 11]] = 1.0
+    state[MOMENT] = base
+    for j in range(3):
+        state[STATE * (j + 1) + MOMENT.start + j] = 1.0
+    state[4 * STATE] = np.inf
+    return state
+
+
+def _solved(J: Array, right: Array) -> Array:
+    """Return x with J x = right for many 3x3 systems, (3, poses), by Cramer's rule; not finite where singular."""
+    a, b, c = J[:, 0], J[:, 1], J[:, 2]
+    normal = np.cross(b, c, axis=0)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        inverse = 1.0 / (a * normal).sum(axis=0)
+        x = np.stack(
+            [
+                (right * normal).sum(axis=0) * inverse,
+                (right * np.cross(c, a, axis=0)).sum(axis=0) * inverse,
+                (right * np.cross(a, b, axis=0)).sum(axis=0) * inverse,
+            ]
+        )
+    return x
+
+
+def _turns(R: Array, V: Array) -> Array:
+    """Return the world rotation vectors by each direction, (3, direction, poses), from dR (direction, 9, poses)."""
+    R_ = R.reshape(3, 3, -1)  # column, row
+    W = np.einsum("jcan,cbn->jabn", V.reshape(3, 3, 3, -1), R_)
+    return np.stack([W[:, 2, 1] - W[:, 1, 2], W[:, 0, 2] - W[:, 2, 0], W[:, 1, 0] - W[:, 0, 1]])
+
+
+def _smallest_minor(S: Array) -> Array:
+    """Return the least leading minor of symmetric matrices (3, 3, poses)."""
+    second = S[0, 0] * S[1, 1] - S[0, 1] ** 2
+    third = (S[0] * np.cross(S[1], S[2], axis=0)).sum(axis=0)
+    least: Array = np.minimum(S[0, 0], np.minimum(second, third))
+    return least
+
+
+def _chosen(shot: Shot, slots: NDArray[np.intp]) -> Shot:
+    """Return some poses of a shot."""
+    return Shot(**{name: np.take(getattr(shot, name), slots, axis=-1) for name in Shot.__dataclass_fields__})
+
+
+def _merged(shot: Shot, where: NDArray[np.intp], other: Shot) -> Shot:
+    """Return a shot with the poses `where` replaced; iterations add up."""
+    merged = {}
+    for name in Shot.__dataclass_fields__:
+        values = getattr(shot, name).copy()
+        new = getattr(other, name)
+        values[..., where] = new + values[..., where] if name == "iterations" else new
+        merged[name] = values
+    return Shot(**merged)

@@ -1,0 +1,132 @@
+"""The rod under known dead loads with the base moment as its only unknown: single shooting over many poses at once.
+
+Without contact the internal force is known in closed form, n(s) = F_P R e3 + F_e + f_e (L - s), which turns Eq. (2)
+for n into an identity. A Runge-Kutta step is linear in the rates, so it keeps the identity to round-off: nodes found
+with three unknowns solve the multiple-shooting equations of all eighteen states. They are judged by those.
+
+States are in the units of `softnlp.loadcase`. A step is a function (state, data, s, h) -> state a step h further, where
+data stacks the constants c of the load case and the scaled tip force and moment.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from softnlp import rod
+from softnlp.loadcase import RodFunctions, unpack_section
+from softnlp.transcription import RK4, rk_step
+
+POSITION, ROTATION, MOMENT = slice(0, 3), slice(3, 12), slice(12, 15)
+STATE = 15
+_TURNING = slice(3, 15)  # rotation and moment; nothing depends on the position
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedRod:
+    """The steps of a rod under dead loads; N chambers.
+
+    value : state [p, R, m] (15). directions : [p, R, m, d/dm(0) of each (15 x 3), certainty] (61); certainty is the
+    least leading minor so far of the symmetric part of d(rotation)/dm(0): while it is positive there is no conjugate
+    point. check : [p, R, m, gap, chamber lengths (N), bending angle, backbone length]; gap is the largest so far of the
+    full equations between two nodes.
+    ends : [state, data] -> [the state p, R, n, m at the tip (18), its six residuals].
+    data_size : entries of data.
+    """
+
+    value: ca.Function
+    directions: ca.Function
+    check: ca.Function
+    ends: ca.Function
+    data_size: int
+
+
+def reduced_rod(functions: RodFunctions) -> ReducedRod:
+    """Build the steps from the field of a load case with dead loads."""
+    nc = functions.field.size1_in(1)
+    data, s, h = ca.SX.sym("data", nc + 6), ca.SX.sym("s"), ca.SX.sym("h")
+    c, force, moment = data[:nc], data[nc : nc + 3], data[nc + 3 :]
+    section = unpack_section(c)
+    L = c[len(rod.RodSection._fields)]
+    weight = L * ca.vertcat(section.load_x, section.load_y, section.load_z)
+
+    def full(state: Any, at: Any) -> Any:
+        """Return [p, R, n, m] with the force in closed form."""
+        R = ca.reshape(state[ROTATION], 3, 3)
+        n = force + weight * (1 - at) + section.pressure_force * R[:, 2]
+        return ca.vertcat(state[:12], n, state[MOMENT])
+
+    def rates(state: Any, at: Any) -> Any:
+        every = functions.field(full(state, at), c)
+        return ca.vertcat(every[:12], every[15:18])
+
+    def advance(state: Any) -> Any:
+        k: list[Any] = []
+        for row in RK4.a:
+            moved = state + h * sum((a * k_j for a, k_j in zip(row, k, strict=True) if a), ca.SX.zeros(STATE))
+            k.append(rates(moved, s + h * sum(row)))
+        return state + h * sum((b * k_j for b, k_j in zip(RK4.b, k, strict=True)), ca.SX.zeros(STATE))
+
+    state = ca.SX.sym("state", STATE)
+    reached = advance(state)
+    return ReducedRod(
+        value=ca.Function("value", [state, data, s, h], [reached], {"cse": True}),
+        directions=_directions(state, reached, [data, s, h]),
+        check=_check(functions, full, state, reached, [data, s, h]),
+        ends=ca.Function(
+            "ends",
+            [ca.vertcat(state, data)],
+            [ca.vertcat(full(state, 1), rod.tip_balance(full(state, 1), section, force, moment))],
+            {"cse": True},
+        ),
+        data_size=nc + 6,
+    )
+
+
+def _directions(state: Any, reached: Any, given: list[Any]) -> ca.Function:
+    """Return the step with the derivatives by m(0) beside the state."""
+    V, worst = ca.SX.sym("V", STATE, 3), ca.SX.sym("certainty")
+    moved = ca.jtimes(reached, state, V)
+    R = ca.reshape(reached[ROTATION], 3, 3)
+    turns = []
+    for j in range(3):
+        W = ca.reshape(moved[ROTATION, j], 3, 3) @ R.T
+        turns.append(ca.vertcat(W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]))
+    U = ca.horzcat(*turns)
+    certainty = ca.fmin(worst, smallest_minor(U + U.T))
+    before = ca.vertcat(state, ca.vec(V), worst)
+    after = ca.vertcat(reached, ca.vec(moved), certainty)
+    return ca.Function("directions", [before, *given], [after], {"cse": True})
+
+
+def smallest_minor(S: Any) -> Any:
+    """Return the least leading minor of a symmetric 3x3 matrix: positive where it is positive definite."""
+    second = S[0, 0] * S[1, 1] - S[0, 1] * S[1, 0]
+    third = (
+        S[0, 0] * (S[1, 1] * S[2, 2] - S[1, 2] * S[2, 1])
+        - S[0, 1] * (S[1, 0] * S[2, 2] - S[1, 2] * S[2, 0])
+        + S[0, 2] * (S[1, 0] * S[2, 1] - S[1, 1] * S[2, 0])
+    )
+    return ca.fmin(S[0, 0], ca.fmin(second, third))
+
+
+def _check(functions: RodFunctions, full: Any, state: Any, reached: Any, given: list[Any]) -> ca.Function:
+    """Return the step with the full equations' gap and the integrals along the rod beside the state."""
+    data, s, h = given
+    c = data[: functions.field.size1_in(1)]
+    x = full(state, s)
+    gap = ca.norm_inf(rk_step(functions.field, RK4)(x, c, h) - full(reached, s + h))
+    # The quadrature of the transcription: its stages are those of the step.
+    k: list[Any] = []
+    rates: list[Any] = []
+    for row in RK4.a:
+        stage = x + h * sum((a * k_j for a, k_j in zip(row, k, strict=True) if a), ca.SX.zeros(rod.STATE_SIZE))
+        k.append(functions.field(stage, c))
+        rates.append(functions.lengths(stage, c))
+    gained = h * sum((b * r for b, r in zip(RK4.b, rates, strict=True)), ca.SX.zeros(rates[0].numel()))
+    worst, integrals = ca.SX.sym("gap"), ca.SX.sym("integrals", rates[0].numel())
+    before = ca.vertcat(state, worst, integrals)
+    after = ca.vertcat(reached, ca.fmax(worst, gap), integrals + gained)
+    return ca.Function("check", [before, *given], [after], {"cse": True})

@@ -1,0 +1,114 @@
+"""The stretch of many poses at once, where the branch from zero pressure is plain to see.
+
+Every chamber has the same bore, so the balance of Eq. (10) depends on the sum of the pressures alone, and solved for
+that sum it is a curve over the stretch. Up to the first stretch where the curve turns or the unpressurised section
+loses a stiffness (pressure only adds to them) a root is on the branch; beyond it `softnlp.branch` decides.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.branch import branch_function
+from softnlp.loadcase import RodFunctions
+from softnlp.units import BAR
+from softnlp.workspace.shooting import Shooting
+
+Array = NDArray[np.float64]
+
+_LARGEST = {True: 10.0, False: 3.0}
+_SAMPLES = {True: 1800, False: 100}  # of a curve that all poses share, and of a pose's own
+_NEWTON_STEPS = 8
+
+
+def stretch_maps(functions: RodFunctions) -> dict[str, ca.Function]:
+    """Return the maps of [every quantity, stretch] that `Stretches` needs, and the section itself.
+
+    branch : rows of `softnlp.branch.branch_function`. balance : the scaled imbalance and its slope. section : the
+    constants of the load case, the imbalance, the units of length and force.
+    """
+    size = functions.section.size1_in(0)
+    column, stretch = ca.SX.sym("column", size), ca.SX.sym("stretch")
+    given = ca.vertcat(column, stretch)
+    constants, balance, units = functions.section(column, stretch)
+    found = {
+        "branch": branch_function(functions.model)(column, stretch),
+        "balance": ca.vertcat(balance, ca.jacobian(balance, stretch)),
+        "section": ca.vertcat(constants, balance, units),
+    }
+    return {name: ca.Function(name, [given], [ca.densify(rows)], {"cse": True}) for name, rows in found.items()}
+
+
+class Stretches:
+    """Finds stretches of poses given as columns of every quantity (see `softnlp.quantities`), SI.
+
+    shared : whether the poses differ in pressure and loads only, so that one curve serves all.
+    """
+
+    def __init__(self, functions: RodFunctions, shooting: Shooting, *, shared: bool) -> None:
+        self._shooting = shooting
+        model = functions.model
+        self._shared = shared
+        self._sets = model.robot.chamber_sets
+        self._stiffens = min(model.coefficients.elongation, model.coefficients.bending) >= 0
+        self._grid = np.linspace(1.0, _LARGEST[shared], _SAMPLES[shared])
+        self._curve: tuple[Array, Array] | None = None
+
+    def find(self, columns: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the stretch of each pose, and whether it is on the branch for certain; NaN where it is not."""
+        n = columns.shape[1]
+        total = columns[: self._sets].sum(axis=0)
+        stretch = np.full(n, np.nan)
+        if not self._stiffens:
+            return stretch, np.zeros(n, bool)
+        if self._shared:
+            if self._curve is None:
+                sums, safe = self._sampled(columns[:, :1])
+                self._curve = sums[0, : safe[0]], self._grid[: safe[0]]
+            sums, grid = self._curve
+            start = np.interp(total, sums, grid, right=np.nan)
+        else:
+            sums, safe = self._sampled(columns)
+            beyond = np.arange(self._grid.size) >= safe[:, None]
+            above = np.argmax((sums >= total[:, None]) | beyond, axis=1)
+            inside = above < safe
+            k = np.clip(above, 1, None)
+            poses = np.arange(n)
+            low, high = sums[poses, k - 1], sums[poses, k]
+            part = np.where(inside, (total - low) / (high - low), np.nan)
+            start = self._grid[k - 1] + part * (self._grid[k] - self._grid[k - 1])
+        known = np.isfinite(start)
+        known[known] = self._polish(columns[:, known], start, known)
+        stretch[known] = start[known]
+        stretch[known & (total == 0)] = 1.0
+        return stretch, known
+
+    def _sampled(self, columns: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Return the sum of pressures on the grid of stretches (poses, samples), and how many samples are safe."""
+        n, samples = columns.shape[1], self._grid.size
+        unit = columns.copy()
+        unit[: self._sets] = 0.0
+        unit[0] = BAR
+        every = np.vstack([np.repeat(unit, samples, axis=1), np.tile(self._grid, n)])
+        rows = self._shooting.apply("branch", every).reshape(-1, n, samples)
+        driven = rows[1] > 0
+        sums = np.where(driven, rows[0] / np.where(driven, rows[1], 1.0), np.nan) * BAR
+        sums[:, 0] = 0.0
+        good = np.isfinite(sums) & np.all(rows[2:6] > 0, axis=0)
+        good[:, 1:] &= np.diff(sums, axis=1) > 0
+        return sums, np.where(good.all(axis=1), samples, np.argmin(good, axis=1))
+
+    def _polish(self, columns: Array, start: Array, known: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Take Newton steps in place on `start[known]`; return which of them converged on a rising curve."""
+        found = start[known]
+        for _ in range(_NEWTON_STEPS):
+            balance, slope = self._shooting.apply("balance", np.vstack([columns, found]))
+            change = -balance / slope
+            found = found + change
+            if not np.any(np.abs(change) > 1e-14):
+                break
+        start[known] = found
+        done: NDArray[np.bool_] = np.abs(change) <= 1e-12
+        return done
