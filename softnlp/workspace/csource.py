@@ -106,7 +106,7 @@ class Kernels:
 
 
 def c_source(kernels: Kernels) -> str | None:
-    """Return C with shoot_NAME(poses, intervals, data, state) for each step, apply_NAME(poses, given, found) for each map.
+    """Return C with shoot_NAME(poses, intervals, data, state) for steps and apply_NAME(poses, given, found) for maps.
 
     poses is a multiple of `WIDTH`, intervals has an entry for each group of them, arrays are (fields, poses).
     None where a function holds an operation that has no translation.

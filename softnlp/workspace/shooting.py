@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from softnlp.workspace.compiled import library
 from softnlp.workspace.csource import WIDTH, Kernels, c_source
+from softnlp.workspace.interpreted import Interpreted, padded
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
-
-_COLUMNS = 256  # poses to a call of an interpreted step
 
 
 class Shooting(Protocol):
@@ -51,49 +50,11 @@ class Compiled:
     def apply(self, name: str, given: Array) -> Array:
         """Return a map's columns, see `Shooting`."""
         poses = given.shape[1]
-        padded = np.ascontiguousarray(given if poses % WIDTH == 0 else _padded(given, -poses % WIDTH))
-        found = np.empty((self._rows[name], padded.shape[1]))
-        pointers = [ctypes.c_void_p(array.ctypes.data) for array in (padded, found)]
-        getattr(self._code, f"apply_{name}")(ctypes.c_longlong(padded.shape[1]), *pointers)
+        whole = np.ascontiguousarray(padded(given, -poses % WIDTH))
+        found = np.empty((self._rows[name], whole.shape[1]))
+        pointers = [ctypes.c_void_p(array.ctypes.data) for array in (whole, found)]
+        getattr(self._code, f"apply_{name}")(ctypes.c_longlong(whole.shape[1]), *pointers)
         return found[:, :poses]
-
-
-class Interpreted:
-    """Kernels run by CasADi, a block of poses at a time."""
-
-    def __init__(self, kernels: Kernels) -> None:
-        self._steps = {name: step.map(_COLUMNS) for name, step in kernels.steps.items()}
-        self._maps = {name: function.map(_COLUMNS) for name, function in kernels.maps.items()}
-
-    def run(self, step: str, intervals: Counts, data: Array, state: Array) -> Array:
-        """Return the states at the tip, see `Shooting`."""
-        advance = self._steps[step]
-        reached = np.array(state)
-        each = np.repeat(intervals, WIDTH)
-        for K in np.unique(intervals):
-            columns = np.flatnonzero(each == K)
-            for first in range(0, columns.size, _COLUMNS):
-                chosen = columns[first : first + _COLUMNS]
-                padded = np.resize(chosen, _COLUMNS)
-                here, given, h = reached[:, padded], data[:, padded], np.full((1, _COLUMNS), 1.0 / K)
-                for k in range(int(K)):
-                    here = advance(here, given, np.full((1, _COLUMNS), k * (1.0 / K)), h)
-                reached[:, chosen] = np.asarray(here)[:, : chosen.size]
-        return reached
-
-    def apply(self, name: str, given: Array) -> Array:
-        """Return a map's columns, see `Shooting`."""
-        poses = given.shape[1]
-        padded = _padded(given, -poses % _COLUMNS)
-        blocks = [
-            self._maps[name](padded[:, first : first + _COLUMNS]) for first in range(0, padded.shape[1], _COLUMNS)
-        ]
-        return np.hstack([np.asarray(block) for block in blocks])[:, :poses]
-
-
-def _padded(columns: Array, more: int) -> Array:
-    """Return columns with the last one repeated."""
-    return np.hstack([columns, np.repeat(columns[:, -1:], more, axis=1)])
 
 
 def shooting(kernels: Kernels, *, build: bool) -> Shooting:
