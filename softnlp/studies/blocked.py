@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from copy import copy
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -80,6 +81,12 @@ class BlockedSolver:
         other = BlockedSolver(self.model, self.numerics, contact, wall=self.has_wall, poses=self.poses)
         if contact.closure == self.contact.closure:
             other.functions, other._compiled = self.functions, self._compiled
+        return other
+
+    def with_model(self, model: Model) -> BlockedSolver:
+        """Return a solver for other numbers of the same kind of robot and law, which shares everything compiled."""
+        other = copy(self)
+        other.model, other.poses = model, self.poses.with_model(model)
         return other
 
     def grid(self, intervals: int, plane: Array | None) -> BlockedGrid:

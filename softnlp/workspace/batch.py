@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from softnlp.loadcase import RodFunctions
 from softnlp.rod import STATE_SIZE
+from softnlp.workspace.columns import replaced, some
 from softnlp.workspace.csource import WIDTH
+from softnlp.workspace.grids import MOST_INTERVALS, grid_level, whole_groups
 from softnlp.workspace.predictor import predicted
 from softnlp.workspace.reduced import MOMENT, POSITION, ROTATION, STATE
 from softnlp.workspace.shooting import Shooting
@@ -20,8 +22,6 @@ Mask = NDArray[np.bool_]
 _PASSES = 10
 _CONVERGED = 1e-11  # scaled residual of the tip
 _DIVERGED = 1e3
-_LEVELS = np.unique(np.round(6 * 2 ** (np.arange(60) / 6)).astype(np.int64))  # grid sizes, 12 % apart
-_MOST_INTERVALS = 400
 _SAMPLE = 16  # a pose in so many is solved first, and predicts the others
 _MARGIN = 1.05  # on the number of intervals
 _RICHARDSON = 16 / 15  # a fourth-order method's error over its change from halving every step
@@ -92,29 +92,31 @@ class BatchSolver:
             # RK4's error is C / K^4; log C is what varies smoothly
             constant = np.log(first.refinement_error[solved] * first.intervals[solved].astype(float) ** 4 + 1e-300)
             expected = np.exp(predicted(features, good, constant[None, :])[0])
-            grids = _level(_MARGIN * (expected / self._target) ** 0.25)
+            grids = grid_level(_MARGIN * (expected / self._target) ** 0.25)
         shot = self._shoot(batch, np.arange(n), guess, grids)
         if self._intervals is not None:
             return shot
         for _ in range(4):
             error = shot.refinement_error
-            coarse = np.flatnonzero((error > self._target) & (shot.intervals < _MOST_INTERVALS) & np.isfinite(error))
+            coarse = np.flatnonzero((error > self._target) & (shot.intervals < MOST_INTERVALS) & np.isfinite(error))
             if coarse.size == 0:
                 break
             wanted = _MARGIN * shot.intervals[coarse] * (error[coarse] / self._target) ** 0.25
-            again = self._shoot(batch, coarse, shot.base[:, coarse], _level(np.maximum(wanted, shot.intervals[coarse])))
-            shot = _merged(shot, coarse, again)
+            again = self._shoot(
+                batch, coarse, shot.base[:, coarse], grid_level(np.maximum(wanted, shot.intervals[coarse]))
+            )
+            shot = replaced(shot, coarse, again)
         return shot
 
     def _first_grids(self, bend: Array) -> NDArray[np.int64]:
         """Return the number of intervals of each pose, as far as its unloaded bend tells."""
         if self._intervals is not None:
             return np.full(bend.size, self._intervals, np.int64)
-        return _level(np.maximum(10.0, 6 * bend))
+        return grid_level(np.maximum(10.0, 6 * bend))
 
     def _shoot(self, batch: Batch, poses: NDArray[np.intp], guess: Array, intervals: NDArray[np.int64]) -> Shot:
         """Solve some poses on given grids."""
-        slots, counts = _groups(intervals)
+        slots, counts = whole_groups(intervals)
         data, base = batch.data[:, poses][:, slots], guess[:, slots].copy()
         width = slots.size
         state = np.zeros((4 * STATE + 1, width))
@@ -137,7 +139,7 @@ class BatchSolver:
         shot = self._judged(data, base, state, system, residual, counts, passes)
         back = np.empty(poses.size, np.intp)
         back[slots] = np.arange(width)  # of the copies that fill a group, the last
-        return _chosen(shot, back)
+        return some(shot, back)
 
     def _tip(self, reached: Array, data: Array) -> tuple[Array, Array]:
         """Return the tip's moment residual (3, poses) and its derivative by m(0) (3, 3, poses)."""
@@ -190,23 +192,6 @@ class BatchSolver:
         )
 
 
-def _level(wanted: Array) -> NDArray[np.int64]:
-    """Return the next grid size of a list, so that many poses share one."""
-    capped = np.minimum(np.where(np.isfinite(wanted), wanted, _LEVELS[0]), _MOST_INTERVALS)
-    return _LEVELS[np.searchsorted(_LEVELS, capped)]
-
-
-def _groups(intervals: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.int64]]:
-    """Return which pose stands in each slot of groups of equal grids, and the grid of each group."""
-    slots, counts = [], []
-    for K in np.unique(intervals):
-        poses = np.flatnonzero(intervals == K)
-        groups = -(-poses.size // WIDTH)
-        slots.append(np.concatenate([poses, np.full(groups * WIDTH - poses.size, poses[-1])]))
-        counts.append(np.full(groups, K))
-    return np.concatenate(slots), np.concatenate(counts)
-
-
 def _start(base: Array) -> Array:
     """Return the state at the base for m(0), with its derivatives by m(0)."""
     state = np.zeros((4 * STATE + 1, base.shape[1]))
@@ -247,19 +232,3 @@ def _smallest_minor(S: Array) -> Array:
     third = (S[0] * np.cross(S[1], S[2], axis=0)).sum(axis=0)
     least: Array = np.minimum(S[0, 0], np.minimum(second, third))
     return least
-
-
-def _chosen(shot: Shot, slots: NDArray[np.intp]) -> Shot:
-    """Return some poses of a shot."""
-    return Shot(**{name: np.take(getattr(shot, name), slots, axis=-1) for name in Shot.__dataclass_fields__})
-
-
-def _merged(shot: Shot, where: NDArray[np.intp], other: Shot) -> Shot:
-    """Return a shot with the poses `where` replaced; iterations add up."""
-    merged = {}
-    for name in Shot.__dataclass_fields__:
-        values = getattr(shot, name).copy()
-        new = getattr(other, name)
-        values[..., where] = new + values[..., where] if name == "iterations" else new
-        merged[name] = values
-    return Shot(**merged)

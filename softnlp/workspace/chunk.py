@@ -7,23 +7,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.loadcase import rod_functions
 from softnlp.quantities import Model, with_symbols
 from softnlp.rod import Loads
 from softnlp.status import Status
+from softnlp.studies.blocked import BlockedSolver
+from softnlp.studies.blocked_grid import Blocked
 from softnlp.studies.statics import PoseSolver, Solved
 from softnlp.studies.step import Step
-from softnlp.workspace.batch import Batch, BatchSolver, Mask, Shot
-from softnlp.workspace.csource import Kernels
-from softnlp.workspace.plan import LOADS, Plan
+from softnlp.workspace.blocked_lane import CLOSURES, BlockedLane, BlockedPoses, wall_of_plan
+from softnlp.workspace.columns import some
+from softnlp.workspace.plan import Plan
+from softnlp.workspace.pose_lane import PoseLane, Poses
 from softnlp.workspace.poses import STATUSES, Block, Lane, Rows, unsolved_rows
-from softnlp.workspace.reduced import POSITION, ROTATION, reduced_rod
-from softnlp.workspace.shooting import shooting
-from softnlp.workspace.stretches import Stretches, stretch_maps
+from softnlp.workspace.reduced import POSITION, ROTATION, STATE
 
 Array = NDArray[np.float64]
-
-_WORTH_COMPILING = 2000  # poses
+Index = NDArray[np.intp]
 
 
 class ChunkSolver:
@@ -32,56 +31,62 @@ class ChunkSolver:
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
         self._problem: PoseSolver | None = None
-        self._functions = rod_functions(plan.model)
-        reduced = reduced_rod(self._functions)
-        kernels = Kernels(
-            {"value": reduced.value, "directions": reduced.directions, "check": reduced.check},
-            {"ends": reduced.ends, **stretch_maps(self._functions)},
-        )
-        self._kernels = shooting(kernels, build=plan.poses >= _WORTH_COMPILING)
-        numerics = plan.numerics
-        self._batch = BatchSolver(self._functions, self._kernels, numerics.accuracy / 3, numerics.intervals)
-        self._stretches = Stretches(self._functions, self._kernels, shared=not set(plan.varied) - {"pressure", *LOADS})
-        self._loads = _entries(plan, "tip_force"), _entries(plan, "tip_moment")
+        self._blocked_problem: BlockedSolver | None = None
+        self._free = PoseLane(plan) if plan.numerics.transcription == "multiple-shooting" else None
+        self._wall = None if plan.contact is None else wall_of_plan(plan, plan.contact)
+        self._blocked: BlockedLane | None = None
+        together = self._free is not None and plan.numerics.intervals is None
+        if self._free is not None and plan.contact is not None and self._wall is not None:
+            together = together and plan.contact.closure in CLOSURES
+            self._blocked = BlockedLane(plan, plan.contact, self._wall, self._free) if together else None
 
     def solve(self, chunk: int) -> Block:
         """Return the poses of a chunk; never raises for a pose that cannot be solved."""
         numbers = self.plan.members(chunk)
         rows = unsolved_rows(numbers, self.plan.row_type)
-        table = self.plan.full_values(numbers)
-        if self.plan.numerics.transcription == "multiple-shooting":
-            self._solve_together(rows, table)
+        columns = self.plan.full_values(numbers)
+        if self._free is not None and (self._wall is None or self._blocked is not None):
+            self._solve_together(self._free, rows, columns, self.plan.values[numbers])
         messages: list[tuple[int, str]] = []
-        near: Solved | None = None
+        near: Any = None
         for k in np.flatnonzero(rows["lane"] == Lane.PROBLEM).tolist():
-            model, pressure, loads = self._pose(table[:, k])
-            if self._problem is None:
-                self._problem = PoseSolver(self.plan.model, self.plan.numerics)
-            step, solved = self._problem.with_model(model).solve(pressure, loads, near)
+            step, solved = self._solve_alone(columns[:, k], near)
             near = solved or near
             _fill(rows, k, step)
-            if not step.status.has_solution:
+            if step.status is not Status.SOLVED:
                 messages.append((int(numbers[k]), step.message))
         return Block(chunk, rows, tuple(messages))
 
-    def _solve_together(self, rows: Rows, table: Array) -> None:
+    def _solve_together(self, lane: PoseLane, rows: Rows, columns: Array, features: Array) -> None:
         """Fill the rows of poses that are solved, accurate and stable for certain; the others stay as they are."""
-        stretch, known = self._stretches.find(table)
-        poses = np.flatnonzero(known)
-        if poses.size == 0:
+        free = lane.solve(columns, features)
+        if self._blocked is None:
+            _fill_free(rows, free)
             return
-        columns, stretch = table[:, poses], stretch[poses]
-        section = self._kernels.apply("section", np.vstack([columns, stretch]))
-        constants, (balance, L_0, F_0) = section[:-3], section[-3:]
-        force, moment = columns[self._loads[0]] / F_0, columns[self._loads[1]] / (F_0 * L_0)
-        data = np.vstack([constants, force, moment])
-        bend = constants[11] * np.hypot(constants[6] / constants[2], constants[7] / constants[3])
-        features = self.plan.values[rows["pose"][poses]]
-        shot = self._batch.solve(Batch(data, bend), features)
-        residual = np.maximum(shot.residual, np.abs(balance))
-        good = (residual <= self.plan.numerics.tolerance) & shot.certain & np.all(constants[:5] > 0, axis=0)
-        good &= (shot.refinement_error <= self.plan.numerics.accuracy) | (self.plan.numerics.intervals is not None)
-        _fill_together(rows, poses[good], shot, good, stretch[good], L_0[good], residual[good])
+        gap, touch = self._blocked.gaps(free), self._blocked.touching(free)
+        beyond = gap <= -touch
+        apart = some_poses(free, ~beyond)
+        _fill_free(rows, apart)
+        rows["blocked_force"][apart.numbers] = 0.0
+        rows["gap"][apart.numbers] = gap[~beyond]
+        rows["status"][apart.numbers[(gap > touch)[~beyond]]] = STATUSES.index(Status.NO_CONTACT)
+        if np.any(beyond):
+            found = self._blocked.solve(columns, features, some_poses(free, beyond))
+            if found is not None:
+                gaps = np.full(len(rows), np.nan)
+                gaps[free.numbers] = gap
+                _fill_blocked(rows, found, gaps[found.numbers])
+
+    def _solve_alone(self, column: Array, near: Any) -> tuple[Step, Solved | Blocked | None]:
+        """Solve one pose by the problem itself, from a neighbour where there is one."""
+        model, pressure, loads = self._pose(column)
+        plan = self.plan
+        if plan.contact is None:
+            self._problem = self._problem or PoseSolver(plan.model, plan.numerics)
+            return self._problem.with_model(model).solve(pressure, loads, near)
+        self._blocked_problem = self._blocked_problem or BlockedSolver(plan.model, plan.numerics, plan.contact)
+        # from zero pressure: the neighbours in a chunk are not on the way to each other
+        return self._blocked_problem.with_model(model).solve(pressure, loads, self._wall)
 
     def _pose(self, column: Array) -> tuple[Model, Array, Loads]:
         """Return the model, the pressures and the loads of one pose from every quantity."""
@@ -95,31 +100,46 @@ class ChunkSolver:
         return named, values["pressure"], Loads(values["tip_force"], values["tip_moment"], values["gravity"])
 
 
-def _entries(plan: Plan, name: str) -> slice:
-    """Return where a quantity stands in a column of all of them."""
-    names = list(plan.nominal)
-    start = sum(plan.nominal[other].size for other in names[: names.index(name)])
-    return slice(start, start + plan.nominal[name].size)
+def some_poses(poses: Poses, mask: NDArray[np.bool_]) -> Poses:
+    """Return some of the solved poses."""
+    return Poses(poses.numbers[mask], some(poses.sections, mask), some(poses.shot, mask), poses.residual[mask])
 
 
-def _fill_together(
-    rows: Rows, where: NDArray[np.intp], shot: Shot, good: Mask, stretch: Array, L_0: Array, residual: Array
-) -> None:
-    """Put the good poses of a shot into their rows."""
-    N = shot.integrals.shape[0] - 2
+def _fill_free(rows: Rows, poses: Poses) -> None:
+    """Put solved poses without a wall into their rows."""
+    shot, where = poses.shot, poses.numbers
+    lengths, angle, backbone = shot.integrals[:-2], shot.integrals[-2], shot.integrals[-1]
+    _fill_together(rows, where, shot.tip, lengths, poses.sections.length_unit)
+    rows["bending_angle"][where] = angle
+    rows["backbone_length"][where] = backbone * poses.sections.length_unit
+    rows["stretch"][where] = poses.sections.stretch
+    for name, values in (("intervals", shot.intervals), ("iterations", shot.iterations), ("error", shot.error)):
+        rows[name][where] = values
+    rows["residual"][where] = poses.residual
+
+
+def _fill_blocked(rows: Rows, poses: BlockedPoses, gap: Array) -> None:
+    """Put solved blocked poses into their rows."""
+    shot, where = poses.shot, poses.numbers
+    _fill_together(rows, where, shot.state, shot.state[STATE:], poses.sections.length_unit)
+    rows["bending_angle"][where] = shot.integrals[0]
+    rows["backbone_length"][where] = shot.integrals[1] * poses.sections.length_unit
+    rows["stretch"][where] = poses.sections.stretch
+    for name, values in (("intervals", shot.intervals), ("iterations", shot.iterations), ("error", shot.error)):
+        rows[name][where] = values
+    rows["residual"][where] = poses.residual
+    rows["blocked_force"][where] = poses.force
+    rows["gap"][where] = gap
+
+
+def _fill_together(rows: Rows, where: Index, tip: Array, lengths: Array, L_0: Array) -> None:
+    """Put what poses with and without a wall share into their rows; both are stable for certain."""
     rows["status"][where] = STATUSES.index(Status.SOLVED)
     rows["lane"][where] = Lane.BATCH
     rows["stable"][where] = 1
-    rows["intervals"][where] = shot.intervals[good]
-    rows["iterations"][where] = shot.iterations[good]
-    rows["stretch"][where] = stretch
-    rows["tip_position"][where] = (shot.tip[POSITION, good] * L_0).T
-    rows["tip_rotation"][where] = shot.tip[ROTATION, good].T.reshape(-1, 3, 3).transpose(0, 2, 1)
-    rows["chamber_length"][where] = (shot.integrals[:N, good] * L_0).T
-    rows["bending_angle"][where] = shot.integrals[N, good]
-    rows["backbone_length"][where] = shot.integrals[N + 1, good] * L_0
-    rows["residual"][where] = residual
-    rows["error"][where] = shot.error[good]
+    rows["tip_position"][where] = (tip[POSITION] * L_0).T
+    rows["tip_rotation"][where] = tip[ROTATION].T.reshape(-1, 3, 3).transpose(0, 2, 1)
+    rows["chamber_length"][where] = (lengths * L_0).T
 
 
 def _fill(rows: Rows, k: int, step: Step) -> None:
@@ -136,3 +156,6 @@ def _fill(rows: Rows, k: int, step: Step) -> None:
     rows["error"][k] = step.discretisation_error
     for name in ("stretch", "tip_position", "tip_rotation", "bending_angle", "backbone_length", "chamber_length"):
         rows[name][k] = getattr(pose, name)
+    if step.contact is not None:
+        rows["blocked_force"][k] = step.contact.force
+        rows["gap"][k] = step.contact.gap

@@ -22,6 +22,9 @@ typedef double V __attribute__((vector_size(8 * WIDTH)));
 #define LANES(expression) V r; for (int i = 0; i < WIDTH; ++i) r[i] = expression; return r;
 static inline V all(double a) {{ LANES(a) }}
 static inline V power(V a, V b) {{ LANES(pow(a[i], b[i])) }}
+static inline V below(V a, V b) {{ LANES(a[i] < b[i]) }}
+static inline V not(V a) {{ LANES(a[i] == 0) }}
+static inline V where(V a, V b) {{ LANES(a[i] != 0 ? b[i] : 0) }}
 static inline V least(V a, V b) {{ LANES(a[i] < b[i] ? a[i] : b[i]) }}
 static inline V most(V a, V b) {{ LANES(a[i] > b[i] ? a[i] : b[i]) }}
 """
@@ -86,6 +89,9 @@ _OPERATIONS = {
     ca.OP_SQ: "{0} * {0}",
     ca.OP_TWICE: "{0} + {0}",
     ca.OP_INV: "1.0 / {0}",
+    ca.OP_LT: "below({0}, {1})",
+    ca.OP_NOT: "not({0})",
+    ca.OP_IF_ELSE_ZERO: "where({0}, {1})",
     ca.OP_FMIN: "least({0}, {1})",
     ca.OP_FMAX: "most({0}, {1})",
     ca.OP_POW: "power({0}, {1})",

@@ -118,15 +118,19 @@ def _check(functions: RodFunctions, full: Any, state: Any, reached: Any, given: 
     c = data[: functions.field.size1_in(1)]
     x = full(state, s)
     gap = ca.norm_inf(rk_step(functions.field, RK4)(x, c, h) - full(reached, s + h))
-    # The quadrature of the transcription: its stages are those of the step.
-    k: list[Any] = []
-    rates: list[Any] = []
-    for row in RK4.a:
-        stage = x + h * sum((a * k_j for a, k_j in zip(row, k, strict=True) if a), ca.SX.zeros(rod.STATE_SIZE))
-        k.append(functions.field(stage, c))
-        rates.append(functions.lengths(stage, c))
-    gained = h * sum((b * r for b, r in zip(RK4.b, rates, strict=True)), ca.SX.zeros(rates[0].numel()))
-    worst, integrals = ca.SX.sym("gap"), ca.SX.sym("integrals", rates[0].numel())
+    gained = rk_integral(functions, x, c, h)
+    worst, integrals = ca.SX.sym("gap"), ca.SX.sym("integrals", gained.numel())
     before = ca.vertcat(state, worst, integrals)
     after = ca.vertcat(reached, ca.fmax(worst, gap), integrals + gained)
     return ca.Function("check", [before, *given], [after], {"cse": True})
+
+
+def rk_integral(functions: RodFunctions, x: Any, c: Any, h: Any) -> Any:
+    """Return what the chamber lengths, the bending angle and the backbone gain in a step, by the step's own stages."""
+    k: list[Any] = []
+    rates: list[Any] = []
+    for row in RK4.a:
+        stage = x + h * sum((a * k_j for a, k_j in zip(row, k, strict=True) if a), ca.SX.zeros(x.numel()))
+        k.append(functions.field(stage, c))
+        rates.append(functions.lengths(stage, c))
+    return h * sum((b * r for b, r in zip(RK4.b, rates, strict=True)), ca.SX.zeros(rates[0].numel()))
