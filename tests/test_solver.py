@@ -15,6 +15,7 @@ from designs import body_of, random_design, rubber_of, silicone
 from witness import Witnessed, shoot
 from witness_section import section
 
+from softnlp.branch import stretch_on_branch
 from softnlp.condensed import CondensedSolver
 from softnlp.continuation import follow, straight_path
 from softnlp.conventions import Coefficients
@@ -25,7 +26,10 @@ from softnlp.robot import ROBOTS
 from softnlp.rod import Loads
 from softnlp.solver import Engine, Solution, certificate, discretisation_correction, violation
 from softnlp.status import Status
+from softnlp.studies import statics
+from softnlp.studies.attempts import Attempt
 from softnlp.studies.forward import forward
+from softnlp.studies.statics import PoseSolver
 from softnlp.studies.step import Step
 from softnlp.transcription import Collocation, MultipleShooting, Transcription
 
@@ -289,6 +293,59 @@ def test_a_branch_that_ends_is_named_with_the_last_pressure_that_solves(
     assert solved.residual is not None
     assert solved.residual <= 1e-8
     assert at(1.001 * last).status is beyond.status
+
+
+@pytest.mark.parametrize("transcription", ["multiple-shooting", "collocation"])
+@pytest.mark.parametrize("loads", [Loads(), Loads(tip_force=(1e-3, 2e-3, 0)), Loads(gravity=(0, 0, -9.8))])
+def test_near_vanishing_stiffness_a_pose_ends_in_a_named_status(loads: Loads, transcription: str) -> None:
+    # EI falls towards zero, so the robot curls up hundreds of times, more than any grid shows
+    model = Model(ROBOTS["D10L40"], silicone("Ecoflex 00-10", "yeoh"), Coefficients(elongation=0.0, bending=0.0))
+    solver = PoseSolver(model, Numerics(transcription=transcription))
+    column = solver.column({"pressure": np.array([1e6, 0, 0])})
+    last = stretch_on_branch(solver.branch, column, np.array([1e6, 0, 0])).fraction * 1e6
+    step, found = solver.solve(np.array([0.99 * last, 0, 0]), loads)
+    assert step.status in (Status.DIVERGED, Status.INACCURATE)
+    assert step.pose is None
+    assert found is None
+    assert solver.solve(np.array([0.5 * last, 0, 0]), loads)[0].status is Status.SOLVED
+
+
+def test_what_cannot_be_judged_is_not_a_solution(monkeypatch: pytest.MonkeyPatch) -> None:
+    def solve() -> Step:
+        return PoseSolver(MODEL, Numerics()).solve(np.array(VALUES["pressure"]), Loads(**LOADS))[0]
+
+    assert solve().status is Status.SOLVED
+
+    def singular(*_: object) -> int:
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(statics, "conjugate_points", singular)
+        step = solve()
+        assert step.status is Status.DIVERGED
+        assert "cannot be judged: Singular matrix" in step.message
+    monkeypatch.setattr(statics, "discretisation_correction", lambda *_: np.full(18, np.nan))
+    step = solve()
+    assert step.status is Status.DIVERGED
+    assert "error is not finite" in step.message
+
+
+def test_of_unstable_equilibria_the_first_on_the_load_path_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    solver = PoseSolver(Model(ROBOTS["D10L60"], silicone("Ecoflex 00-10")), Numerics(intervals=20))
+    weight = Loads(gravity=(0.0, 0.0, -9.8))
+    P = np.zeros(3)
+    found = solver.solve(P, weight)[1]
+    assert found is not None
+    assert not found.stable
+    named = [("guessed", False), ("first", True), ("second", True), ("guessed again", False)]
+
+    def four(*_: object) -> list[Attempt]:
+        return [Attempt(replace(found.solution, engine_status=name), on_path=on_path) for name, on_path in named]
+
+    monkeypatch.setattr(statics, "attempts", four)
+    kept = solver.solve(P, weight)[1]
+    assert kept is not None
+    assert kept.solution.engine_status == "first"
 
 
 @pytest.mark.parametrize("exponent", [1.5, 2.0, 5.0])

@@ -20,7 +20,15 @@ from softnlp.solver import Engine, LinearSolver, Solution, SparseSolver, certifi
 from softnlp.stability import conjugate_points, transition_functions
 from softnlp.status import Status
 from softnlp.studies.attempts import LOADS, Goal, Neighbour, Work, attempts
-from softnlp.studies.pose import SHAPE_POINTS, between_nodes, pose_of, pose_warnings, shape_function, shape_of
+from softnlp.studies.pose import (
+    SHAPE_POINTS,
+    bending_angle,
+    between_nodes,
+    pose_of,
+    pose_warnings,
+    shape_function,
+    shape_of,
+)
 from softnlp.studies.pose_grid import Grid, Solved, next_size
 from softnlp.studies.step import Step
 from softnlp.transcription import MultipleShooting, method_named
@@ -276,7 +284,8 @@ class PoseSolver:
         s = np.linspace(0, 1, SHAPE_POINTS)
         shape = shape_of(between_nodes(self.shape, solved.nodes, solved.constants, s), s, L_0, F_0)
         unloaded_tip = np.asarray(self.functions.arc(solution.p, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
-        pose = pose_of(self.model, result, shape, unloaded_tip, solved.stable)
+        bending = bending_angle(self.shape, solved.nodes, solved.constants)
+        pose = pose_of(self.model, result, shape, bending, unloaded_tip, solved.stable)
         warnings = list(pose_warnings(self.model, pose))
         if solved.error > self.numerics.accuracy:
             warnings.append(
