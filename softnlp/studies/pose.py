@@ -79,7 +79,8 @@ def bending_angle(function: ca.Function, nodes: Array, constants: Array) -> floa
         half = np.abs(reach)[:, None] * (graded[1:] - graded[:-1]) / 2
         at = middle[:, :, None] + half[:, :, None] * points
         total += np.sum(norm(at.reshape(K, -1)).reshape(at.shape) * half[:, :, None] * weights, axis=(1, 2))
-    return float(np.sum(total)) * length / K
+    angle: float = np.sum(total).item() * length / K
+    return angle
 
 
 def shape_of(values: Array, s: Array, length_unit: float, force_unit: float) -> Shape:

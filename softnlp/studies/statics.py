@@ -140,10 +140,12 @@ class PoseSolver:
             if wanted is None:
                 break
             if intervals >= self.most_intervals:
+                if found.refinement_error <= self.numerics.accuracy:
+                    break
                 step = Step(
                     pressure,
                     Status.INACCURATE,
-                    f"{Status.INACCURATE.advice}; with {intervals} intervals it is {found.error:.2g} L_0",
+                    f"{Status.INACCURATE.advice}; with {intervals} intervals it is {found.refinement_error:.2g} L_0",
                     residual=found.solution.residual,
                     iterations=iterations,
                     solve_time=time.perf_counter() - began,
@@ -189,7 +191,7 @@ class PoseSolver:
 
         Of several unstable ones that is the first along a load path, which is where the robot buckles or snaps from;
         what a guess led to comes after. near : a neighbour, or this pose on a coarser grid, whose like is the answer.
-        Returns the solution, the iterations spent and, without one, how far continuation came.
+        Returns the solution, the iterations spent and what to say where there is none.
         """
         grid = self.grid(intervals)
         p = grid.problem.pack(values)
@@ -220,6 +222,8 @@ class PoseSolver:
             if work.used_up:
                 note += "; stopped, since it took too long"
                 break
+        if not goal.is_loaded:
+            return kept, spent, f"; {intervals} intervals do not show how far it curls{note}"
         return kept, spent, f"; continuation came {100 * reached:.3g} % of the way{note}"
 
     def column(self, values: Mapping[str, Any]) -> Array:
