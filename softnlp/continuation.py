@@ -42,6 +42,7 @@ def follow(
     smallest_step: float = 1 / 1024,
     largest_jump: float = 0.6,
     most_solves: int = 400,
+    most_iterations: int | None = None,
     same_branch: Callable[[float, Solution], bool] | None = None,
 ) -> Followed:
     """Follow a solution along p = path(t) from t = 0, where `start` is a solution or close to one, to t = 1.
@@ -49,7 +50,8 @@ def follow(
     The step is halved when a solve fails or lands further than `largest_jump` (scaled) from its prediction, which is
     how another branch shows, and grows again after success. The predictor is the secant. `distance` measures a change
     of x. A solve counts when it meets ten times the engine's own tolerance, so an engine for a path may be a loose one.
-    `same_branch(t, solution)` may refuse a solution that the distance does not tell from the branch.
+    `most_iterations` bounds what is spent. `same_branch(t, solution)` may refuse a solution that the distance does not
+    tell from the branch.
     """
     tolerance = 10 * engine.tolerance
     current = engine.solve(path(0.0), start)
@@ -59,6 +61,8 @@ def follow(
     done, step = 0.0, first_step
     previous: tuple[float, Array] | None = None
     for _ in range(most_solves):
+        if most_iterations is not None and iterations >= most_iterations:
+            break
         target = min(1.0, done + step)
         guess = current.x
         if previous is not None:
@@ -104,38 +108,36 @@ def around_folds(
     largest_step: float = 0.3,
     smallest_step: float = 1e-5,
     most_solves: int = 1500,
-) -> Iterator[tuple[Array, int]]:
+) -> Iterator[tuple[Array | None, int]]:
     """Follow the curve of solutions (x, t) by arc length from t = `fraction`; yield x near every passage of t = 1.
 
     Where a load path turns back, its curve goes on through unstable equilibria and often turns forward again: the robot
     snaps through. weight : per entry of x, for the arc length. Yields also the linear solves spent since the last
-    passage, and ends after `most_solves`.
+    passage; those after the last one come with None. It ends after `most_solves` in all.
     """
-    x, t, step, spent = start.x, fraction, first_step, 0
+    x, t, step, spent, told = start.x, fraction, first_step, 0, 0
     tangent: _Tangent | None = None
-    while True:
+    while spent <= most_solves and -1.0 <= t <= 2.0:
         try:
             heading = _tangent(engine.problem, linear, path, x, t, weight, tangent)
         except np.linalg.LinAlgError:
-            return
+            break
+        spent += 1
         while step >= smallest_step:
             corrected, steps_taken = _corrected(engine, linear, path, x, t, heading, step, weight)
-            spent += 1 + 2 * steps_taken  # linear solves
+            spent += 2 * steps_taken
             if corrected is not None:
                 break
             step /= 2
         else:
-            return
-        if spent > most_solves:
-            return
+            break
         x_new, t_new = corrected
         if (t - 1.0) * (t_new - 1.0) <= 0.0 and t_new != t:
-            yield x + (x_new - x) * (1.0 - t) / (t_new - t), spent
-            spent = 0
-        if t_new < -1.0 or t_new > 2.0:
-            return
+            yield x + (x_new - x) * (1.0 - t) / (t_new - t), spent - told
+            told = spent
         x, t, tangent = x_new, t_new, heading
         step = min(largest_step, step * (1.5 if steps_taken <= 3 else 1.0))
+    yield None, spent - told
 
 
 def _slope(problem: CompiledProblem, path: Path, x: Array, t: float) -> Array:

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 _LONGEST_SOLVE = 60.0  # seconds after which IPOPT is stopped
 _NEWTON_STEPS = 12
 _DIVERGED = 1e4  # scaled residual past which Newton steps are not worth following
+_LARGEST_FALLBACK = 8000  # unknowns up to which IPOPT is tried after Newton: MUMPS has taken minutes over more
 _SLACK = 100.0  # round-off may leave a residual this much above the tolerance asked of an engine
 
 
@@ -61,10 +62,33 @@ class LinearSolver(Protocol):
         ...
 
 
+class SparseSolver:
+    """Solves J dx = -g of any square problem by sparse LU factorisation."""
+
+    def __init__(self, problem: CompiledProblem) -> None:
+        self._problem = problem
+
+    def solve(self, x: Array, p: Array, g: Array) -> Array:
+        """Return dx. Raises `numpy.linalg.LinAlgError` where J is singular or not finite."""
+        from scipy.sparse import csc_matrix
+        from scipy.sparse.linalg import splu
+
+        J = self._problem.jacobian(x, p)
+        entries = np.asarray(J.nonzeros())
+        if not np.all(np.isfinite(entries)):
+            raise np.linalg.LinAlgError("the Jacobian is not finite")
+        try:
+            factors = splu(csc_matrix((entries, J.row(), J.colind()), shape=J.shape))
+        except RuntimeError as error:
+            raise np.linalg.LinAlgError(str(error)) from error
+        return np.asarray(factors.solve(-np.asarray(g, dtype=float)))
+
+
 class Engine:
     """Newton's method where a structured linear solver is given, and IPOPT, on one compiled problem.
 
-    IPOPT is the reference: it solves what Newton does not, unless `newton_only`. A square problem needs no Hessian:
+    IPOPT is the reference: it solves what Newton does not, unless `newton_only` or too large for it in bounded time (no
+    limit reaches into one sparse factorisation). A square problem needs no Hessian:
     with a zero one IPOPT's step is Newton's too. Safe to share between threads: calls wait for each other.
     """
 
@@ -82,8 +106,9 @@ class Engine:
         self.newton_only = newton_only
         self.tolerance = tolerance
         self._lock = threading.Lock()
-        # Newton on a square problem either converges soon or has left the basin of the first guess.
-        self._max_iterations = max_iterations or (15 if problem.is_square else 300)
+        # Newton at given values either converges soon or has left the basin of the first guess; with quantities free,
+        # 70 iterations are not rare.
+        self._max_iterations = max_iterations or (15 if problem.is_square and not problem.free else 300)
 
     @cached_property
     def _solver(self) -> ca.Function:
@@ -99,6 +124,7 @@ class Engine:
                 "tol": self.tolerance,
                 "constr_viol_tol": self.tolerance,
                 "acceptable_iter": 0,
+                "honor_original_bounds": "yes",  # IPOPT relaxes bounds by 1e-8 of a scaled unknown while it solves
                 "nlp_scaling_method": "none",
                 "max_iter": self._max_iterations,
                 "max_wall_time": _LONGEST_SOLVE,
@@ -118,6 +144,8 @@ class Engine:
         if self.linear is not None:
             quick = self._newton(self.linear, p, x_start)
             if self.newton_only or quick.holds(self.tolerance * _SLACK):
+                return quick
+            if x_start.size > _LARGEST_FALLBACK:
                 return quick
             spent = quick.iterations
         with self._lock:

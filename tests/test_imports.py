@@ -25,6 +25,8 @@ LAYERS = (
         "studies",
         "studies.step",
         "studies.pose",
+        "studies.pose_grid",
+        "studies.attempts",
         "studies.statics",
         "studies.forward",
         "studies.wall",

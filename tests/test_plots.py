@@ -141,6 +141,13 @@ def test_tube_has_its_radius_about_the_offset_axis(radius: float, offset: float,
     assert np.allclose(distance, 1e3 * radius, atol=1e-6)
 
 
+def faces_of(collection: Any) -> list[np.ndarray]:
+    """Return the corners of each face of a 3D collection, which matplotlib keeps for itself, before 3.10 in one row."""
+    if hasattr(collection, "_faces"):
+        return [np.asarray(face) for face in collection._faces]
+    return [np.asarray(collection._vec)[:3, part].T for part in collection._segslices]
+
+
 def projected(axes: Any, points: np.ndarray) -> np.ndarray:
     from mpl_toolkits.mplot3d.proj3d import proj_transform
 
@@ -188,7 +195,7 @@ def test_body_in_pixels_is_to_scale() -> None:
     figure.canvas.draw()
     axes: Any = figure.axes[0]
     (skin,) = labelled(axes, "last step")
-    pixels = projected(axes, np.concatenate([np.asarray(f) for f in skin._faces]).reshape(-1, 3))
+    pixels = projected(axes, np.concatenate(faces_of(skin)).reshape(-1, 3))
     width, height = np.ptp(pixels, axis=0)
     expected = (60 * math.cos(math.radians(16)) + 25 * math.sin(math.radians(16))) / 25
     assert height / width == pytest.approx(expected, rel=0.02)
@@ -319,11 +326,11 @@ def test_the_wall_its_force_and_the_cap_are_where_the_contact_is() -> None:
     assert end == pytest.approx(at)
     assert (end - start) / np.linalg.norm(end - start) == pytest.approx([1, 0, 0])
     (wall,) = labelled(axes, "wall")
-    corners = np.asarray(wall._faces[0])
+    corners = faces_of(wall)[0]
     assert corners[:, 0] == pytest.approx([-4] * 4)
     assert corners.min(axis=0)[2] < at[2] < corners.max(axis=0)[2]
     (cap,) = labelled(axes, "tip cap")
-    side = np.concatenate([np.asarray(face)[:4] for face in cap._faces[:-1]])
+    side = np.concatenate([face[:4] for face in faces_of(cap)[:-1]])
     along = (side - 1e3 * pose.tip_position) @ pose.tip_rotation[:, 2]
     assert (along.min(), along.max()) == pytest.approx((0, 6), abs=1e-9)
     assert "$F_b$ = 1.2 N" in texts(axes.figure)
@@ -353,7 +360,7 @@ def leaning() -> Run:
 
 def test_a_leaning_wall_is_drawn_perpendicular_to_its_normal() -> None:
     axes: Any = drawn(leaning()).axes[0]
-    corners = np.asarray(labelled(axes, "wall")[0]._faces[0])
+    corners = faces_of(labelled(axes, "wall")[0])[0]
     assert corners @ [0.8, 0, 0.6] == pytest.approx([0] * 4, abs=1e-9)
 
 

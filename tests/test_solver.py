@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 from cases import equals, pose
@@ -15,6 +16,7 @@ from designs import body_of, random_design, rubber_of, silicone
 from witness import Witnessed, shoot
 from witness_section import section
 
+from softnlp.branch import stretch_on_branch
 from softnlp.condensed import CondensedSolver
 from softnlp.continuation import follow, straight_path
 from softnlp.conventions import Coefficients
@@ -25,7 +27,10 @@ from softnlp.robot import ROBOTS
 from softnlp.rod import Loads
 from softnlp.solver import Engine, Solution, certificate, discretisation_correction, violation
 from softnlp.status import Status
+from softnlp.studies import statics
+from softnlp.studies.attempts import Attempt
 from softnlp.studies.forward import forward
+from softnlp.studies.statics import PoseSolver
 from softnlp.studies.step import Step
 from softnlp.transcription import Collocation, MultipleShooting, Transcription
 
@@ -133,6 +138,35 @@ def test_an_engine_that_stopped_early_is_not_believed() -> None:
     right = Engine(posed.problem).solve(p, start)
     repeated = Engine(posed.problem, max_iterations=1).solve(p, right.x)
     assert repeated.holds(1e-10)
+
+
+def test_freed_quantities_get_the_iterations_that_they_need() -> None:
+    # from far away, with what the engine gives by itself
+    target = quantity("target", "m", tuple(np.asarray(witness_of_values().tip_position)))
+    posed = pose(
+        MODEL,
+        free=["pressure"],
+        constraints=lambda cases, given: [equals("tip", cases[0].outputs["tip_position"], target.symbol, "m", 0.06)],
+        extra=[target],
+    )
+    values = {name: value for name, value in VALUES.items() if name != "pressure"}
+    start = posed.start({**values, "pressure": (1e3, 1e3, 1e5)})
+    found = Engine(posed.problem).solve(posed.problem.pack(values), start)
+    assert found.iterations > 15
+    assert found.holds(1e-8)
+
+
+def test_a_bound_is_met_exactly() -> None:
+    # a tip that a pressure below zero would reach: IPOPT itself lets a bound give by 1e-8 of the scale
+    posed = pose(
+        MODEL,
+        free=["pressure"],
+        objective=lambda cases, given: ca.sumsqr(cases[0].outputs["tip_position"] - ca.DM([0.0, 0.0, 0.02])) / 0.06**2,
+    )
+    found = posed.solve({}, {"pressure": [2e4, 1e4, 1e4]}, max_iterations=200)
+    pressure = posed.problem.free_values(found.x)["pressure"]
+    assert found.holds(1e-8)
+    assert np.all(pressure >= 0.0)
 
 
 def test_an_impossible_problem_is_not_solved() -> None:
@@ -289,6 +323,68 @@ def test_a_branch_that_ends_is_named_with_the_last_pressure_that_solves(
     assert solved.residual is not None
     assert solved.residual <= 1e-8
     assert at(1.001 * last).status is beyond.status
+
+
+@pytest.mark.parametrize("transcription", ["multiple-shooting", "collocation"])
+def test_near_vanishing_stiffness_a_pose_ends_in_a_named_status(
+    transcription: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # EI falls towards zero, so the robot curls up hundreds of times, more than any grid shows
+    model = Model(ROBOTS["D10L40"], silicone("Ecoflex 00-10", "yeoh"), Coefficients(elongation=0.0, bending=0.0))
+    solver = PoseSolver(model, Numerics(transcription=transcription))
+    column = solver.column({"pressure": np.array([1e6, 0, 0])})
+    last = stretch_on_branch(solver.branch, column, np.array([1e6, 0, 0])).fraction * 1e6
+    assert solver.solve(np.array([0.4 * last, 0, 0]), Loads())[0].status is Status.SOLVED
+    step, found = solver.solve(np.array([0.99 * last, 0, 0]), Loads())
+    assert step.status is Status.DIVERGED
+    assert "curls" in step.message
+    assert step.pose is None
+    assert found is None
+    # with a load there are many paths to try, but only so much work
+    monkeypatch.setattr(statics, "_MOST_WORK", 20_000)
+    step, found = solver.solve(np.array([0.99 * last, 0, 0]), Loads(tip_force=(1e-3, 2e-3, 0)))
+    assert step.status is Status.DIVERGED
+    assert "took too long" in step.message
+    assert step.iterations < 400
+    assert found is None
+
+
+def test_what_cannot_be_judged_is_not_a_solution(monkeypatch: pytest.MonkeyPatch) -> None:
+    def solve() -> Step:
+        return PoseSolver(MODEL, Numerics(intervals=20)).solve(np.array(VALUES["pressure"]), Loads(**LOADS))[0]
+
+    assert solve().status is Status.SOLVED
+
+    def singular(*_: object) -> int:
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(statics, "conjugate_points", singular)
+        step = solve()
+        assert step.status is Status.DIVERGED
+        assert "cannot be judged: Singular matrix" in step.message
+    monkeypatch.setattr(statics, "discretisation_correction", lambda *_: np.full(18, np.nan))
+    step = solve()
+    assert step.status is Status.DIVERGED
+    assert "error is not finite" in step.message
+
+
+def test_of_unstable_equilibria_the_first_on_the_load_path_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    solver = PoseSolver(Model(ROBOTS["D10L60"], silicone("Ecoflex 00-10")), Numerics(intervals=20))
+    weight = Loads(gravity=(0.0, 0.0, -9.8))
+    P = np.zeros(3)
+    found = solver.solve(P, weight)[1]
+    assert found is not None
+    assert not found.stable
+    named = [("guessed", False), ("first", True), ("second", True), ("guessed again", False)]
+
+    def four(*_: object) -> list[Attempt]:
+        return [Attempt(replace(found.solution, engine_status=name), on_path=on_path) for name, on_path in named]
+
+    monkeypatch.setattr(statics, "attempts", four)
+    kept = solver.solve(P, weight)[1]
+    assert kept is not None
+    assert kept.solution.engine_status == "first"
 
 
 @pytest.mark.parametrize("exponent", [1.5, 2.0, 5.0])

@@ -186,8 +186,9 @@ def _draw_wall(axes: Any, point: Array, normal: Array, at: Array, view: RunView)
             corners[None], facecolors=WALL, edgecolors=WALL, linewidths=1.0, alpha=WALL_TINT, zorder=3, label="wall"
         )
     )
+    clear = [(0.0, 0.0, 0.0, 0.0)]  # "none" is no colour at all, which matplotlib before 3.11 cannot sort by depth
     axes.add_collection3d(
-        Poly3DCollection(corners[None], facecolors="none", edgecolors=WALL, linewidths=1.0, zorder=3.1)
+        Poly3DCollection(corners[None], facecolors=clear, edgecolors=WALL, linewidths=1.0, zorder=3.1)
     )
     return corners
 

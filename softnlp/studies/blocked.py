@@ -24,7 +24,8 @@ from softnlp.studies.blocked_grid import Blocked, BlockedGrid
 from softnlp.studies.blocked_step import failed_step, solved_step, touching_step
 from softnlp.studies.free_shape import FreeShapes
 from softnlp.studies.pose import between_nodes, shape_function
-from softnlp.studies.statics import MOST_INTERVALS, PoseSolver, Solved
+from softnlp.studies.pose_grid import Solved
+from softnlp.studies.statics import MOST_INTERVALS, PoseSolver
 from softnlp.studies.step import Step
 from softnlp.studies.wall import Situation, Wall
 from softnlp.studies.weighted import Weighted

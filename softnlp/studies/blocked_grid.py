@@ -11,7 +11,7 @@ from softnlp.condensed import CondensedSolver, plane_directions
 from softnlp.loadcase import LoadCase
 from softnlp.problem import CompiledProblem
 from softnlp.solver import Engine, Solution
-from softnlp.studies.statics import Solved
+from softnlp.studies.pose_grid import Solved
 from softnlp.studies.wall import Situation
 from softnlp.studies.weighted import Weighted
 

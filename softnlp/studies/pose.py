@@ -10,6 +10,7 @@ from softnlp import rod
 from softnlp.loadcase import unpack_section
 from softnlp.quantities import Model
 from softnlp.robot import touching_stretch
+from softnlp.rod import RodSection
 from softnlp.section import deform
 from softnlp.studies.step import Pose, SectionRadii, Shape
 from softnlp.transcription import RK4, rk_step
@@ -18,6 +19,8 @@ Array = NDArray[np.float64]
 
 SHAPE_POINTS = 61
 _SUBSTEPS = 4
+_LENGTH = len(RodSection._fields)  # where the constants of a load case hold the length of the stretched rod
+_SAMPLES, _ZOOMS, _GRADES, _GAUSS = 6, 12, 16, 4  # of the bending angle's quadrature
 
 
 def shape_function(field: ca.Function) -> ca.Function:
@@ -36,6 +39,48 @@ def between_nodes(function: ca.Function, nodes: Array, constants: Array, s: Arra
     K = nodes.shape[1] - 1
     left = np.minimum(np.floor(s * K + 1e-9).astype(int), K)
     return np.asarray(function.map(s.size)(nodes[:, left], constants, (s - left / K)[None, :]))
+
+
+def bending_angle(function: ca.Function, nodes: Array, constants: Array) -> float:
+    """Return the integral of sqrt(u_x^2 + u_y^2) over s [rad], to 1e-7 also where the curvature vanishes on the way.
+
+    function : of `shape_function`. The curvature is smooth, its norm has a kink where it crosses zero, or nearly so. In
+    every interval the curvature is the polynomial through `_SAMPLES` points, and the quadrature of its norm is graded
+    towards the point where that is smallest.
+    """
+    K = nodes.shape[1] - 1
+    length = float(constants[_LENGTH])  # in L_0
+    ends = (1 - np.cos(np.pi * np.arange(_SAMPLES) / (_SAMPLES - 1))) / 2  # Chebyshev points, 0 and 1 among them
+    s = ((np.arange(K)[:, None] + ends[:-1]) / K).ravel()
+    u = between_nodes(function, nodes, constants, np.append(s, 1.0))[21:23]
+    last = u[:, _SAMPLES - 1 :: _SAMPLES - 1]  # the right end of each interval is the left one of the next
+    values = np.concatenate([u[:, :-1].reshape(2, K, -1), last[:, :, None]], axis=2)
+    coefficients = np.einsum("ij,akj->aki", np.linalg.inv(np.vander(ends, increasing=True)), values)
+
+    def norm(at: Array) -> Array:
+        """Return the curvature's norm at local coordinates (K, n) in 0..1."""
+        found = np.zeros((2, *at.shape))
+        for c in np.moveaxis(coefficients, 2, 0)[::-1]:
+            found = found * at + c[:, :, None]
+        size: Array = np.hypot(found[0], found[1])
+        return size
+
+    left, width = np.zeros(K), 1.0
+    for _ in range(_ZOOMS):  # on the least of each interval
+        at = left[:, None] + width * np.linspace(0, 1, 9)
+        best = np.argmin(norm(at), axis=1)
+        left, width = at[np.arange(K), np.clip(best - 1, 0, 6)], width / 4
+    least = left + width / 2
+    graded = np.append(0.0, 0.5 ** np.arange(_GRADES, -1, -1))  # from the least outwards
+    points, weights = np.polynomial.legendre.leggauss(_GAUSS)
+    total = np.zeros(K)
+    for reach in (least, least - 1.0):  # to the left end and to the right one
+        middle = least[:, None] - reach[:, None] * (graded[1:] + graded[:-1]) / 2
+        half = np.abs(reach)[:, None] * (graded[1:] - graded[:-1]) / 2
+        at = middle[:, :, None] + half[:, :, None] * points
+        total += np.sum(norm(at.reshape(K, -1)).reshape(at.shape) * half[:, :, None] * weights, axis=(1, 2))
+    angle: float = np.sum(total).item() * length / K
+    return angle
 
 
 def shape_of(values: Array, s: Array, length_unit: float, force_unit: float) -> Shape:
@@ -65,8 +110,13 @@ def section_radii(model: Model, stretch: float) -> SectionRadii:
     )
 
 
-def pose_of(model: Model, outputs: dict[str, Array], shape: Shape, unloaded_tip: Array, stable: bool) -> Pose:
-    """Assemble a pose. outputs : of the load case, SI. unloaded_tip : tip at this pressure without loads [m]."""
+def pose_of(
+    model: Model, outputs: dict[str, Array], shape: Shape, bending: float, unloaded_tip: Array, stable: bool
+) -> Pose:
+    """Assemble a pose. outputs : of the load case, SI. unloaded_tip : tip at this pressure without loads [m].
+
+    bending : of `bending_angle`, in place of the output, whose quadrature is of second order at a kink.
+    """
     stretch = float(outputs["stretch"][0])
     R = np.asarray(outputs["tip_rotation"])
     tip = np.asarray(outputs["tip_position"])
@@ -77,7 +127,7 @@ def pose_of(model: Model, outputs: dict[str, Array], shape: Shape, unloaded_tip:
         tip_position=tip,
         tip_displacement=tip - unloaded_tip,
         tip_rotation=R,
-        bending_angle=float(outputs["bending_angle"][0]),
+        bending_angle=bending,
         tilt=float(np.arctan2(np.hypot(axis[0], axis[1]), axis[2])),
         backbone_length=float(outputs["backbone_length"][0]),
         chamber_length=np.atleast_1d(outputs["chamber_lengths"]),

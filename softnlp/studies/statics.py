@@ -1,35 +1,36 @@
-"""Solving one pose after another for one robot: guesses, refinement, and what to try when a solve fails."""
+"""Solving one pose after another for one robot: the grid, its refinement, and what is said of the result."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Mapping
 from copy import copy
-from dataclasses import dataclass, replace
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.branch import BranchPoint, branch_function, stretch_on_branch
 from softnlp.condensed import CondensedSolver
-from softnlp.continuation import around_folds, follow, straight_path
-from softnlp.loadcase import LoadCase, load_case, rod_functions
+from softnlp.loadcase import load_case, rod_functions
 from softnlp.numerics import Numerics
-from softnlp.problem import CompiledProblem, compile_problem
+from softnlp.problem import compile_problem
 from softnlp.quantities import Model, quantities
 from softnlp.rod import STATE_SIZE, Loads
-from softnlp.solver import (
-    Engine,
-    Solution,
-    certificate,
-    discretisation_correction,
-    outputs,
-)
+from softnlp.solver import Engine, LinearSolver, Solution, SparseSolver, certificate, discretisation_correction, outputs
 from softnlp.stability import conjugate_points, transition_functions
 from softnlp.status import Status
-from softnlp.studies.pose import SHAPE_POINTS, between_nodes, pose_of, pose_warnings, shape_function, shape_of
+from softnlp.studies.attempts import LOADS, Goal, Neighbour, Work, attempts
+from softnlp.studies.pose import (
+    SHAPE_POINTS,
+    bending_angle,
+    between_nodes,
+    pose_of,
+    pose_warnings,
+    shape_function,
+    shape_of,
+)
+from softnlp.studies.pose_grid import Grid, Solved, next_size
 from softnlp.studies.step import Step
 from softnlp.transcription import MultipleShooting, method_named
 
@@ -37,85 +38,13 @@ Array = NDArray[np.float64]
 
 FIRST_INTERVALS = {"multiple-shooting": 10, "collocation": 5}
 MOST_INTERVALS = 1810
+_MOST_COLLOCATION = 320  # as many points; order 8 needs no more
 _TURN = 0.25  # largest angle [rad] of the unloaded arc within one RK4 interval of a first grid
 _FINER = 4  # how much finer a grid is tried where a coarse one finds no solution
-_MOST_WORK = 200_000  # iterations times intervals on one grid, which is some ten seconds
-_PRESSURE_PARTS = (0.0, 0.5, 0.25, 0.75)
-_LOADS = ("tip_force", "tip_moment", "gravity")
+_MOST_WORK = 150_000  # Runge-Kutta intervals of Newton iterations for one pose, which is some six seconds
+_OVERHEAD, _COLLOCATION_COST = 30, 20  # time of an iteration: beside its intervals, and of a collocation interval
 # Without loads the exact answer is a circular arc; a solution is good enough to show it.
 UNLOADED_ACCURACY = 5e-9
-
-
-@dataclass(frozen=True, eq=False)
-class Grid:
-    """Everything compiled for one number of intervals."""
-
-    case: LoadCase
-    engine: Engine
-    stepper: Engine
-    transition: ca.Function
-
-    @property
-    def problem(self) -> CompiledProblem:
-        """The compiled problem, with every quantity fixed."""
-        return self.engine.problem
-
-    def nodes(self, x: Array) -> Array:
-        """Return the scaled node states (18, K + 1) in x."""
-        states = x[1:].reshape(-1, STATE_SIZE).T
-        return np.ascontiguousarray(states[:, self.case.transcribed.node_index])
-
-    def constants(self, solution: Solution) -> Array:
-        """Return what the field takes beside the state."""
-        return np.asarray(self.problem.case_constants(solution.x, solution.p)).ravel()
-
-
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """A solution on a grid and what was found of it.
-
-    nodes : (18, K + 1) scaled states. constants : what the field takes beside them. error : estimated tip position
-    error over L_0. rotation_error : the same for the tip's orientation [rad]. stable : no conjugate point.
-    """
-
-    grid: Grid
-    solution: Solution
-    nodes: Array
-    constants: Array
-    error: float
-    rotation_error: float
-    stable: bool
-
-    @property
-    def intervals(self) -> int:
-        """The number of intervals."""
-        return int(self.nodes.shape[1]) - 1
-
-    @property
-    def refinement_error(self) -> float:
-        """What refinement holds against the accuracy: a rotation is allowed five times as much as a position."""
-        return max(self.error, self.rotation_error / 5)
-
-
-def next_size(wanted: float) -> int:
-    """Return the first grid size of at least `wanted`; sizes grow by the square root of 2, so that few are compiled."""
-    k = 0
-    while (size := 5 * round(2 ** (k / 2))) < wanted:
-        k += 1
-    return size
-
-
-def pose_weight(x: Array) -> Array:
-    """Return the weight of each entry of x in an arc length that is the mean over the nodes of the change of pose."""
-    states = np.zeros((x.size // STATE_SIZE, STATE_SIZE))
-    states[:, :12] = 1.0 / len(states)
-    return np.concatenate([[0.0], states.ravel()])
-
-
-def pose_distance(change: Array) -> float:
-    """Return the largest change of a scaled position or of a direction cosine between two x."""
-    states = change[1:].reshape(-1, STATE_SIZE)
-    return float(np.max(np.abs(states[:, :12])))
 
 
 class PoseSolver:
@@ -150,16 +79,25 @@ class PoseSolver:
             method = method_named(self.numerics.transcription, intervals)
             case = load_case("pose", self.functions, self.quantities, method)
             problem = compile_problem(list(self.quantities.values()), [case])
-            linear = CondensedSolver(self.functions, method) if isinstance(method, MultipleShooting) else None
+            linear: LinearSolver
+            if isinstance(method, MultipleShooting):
+                linear, cost = CondensedSolver(self.functions, method), 1
+            else:
+                linear, cost = SparseSolver(problem), _COLLOCATION_COST
             self._grids[intervals] = Grid(
                 case=case,
-                engine=Engine(problem, linear=linear),
-                stepper=Engine(
-                    problem, linear=linear, newton_only=linear is not None, max_iterations=8, tolerance=1e-7
-                ),
+                engine=Engine(problem, linear=linear, newton_only=True),
+                stepper=Engine(problem, linear=linear, newton_only=True, tolerance=1e-7),
+                reference=Engine(problem),
                 transition=self._transition.map(intervals),
+                iteration_cost=_OVERHEAD + cost * intervals,
             )
         return self._grids[intervals]
+
+    @property
+    def most_intervals(self) -> int:
+        """The finest grid that refinement uses."""
+        return _MOST_COLLOCATION if self.numerics.transcription == "collocation" else MOST_INTERVALS
 
     def values(self, pressure: Array, loads: Loads) -> dict[str, Any]:
         """Return the quantities that a step sets."""
@@ -185,23 +123,24 @@ class PoseSolver:
             return Step(pressure, branch.status, branch.message, solve_time=time.perf_counter() - began), None
 
         target = self.target_accuracy(loads)
-        unloaded = not any(np.any(values[name]) for name in _LOADS)
+        unloaded = not any(np.any(values[name]) for name in LOADS)
         first = self.numerics.intervals or self.first_intervals(column, branch.stretch, target if unloaded else None)
         intervals = max(warm.intervals, first) if warm else first
         iterations = 0
         found: Solved | None = warm
+        work = Work(_MOST_WORK)
+        finest = min(_FINER * first, self.most_intervals)
         while True:
-            refining = found is not None and found is not warm
-            attempt, spent, reached = self._solve_on(intervals, values, branch, found, refining=refining)
+            attempt, spent, how_far = self._solve_on(intervals, values, branch, found, work)
             iterations += spent
-            if attempt is None and self.numerics.intervals is None and intervals < _FINER * first:
-                intervals, found = _FINER * intervals, None
+            if attempt is None and self.numerics.intervals is None and intervals < finest and not work.used_up:
+                intervals, found = min(_FINER * intervals, self.most_intervals), None
                 continue
             if attempt is None:
                 step = Step(
                     pressure,
                     Status.DIVERGED,
-                    f"{Status.DIVERGED.advice}; continuation came {100 * reached:.3g} % of the way",
+                    f"{Status.DIVERGED.advice}{how_far}",
                     iterations=iterations,
                     solve_time=time.perf_counter() - began,
                 )
@@ -210,17 +149,19 @@ class PoseSolver:
             wanted = self.next_intervals(found.refinement_error, intervals, target)
             if wanted is None:
                 break
-            if intervals >= MOST_INTERVALS:
+            if intervals >= self.most_intervals:
+                if found.refinement_error <= self.numerics.accuracy:
+                    break
                 step = Step(
                     pressure,
                     Status.INACCURATE,
-                    f"{Status.INACCURATE.advice}; with {intervals} intervals it is {found.error:.2g} L_0",
+                    f"{Status.INACCURATE.advice}; with {intervals} intervals it is {found.refinement_error:.2g} L_0",
                     residual=found.solution.residual,
                     iterations=iterations,
                     solve_time=time.perf_counter() - began,
                 )
                 return step, None
-            intervals = min(wanted, MOST_INTERVALS)
+            intervals = min(wanted, self.most_intervals)
         return self._finished(pressure, loads, found, iterations, began), found
 
     def first_intervals(self, column: Array, stretch: float, arc_target: float | None = None) -> int:
@@ -236,7 +177,7 @@ class PoseSolver:
         wanted = max(first, curl / turn)
         if arc_target is not None and self.numerics.transcription == "multiple-shooting":
             wanted = max(wanted, curl * (0.6 * curl / (120 * arc_target)) ** 0.25)
-        return min(next_size(wanted), MOST_INTERVALS)
+        return min(next_size(wanted), self.most_intervals)
 
     def target_accuracy(self, loads: Loads) -> float:
         """Return the estimate to aim for: a third of the accuracy, since estimates are good to a factor of 3."""
@@ -254,79 +195,52 @@ class PoseSolver:
         return next_size(max(factor, 1.3) * intervals)
 
     def _solve_on(
-        self, intervals: int, values: dict[str, Any], branch: BranchPoint, near: Solved | None, *, refining: bool
-    ) -> tuple[Solved | None, int, float]:
-        """Try, in order: the neighbour, the unloaded arc, loads applied after the pressure, and after part of it.
+        self, intervals: int, values: dict[str, Any], branch: BranchPoint, near: Solved | None, work: Work
+    ) -> tuple[Solved | None, int, str]:
+        """Make the attempts in turn; the first stable solution wins, an unstable one is kept if there is no other.
 
-        The first stable solution wins; an unstable one is kept in case there is no other. When refining, `near` is this
-        pose on a coarser grid, and its like is the answer. Returns it, the iterations spent and how far continuation
-        came.
+        Of several unstable ones that is the first along a load path, which is where the robot buckles or snaps from;
+        what a guess led to comes after. near : a neighbour, or this pose on a coarser grid, whose like is the answer.
+        Returns the solution, the iterations spent and what to say where there is none.
         """
         grid = self.grid(intervals)
         p = grid.problem.pack(values)
-        no_loads = {name: np.zeros(3) for name in _LOADS}
-        unloaded = values | no_loads
-        spent, reached = 0, 0.0
-        unstable: Solved | None = None
+        refining = near is not None and np.array_equal(near.solution.p, p)
 
-        def attempts() -> Iterator[tuple[Solution, float]]:
-            if near is not None:
-                yield grid.engine.solve(p, self._transfer(near, grid, p, branch.stretch)), 1.0
-            yield grid.engine.solve(p, self.arc_guess(grid, p, branch.stretch)), 1.0
-            if not any(np.any(values[name]) for name in _LOADS):
-                return  # the arc is the answer; a grid that does not show it is too coarse
-            yield from self._along(grid, [unloaded, values])
-            for part in _PRESSURE_PARTS:
-                partly = values | {"pressure": part * values["pressure"]}
-                yield from self._along(grid, [partly | no_loads, partly, values])
+        def arc(at: Mapping[str, Any]) -> Array:
+            return self.arc_guess(grid, grid.problem.pack(at), self._stretch(at))
 
-        for solution, fraction in attempts():
-            spent += solution.iterations
-            reached = max(reached, fraction) if fraction < 1.0 else reached
-            if fraction >= 1.0 and solution.holds(self.numerics.tolerance):
-                solved = self._examine(grid, solution)
+        spent, reached, note = 0, 0.0, ""
+        kept: Solved | None = None
+        kept_from_path = False
+        goal = Goal(grid, values, arc, None if near is None else self._neighbour(near, grid, p, branch.stretch))
+        for attempt in attempts(goal, work):
+            spent += attempt.solution.iterations
+            work.spend(grid, attempt.solution.iterations)
+            if attempt.fraction < 1.0:
+                reached = max(reached, attempt.fraction)
+            elif attempt.solution.holds(self.numerics.tolerance):
+                try:
+                    solved = self._examine(grid, attempt.solution)
+                except np.linalg.LinAlgError as error:
+                    note = f"; a solution found on {intervals} intervals cannot be judged: {error}"
+                    continue
                 if solved.stable or refining:
-                    return solved, spent, 1.0
-                unstable = solved
-            if spent * intervals > _MOST_WORK:
+                    return solved, spent, ""
+                if kept is None or (attempt.on_path and not kept_from_path):
+                    kept, kept_from_path = solved, attempt.on_path
+            if work.used_up:
+                note += "; stopped, since it took too long"
                 break
-        return unstable, spent, reached
+        if not goal.is_loaded:
+            return kept, spent, f"; {intervals} intervals do not show how far it curls{note}"
+        return kept, spent, f"; continuation came {100 * reached:.3g} % of the way{note}"
 
-    def _along(self, grid: Grid, waypoints: list[dict[str, Any]]) -> Iterator[tuple[Solution, float]]:
-        """Follow the solution along straight lines between values; yield solutions at the end and the fraction reached.
-
-        Where the branch turns back before the end the robot snaps through: the curve is followed around its folds, and
-        every equilibrium at the end that it passes is offered.
-        """
-        problem = grid.problem
-        x = self.arc_guess(grid, problem.pack(waypoints[0]), self._stretch(waypoints[0]))
-        p_end = problem.pack(waypoints[-1])
-        legs = len(waypoints) - 1
-        spent = 0
-        for k in range(legs):
-            path = straight_path(problem, waypoints[k], waypoints[k + 1])
-            followed = follow(grid.stepper, path, x, distance=pose_distance)
-            spent += followed.iterations
-            x = followed.solution.x
-            if not followed.arrived:
-                yield replace(followed.solution, iterations=spent), (k + followed.fraction) / legs
-                if k == legs - 1 and grid.engine.linear is not None:
-                    weight = pose_weight(x)
-                    passages = around_folds(
-                        grid.stepper, grid.engine.linear, path, followed.solution, followed.fraction, weight=weight
-                    )
-                    for x_end, iterations in passages:
-                        final = grid.engine.solve(p_end, x_end)
-                        yield replace(final, iterations=final.iterations + iterations), 1.0
-                return
-        final = grid.engine.solve(p_end, x)
-        yield replace(final, iterations=spent + final.iterations), 1.0
-
-    def column(self, values: dict[str, Any]) -> Array:
+    def column(self, values: Mapping[str, Any]) -> Array:
         """Return every quantity in its order, SI."""
         return np.concatenate([np.ravel(values.get(name, q.nominal)) for name, q in self.quantities.items()])
 
-    def _stretch(self, values: dict[str, Any]) -> float:
+    def _stretch(self, values: Mapping[str, Any]) -> float:
         """Return the stretch on the branch from zero pressure at the pressure in `values`."""
         return stretch_on_branch(self.branch, self.column(values), values["pressure"]).stretch
 
@@ -338,27 +252,33 @@ class PoseSolver:
 
     def transfer(self, solved: Solved, grid: Grid) -> Array:
         """Return x of a solution on another grid."""
-        return self._transfer(solved, grid, solved.solution.p, float(solved.solution.x[0]))
+        return self._neighbour(solved, grid, solved.solution.p, float(solved.solution.x[0])).moved
 
-    def _transfer(self, solved: Solved, grid: Grid, p: Array, stretch: float) -> Array:
-        """Return a solution's states on a grid, moved by what the unloaded arc moves between the two poses."""
+    def _neighbour(self, solved: Solved, grid: Grid, p: Array, stretch: float) -> Neighbour:
+        """Return a solution on a grid, as it is and moved by what the unloaded arc moves to the pose at p."""
         s = grid.case.transcribed.points
         if solved.grid is grid:
             states = solved.solution.x[1:]
         else:
             states = between_nodes(self.shape, solved.nodes, solved.constants, s)[:STATE_SIZE].T.ravel()
         x_old, p_old = solved.solution.x, solved.solution.p
-        moved = self.arc_guess(grid, p, stretch) - self.arc_guess(grid, p_old, x_old[0])
-        return np.concatenate([[x_old[0]], states]) + moved
+        x = np.concatenate([[x_old[0]], states])
+        moves = self.arc_guess(grid, p, stretch) - self.arc_guess(grid, p_old, x_old[0])
+        return Neighbour(x=x, p=p_old, moved=x + moves, stable=solved.stable)
 
     def _examine(self, grid: Grid, solution: Solution) -> Solved:
-        """Estimate the discretisation error of a solution and test its stability."""
+        """Estimate the discretisation error of a solution and test its stability.
+
+        Raises `numpy.linalg.LinAlgError` where they are not numbers.
+        """
         correction = discretisation_correction(grid.problem, solution, grid.engine.linear)
         order = method_named(self.numerics.transcription, 1).order
         richardson = 2**order / (2**order - 1)
         tip = correction[-STATE_SIZE:] * richardson
         nodes = grid.nodes(solution.x)
         constants = grid.constants(solution)
+        if not np.all(np.isfinite(tip)):
+            raise np.linalg.LinAlgError("its discretisation error is not finite")
         return Solved(
             grid=grid,
             solution=solution,
@@ -378,7 +298,8 @@ class PoseSolver:
         s = np.linspace(0, 1, SHAPE_POINTS)
         shape = shape_of(between_nodes(self.shape, solved.nodes, solved.constants, s), s, L_0, F_0)
         unloaded_tip = np.asarray(self.functions.arc(solution.p, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
-        pose = pose_of(self.model, result, shape, unloaded_tip, solved.stable)
+        bending = bending_angle(self.shape, solved.nodes, solved.constants)
+        pose = pose_of(self.model, result, shape, bending, unloaded_tip, solved.stable)
         warnings = list(pose_warnings(self.model, pose))
         if solved.error > self.numerics.accuracy:
             warnings.append(

@@ -12,7 +12,8 @@ from softnlp.rod import Loads
 from softnlp.status import Status
 from softnlp.studies.blocked import BlockedSolver
 from softnlp.studies.blocked_grid import Blocked
-from softnlp.studies.statics import PoseSolver, Solved
+from softnlp.studies.pose_grid import Solved
+from softnlp.studies.statics import PoseSolver
 from softnlp.studies.step import Step
 from softnlp.workspace.blocked_lane import CLOSURES, BlockedLane, BlockedPoses, wall_of_plan
 from softnlp.workspace.columns import some
