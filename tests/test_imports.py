@@ -34,7 +34,11 @@ LAYERS = (
     ),
     *("studies.free_shape", "studies.blocked_grid", "studies.blocked_step", "studies.blocked", "studies.multistart"),
     *("studies.force_inversion", "studies.*"),
-    *("workspace", "workspace.poses", "workspace.plan", "workspace.chunk", "workspace.*"),
+    *("workspace", "workspace.poses", "workspace.plan", "workspace.columns", "workspace.predictor"),
+    *("workspace.csource", "workspace.interpreted", "workspace.compiled", "workspace.shooting", "workspace.grids"),
+    *("workspace.reduced", "workspace.reduced_contact", "workspace.stretches"),
+    *("workspace.batch", "workspace.contact_batch", "workspace.pose_lane", "workspace.blocked_lane"),
+    *("workspace.chunk", "workspace.*"),
     *("scenario_schema", "scenario_check", "pressures", "scenario_contact", "scenario"),
     *("runner_blocked", "runner", "results", "plots", "cli", "__main__"),
 )
