@@ -175,7 +175,7 @@ def read_column(workspace: Workspace, name: str) -> Column:
             )
         variable, index = known[name]
         values = np.asarray(data[variable][(slice(None), *index)], dtype=float)
-        unit = str(data[variable].attrs.get("units", "1"))
+        unit = _unit(data[variable])
         meaning = str(data[variable].attrs.get("long_name", name))
     if name not in _KNOWN_OF_FAILED and variable not in _KNOWN_OF_FAILED:
         values[~workspace.solved] = np.nan
@@ -274,7 +274,11 @@ def _columns(data: Any) -> Iterator[tuple[str, str, tuple[int, ...]]]:
         if variable == "pose":
             continue
         for index in np.ndindex(*found.shape[1:]):
-            yield _component(variable, index), variable, index
+            yield _component(variable, index, _unit(found) != "1"), variable, index
+
+
+def _unit(found: Any) -> str:
+    return str(found.attrs.get("units", "1"))
 
 
 def _is_per_pose(found: Any) -> bool:
@@ -285,18 +289,15 @@ def _is_per_pose(found: Any) -> bool:
     return found.name == "/pose" or (len(scales) > 0 and str(scales[0].name).lstrip("/") == "pose")
 
 
-def _component(variable: str, index: tuple[int, ...]) -> str:
-    """Return the name of a component: the index goes before the unit."""
+def _component(variable: str, index: tuple[int, ...], measured: bool) -> str:
+    """Return the name of a component: the index goes before the unit, if the variable is `measured` in one."""
     if not index:
         return variable
     if variable == "pressure_bar":
         return f"p{index[0] + 1}_bar"
-    stem, _, unit = variable.rpartition("_")
-    if unit not in _UNITS:
-        stem, unit = variable, ""
+    stem, unit = variable, ""
+    if measured:
+        stem, _, unit = variable.rpartition("_")
     lettered = variable.startswith("tip_")
-    label = "".join("xyz"[i] for i in index) if lettered else "_".join(str(i + 1) for i in index)
+    label = "_".join("xyz"[i] if lettered else str(i + 1) for i in index)
     return "_".join(part for part in (stem, label, unit) if part)
-
-
-_UNITS = ("mm", "bar", "N", "Nmm", "deg", "MPa", "s", "m")
