@@ -44,9 +44,9 @@ def seen(points: Array, view: tuple[int, int, int, float], most: int = MOST_SHOW
     return np.asarray(kept[np.argsort(side * points[kept, sight], kind="stable")])
 
 
-def mark_size(points: Array, area: float) -> float:
-    """Return the area [pt^2] of markers that leave a cloud readable on a panel of so many pt^2."""
-    return float(np.clip(0.45 * area / max(len(points), 1), SMALLEST_MARK, LARGEST_MARK))
+def mark_size(count: int, area: float) -> float:
+    """Return the area [pt^2] of markers that leave so many readable on a panel of so many pt^2."""
+    return float(np.clip(0.45 * area / max(count, 1), SMALLEST_MARK, LARGEST_MARK))
 
 
 def outline(points: Array, view: tuple[int, int, int, float], parameters: int) -> Outline:

@@ -137,7 +137,7 @@ def _cloud_panel(
     axes.scatter(
         *tips[k].T,
         c=numbers[k],
-        s=mark_size(k, 90_000),
+        s=mark_size(len(k), 90_000),
         cmap=_MAP,
         norm=scale,
         depthshade=False,
@@ -203,7 +203,7 @@ def _projection(
         tips[chosen, first],
         tips[chosen, second],
         c=numbers[chosen],
-        s=mark_size(chosen, area),
+        s=mark_size(len(chosen), area),
         cmap=_MAP,
         norm=scale,
         linewidths=0,
@@ -241,20 +241,15 @@ def _captions(figure: Figure, poses: int, drawn_3d: int, drawn: list[int], outli
     """Explain the lines, and say how many poses are drawn where not all are."""
     from matplotlib.lines import Line2D
 
+    kinds: tuple[tuple[str, Any], ...] = (("boundary", "-"), ("hull", (0, (4, 3))))
     lines = [
-        Line2D([], [], color=INK, linewidth=1.1, label="boundary"),
-        Line2D([], [], color=GREY, linewidth=0.9, linestyle=(0, (4, 3)), label="convex hull"),
+        Line2D([], [], color=style["colors"], linewidth=style["linewidths"], linestyle=dashes, label=words)
+        for (name, dashes), style, words in zip(kinds, (_BOUNDARY, _HULL), ("boundary", "convex hull"), strict=True)
+        if any(len(getattr(found, name)) for found in outlines)
     ]
-    if any(len(found.hull) for found in outlines):
-        figure.legend(
-            handles=lines,
-            loc="upper right",
-            bbox_to_anchor=(0.99, 0.945),
-            ncols=2,
-            fontsize=SMALL,
-            frameon=False,
-            labelcolor=INK,
-        )
+    style: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "labelcolor": INK}
+    if lines:
+        figure.legend(handles=lines, loc="upper right", bbox_to_anchor=(0.99, 0.945), ncols=2, **style)
     least, most = min(drawn), max(drawn)
     flat = f"{least:,}" if least == most else f"{least:,} to {most:,}"
     if drawn_3d == poses == least:

@@ -109,8 +109,10 @@ def convex_hull(points: Array, parameters: int = 3) -> Boundary:
     hull = ConvexHull(cloud.local)
     used, facets = np.unique(hull.simplices, return_inverse=True)
     facets = facets.reshape(hull.simplices.shape).astype(np.int64)
-    measures = (hull.volume, hull.area, 0.0) if cloud.extent is Extent.SOLID else (0.0, hull.volume, hull.area)
-    return Boundary(extent, *map(float, measures), cloud.points[used], facets, None, len(points))
+    # in a plane scipy calls the area volume and the outline area
+    content, skin = float(hull.volume), float(hull.area)
+    measures = (content, skin, 0.0) if cloud.extent is Extent.SOLID else (0.0, content, skin)
+    return Boundary(extent, *measures, cloud.points[used], facets, None, len(points))
 
 
 def alpha_shape(
@@ -290,7 +292,7 @@ def _outside_facets(made: _Triangulation, kept: NDArray[np.bool_]) -> Index:
     owner, opposite = np.nonzero(kept[:, None] & ((made.across < 0) | ~kept[made.across]))
     corners = made.simplices[owner]
     others = np.arange(corners.shape[1])[None, :] != opposite[:, None]
-    return corners[others].reshape(len(owner), -1)
+    return np.asarray(corners[others].reshape(len(owner), -1))
 
 
 def _contents(points: Array, simplices: Index) -> Array:

@@ -20,7 +20,7 @@ Index = NDArray[np.int64]
 WITHIN = 1.0  # pressures that differ by no more are equal [Pa]
 _USED = 100.0  # a set at less has no pressure, in naming groups [Pa]
 _SAME_TIP = 1e-3  # of L_0: poses at one pressure with tips farther apart differ in something else
-MOST_GROUPS = 7
+MOST_GROUPS = 8
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from os import PathLike
@@ -177,12 +177,40 @@ def read_column(workspace: Workspace, name: str) -> Column:
         values = np.asarray(data[variable][(slice(None), *index)], dtype=float)
         unit = _unit(data[variable])
         meaning = str(data[variable].attrs.get("long_name", name))
-    if name not in _KNOWN_OF_FAILED and variable not in _KNOWN_OF_FAILED:
+    if variable in _POSE_NUMBERS:
         values[~workspace.solved] = np.nan
     return Column(name, unit, meaning, values)
 
 
-_KNOWN_OF_FAILED = ("pressure_bar", "residual", "t_s", "iterations", "intervals", "lane")
+def read_block(workspace: Workspace, names: Sequence[str], rows: slice) -> list[NDArray[Any]]:
+    """Return some rows of columns as they stand in the file, NaN where a pose has no solution.
+
+    Raises
+    ------
+    InputError
+        When the file is no longer what it was.
+    """
+    hidden = ~workspace.solved[rows]
+    blocks: dict[str, NDArray[Any]] = {}
+    found = []
+    with _opened(workspace.file) as data:
+        known = {name: (variable, index) for name, variable, index in _columns(data)}
+        for name in names:
+            variable, index = known[name]
+            if variable not in blocks:
+                blocks[variable] = np.asarray(data[variable][rows])
+            values = blocks[variable][(slice(None), *index)]
+            if variable in _POSE_NUMBERS and values.dtype.kind == "f":
+                values = np.where(hidden, np.nan, values)
+            found.append(values)
+    return found
+
+
+_POSE_NUMBERS = (
+    *("tip_position_mm", "tip_rotation", "bending_angle_deg", "tilt_deg", "stretch", "backbone_length_mm"),
+    *("chamber_length_mm", "discretisation_error", "blocked_force_N", "gap_mm", "stable"),
+)
+"""What a pose without a solution does not have, whatever the file says; the rest is what was asked, or how it went."""
 
 
 @contextmanager
