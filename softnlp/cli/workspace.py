@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +11,7 @@ import numpy as np
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, progress, say
 from softnlp.errors import InputError
+from softnlp.units import BAR, DEGREE, MILLIMETRE
 
 if TYPE_CHECKING:
     from softnlp.workspace.boundary import Boundary
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from softnlp.workspace.read import Workspace
     from softnlp.workspace.summary import Summary
 
+CM = 1e-2
 _FIGURES = (".png", ".pdf", ".svg")
 
 
@@ -63,7 +64,6 @@ def workspace(
     from softnlp.plots import save_figure
     from softnlp.plots.dexterity import dexterity_figure
     from softnlp.plots.workspace import workspace_figure
-    from softnlp.units import MILLIMETRE
     from softnlp.workspace.export import export_csv
     from softnlp.workspace.read import load_workspace
     from softnlp.workspace.summary import summarise
@@ -117,7 +117,6 @@ def _places(found: Workspace, out: Path | None) -> tuple[Path, _Places]:
 
 def _compared(found: Workspace, against: Path, within_bar: float) -> tuple[Comparison, Measured | None]:
     """Compare with whatever is there."""
-    from softnlp.units import BAR
     from softnlp.workspace.comparison import compare_measured, compare_workspaces
     from softnlp.workspace.measured import load_measured
     from softnlp.workspace.read import load_workspace
@@ -144,15 +143,16 @@ def _write_comparison(
     """Print and write a comparison; return the files."""
     from softnlp.plots import save_figure
     from softnlp.plots.comparison import comparison_figure
-    from softnlp.results.files import write_whole
+    from softnlp.results.files import placed_whole
     from softnlp.workspace.comparison import comparison_rows
 
     say("\n".join(["", *_comparison_lines(compared)]))
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
     header, rows = comparison_rows(compared, measured)
-    writer.writerows([header, *rows])
-    return [save_figure(comparison_figure(found, compared), drawn), write_whole(table, text.getvalue().encode())]
+    with placed_whole(table) as part, part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
+    return [save_figure(comparison_figure(found, compared), drawn), table]
 
 
 def _aligned(rows: Iterator[tuple[str, str]]) -> list[str]:
@@ -163,7 +163,7 @@ def _aligned(rows: Iterator[tuple[str, str]]) -> list[str]:
 
 def _summary_rows(found: Workspace, s: Summary) -> Iterator[tuple[str, str]]:
     """Yield what a sweep comes to, as name and value."""
-    mm = 1e-3
+    mm, deg = MILLIMETRE, DEGREE
     yield "workspace", f"{found.title}: {found.robot.name}, {found.material}"
     yield "poses", f"{s.poses:,}"
     yield "solved", f"{s.solved:,}" + (f" ({s.unstable:,} unstable)" if s.unstable else "")
@@ -177,7 +177,12 @@ def _summary_rows(found: Workspace, s: Summary) -> Iterator[tuple[str, str]]:
     yield "convex hull", _body(s.hull)
     yield "boundary", _body(s.boundary)
     d = s.dexterity
-    tilts = np.degrees([d.lowest_tilt.min(), d.highest_tilt.max(), np.median(d.tilt_range), d.tilt_range.max()])
+    tilts = [
+        d.lowest_tilt.min() / deg,
+        d.highest_tilt.max() / deg,
+        np.median(d.tilt_range) / deg,
+        d.tilt_range.max() / deg,
+    ]
     yield (
         "tilts",
         f"{tilts[0]:.1f} to {tilts[1]:.1f} deg; within a voxel {tilts[2]:.1f} (median), {tilts[3]:.1f} (most)",
@@ -190,7 +195,7 @@ def _summary_rows(found: Workspace, s: Summary) -> Iterator[tuple[str, str]]:
     yield (
         "voxels",
         f"{len(d.voxel):,} of {d.size / mm:.3g} mm, {float(np.median(d.poses)):.0f} poses (median); "
-        f"{d.directions} directions of {np.degrees(d.resolution):.1f} deg",
+        f"{d.directions} directions of {d.resolution / deg:.1f} deg",
     )
     yield "worst residual", f"{s.worst_residual:.1e}"
 
@@ -199,13 +204,13 @@ def _body(body: Boundary) -> str:
     """Return the measures of a hull or a boundary, or what it is instead."""
     from softnlp.workspace.boundary import Extent
 
-    radius = "" if body.radius is None else f", radius {body.radius * 1e3:.2f} mm, of {body.points:,} poses"
+    radius = "" if body.radius is None else f", radius {body.radius / MILLIMETRE:.2f} mm, of {body.points:,} poses"
     if body.extent is Extent.SOLID:
-        return f"{body.volume * 1e6:.4g} cm^3, surface {body.area * 1e4:.4g} cm^2{radius}"
+        return f"{body.volume / CM**3:.4g} cm^3, surface {body.area / CM**2:.4g} cm^2{radius}"
     if body.extent is Extent.FLAT:
-        return f"{body.area * 1e4:.4g} cm^2 ({body.extent.meaning}{radius})"
+        return f"{body.area / CM**2:.4g} cm^2 ({body.extent.meaning}{radius})"
     if body.volume:
-        return f"{body.volume * 1e6:.4g} cm^3 about {body.extent.meaning}"
+        return f"{body.volume / CM**3:.4g} cm^3 about {body.extent.meaning}"
     return f"none: {body.extent.meaning}"
 
 
@@ -216,16 +221,16 @@ def _comparison_lines(compared: Comparison) -> list[str]:
     every = np.ones(len(compared.row), bool)
     table = [["pressurised", "pairs", "mean", "median", "RMSE", "max [mm]", "mean [%]"]]
     for name, mask in [*groups(compared.pressure), ("all", every)]:
-        s = statistics(compared.distance[mask] * 1e3)
-        numbers = [s.mean, s.median, s.root_mean_square, s.largest, 0.1 * s.mean / compared.length]
+        s = statistics(compared.distance[mask] / MILLIMETRE)
+        numbers = [s.mean, s.median, s.root_mean_square, s.largest, 100 * s.mean * MILLIMETRE / compared.length]
         table.append([name, f"{s.count:,}", *(f"{v:.3f}" for v in numbers)])
     widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
-    lines = [f"tip against {compared.against}; % of the length {compared.length * 1e3:.4g} mm"]
+    lines = [f"tip against {compared.against}; % of the length {compared.length / MILLIMETRE:.4g} mm"]
     for row in table:
         cells = [row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))]
         lines.append("  ".join(cells))
     if compared.angle is not None:
-        s = statistics(np.degrees(compared.angle))
+        s = statistics(compared.angle / DEGREE)
         lines.append(
             f"bending angle: mean difference {s.mean:.3f} deg, RMSE {s.root_mean_square:.3f}, max {s.largest:.3f}"
         )

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.errors import InputError
-from softnlp.units import MILLIMETRE
+from softnlp.units import BAR, DEGREE, MILLIMETRE
 from softnlp.workspace.again import solve_again
 from softnlp.workspace.measured import Measured
 from softnlp.workspace.read import Workspace
@@ -234,45 +234,35 @@ def _require_some(known: NDArray[np.bool_], workspace: Workspace, other: str, wi
     if not known.any():
         why = f" ({reason})" if reason else ""
         raise InputError(
-            f"no pose of {workspace.file} is within {within / 1e5:g} bar of a pressure of {other} and solved{why}"
+            f"no pose of {workspace.file} is within {within / BAR:g} bar of a pressure of {other} and solved{why}"
         )
 
 
-def comparison_rows(comparison: Comparison, measured: Measured | None = None) -> tuple[list[str], list[list[str]]]:
-    """Return the header and the rows of a comparison as CSV cells.
+def comparison_rows(comparison: Comparison, measured: Measured | None = None) -> tuple[list[str], Iterator[list[str]]]:
+    """Return the header of a comparison as CSV and what yields its rows.
 
     A measured file's own columns come first, as they stand in it; otherwise the pose's number and its pressures.
     """
     mm = [f"{axis}_mm" for axis in "xyz"]
-    added = [*(f"simulated_{name}" for name in mm), *(f"error_{name}" for name in mm), "error_mm", "error_percent"]
+    header = ["pose", *(f"p{k + 1}_bar" for k in range(comparison.pressure.shape[1])), *(f"other_{x}" for x in mm)]
     if measured is not None:
-        header = [*measured.header, *added, "pose_from"]
-        left = [list(measured.cells[row]) for row in comparison.row]
-    else:
-        pressures = [f"p{k + 1}_bar" for k in range(comparison.pressure.shape[1])]
-        header = ["pose", *pressures, *(f"other_{name}" for name in mm), *added]
-        bar = comparison.pressure / 1e5
-        left = [
-            [str(row + 1), *map(_cell, P), *map(_cell, p / MILLIMETRE)]
-            for row, P, p in zip(comparison.row, bar, comparison.other, strict=True)
-        ]
-    numbers = np.column_stack(
-        [
-            comparison.tip_position / MILLIMETRE,
-            comparison.error / MILLIMETRE,
-            comparison.distance / MILLIMETRE,
-            100 * comparison.distance / comparison.length,
-        ]
-    )
-    rows = [cells + list(map(_cell, line)) for cells, line in zip(left, numbers, strict=True)]
-    if measured is not None:
-        words = np.where(comparison.solved_again, "solved", "workspace")
-        rows = [[*row, str(word)] for row, word in zip(rows, words, strict=True)]
-    if comparison.angle is not None:
-        header.append("bending_angle_difference_deg")
-        rows = [[*row, _cell(a)] for row, a in zip(rows, np.degrees(comparison.angle), strict=True)]
-    return header, rows
+        header = list(measured.header)
+    header += [*(f"simulated_{x}" for x in mm), *(f"error_{x}" for x in mm), "error_mm", "error_percent"]
+    header += ["bending_angle_difference_deg"] * (comparison.angle is not None)
+    header += ["pose_from"] * (measured is not None)
+    return header, _rows(comparison, measured)
 
 
-def _cell(value: float) -> str:
-    return f"{value:.9g}"
+def _rows(c: Comparison, measured: Measured | None) -> Iterator[list[str]]:
+    columns = [c.tip_position / MILLIMETRE, c.error / MILLIMETRE, c.distance / MILLIMETRE, 100 * c.distance / c.length]
+    if measured is None:
+        columns = [c.pressure / BAR, c.other / MILLIMETRE, *columns]
+    if c.angle is not None:
+        columns.append(c.angle / DEGREE)
+    table = np.column_stack(columns)
+    for k, row in enumerate(c.row.tolist()):
+        numbers = [f"{value:.9g}" for value in table[k].tolist()]
+        if measured is None:
+            yield [str(row + 1), *numbers]
+        else:
+            yield [*measured.cells[row], *numbers, "solved" if c.solved_again[k] else "workspace"]

@@ -191,7 +191,7 @@ def read_block(workspace: Workspace, names: Sequence[str], rows: slice) -> list[
         When the file is no longer what it was.
     """
     hidden = ~workspace.solved[rows]
-    blocks: dict[str, NDArray[Any]] = {}
+    blocks: dict[str, Any] = {}
     found = []
     with _opened(workspace.file) as data:
         known = {name: (variable, index) for name, variable, index in _columns(data)}
@@ -199,7 +199,7 @@ def read_block(workspace: Workspace, names: Sequence[str], rows: slice) -> list[
             variable, index = known[name]
             if variable not in blocks:
                 blocks[variable] = np.asarray(data[variable][rows])
-            values = blocks[variable][(slice(None), *index)]
+            values = blocks[variable][(..., *index)]
             if variable in _POSE_NUMBERS and values.dtype.kind == "f":
                 values = np.where(hidden, np.nan, values)
             found.append(values)
