@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softnlp.workspace.boundary import Extent, alpha_shape, convex_hull, reach, thinned
+from softnlp.workspace.boundary import WIDENING, Extent, alpha_shape, convex_hull, reach, thinned
 
 RNG = np.random.default_rng(4)
 
@@ -47,14 +47,15 @@ def test_a_cube_of_grid_points_is_exact(angle: float) -> None:
         assert body.volume == pytest.approx(0.04**3, rel=1e-9)
         assert body.area == pytest.approx(6 * 0.04**2, rel=1e-9)
     assert convex_hull(cube).radius is None
-    # half the space diagonal of a cell reaches every point; the default is twice that
-    assert alpha_shape(cube).radius == pytest.approx(2 * 0.04 / 8 * 3**0.5 / 2, rel=1e-6)
+    assert alpha_shape(cube).outside == 0
+    # half the space diagonal of a cell takes in every point; the default is wider
+    assert alpha_shape(cube).radius == pytest.approx(WIDENING * 0.04 / 8 * 3**0.5 / 2, rel=1e-6)
 
 
 def test_a_ball_is_approached_from_within() -> None:
     volumes = [alpha_shape(shell(n, 0.0)).volume for n in (500, 8000)]
     assert volumes[0] < volumes[1] < 4 / 3 * pi
-    assert volumes[1] == pytest.approx(4 / 3 * pi, rel=0.09)
+    assert volumes[1] == pytest.approx(4 / 3 * pi, rel=0.11)
     ball = directions(3000)
     assert convex_hull(ball).volume == pytest.approx(4 / 3 * pi, rel=0.01)
     assert convex_hull(ball).area == pytest.approx(4 * pi, rel=0.01)
@@ -64,8 +65,8 @@ def test_the_hollow_of_a_shell_is_outside() -> None:
     cloud = shell(6000, 0.6)
     full, found = convex_hull(cloud), alpha_shape(cloud)
     assert full.volume > 0.93 * 4 / 3 * pi
-    assert found.volume == pytest.approx(4 / 3 * pi * (1 - 0.6**3), rel=0.12)
-    assert found.area == pytest.approx(4 * pi * (1 + 0.36), rel=0.05)
+    assert found.volume == pytest.approx(4 / 3 * pi * (1 - 0.6**3), rel=0.16)
+    assert found.area == pytest.approx(4 * pi * (1 + 0.36), rel=0.1)
     # a radius as wide as the hollow fills it
     assert alpha_shape(cloud, 2.0).volume > 0.93 * 4 / 3 * pi
 
@@ -77,6 +78,14 @@ def test_a_notch_is_outside_and_the_area_counts_it() -> None:
     # the sphere does not reach into the corner: half a cell stays over it
     assert found.volume == pytest.approx(48.0 + 4 * 0.25**2 / 2, rel=1e-9)
     assert convex_hull(cloud).volume == pytest.approx(64 - 8, rel=1e-9)
+
+
+def test_a_few_stray_points_do_not_fill_the_hollow() -> None:
+    cloud = np.vstack([shell(6000, 0.6), [[0, 0, 1.5], [0.1, 0, -1.4], [0, 0, 0.05]]])
+    found = alpha_shape(cloud)
+    assert found.volume == pytest.approx(4 / 3 * pi * (1 - 0.6**3), rel=0.16)
+    assert found.outside >= 3
+    assert alpha_shape(cloud, 3.0).outside == 0
 
 
 def test_a_closed_surface_has_the_facets_of_a_body() -> None:
@@ -108,8 +117,8 @@ def test_a_disc_and_a_ring_have_an_area_alone() -> None:
     for found in (convex_hull(disc), alpha_shape(disc)):
         assert found.extent is Extent.FLAT
         assert found.volume == 0
-        assert found.area == pytest.approx(pi, rel=0.03)
-        assert found.length == pytest.approx(2 * pi, rel=0.05)
+        assert found.area == pytest.approx(pi, rel=0.06)
+        assert found.length > 0.98 * 2 * pi
         assert found.facets.shape[1] == 2
         # the corners are the points themselves, in space
         assert np.linalg.norm(found.vertices - [1, 2, 3], axis=1).max() <= 1 + 1e-9
@@ -191,4 +200,4 @@ def test_a_thinned_cloud_has_the_volume_of_the_whole() -> None:
     cloud = shell(30_000, 0.5)
     part = alpha_shape(cloud, most=5000)
     assert part.points <= 5000
-    assert part.volume == pytest.approx(4 / 3 * pi * (1 - 0.125), rel=0.1)
+    assert part.volume == pytest.approx(4 / 3 * pi * (1 - 0.125), rel=0.16)

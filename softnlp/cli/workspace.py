@@ -54,7 +54,7 @@ def workspace(
     voxel_mm
         Edge of the voxels of the dexterity; a twentieth of the cloud's extent by default.
     radius_mm
-        How wide a hollow the boundary follows; by default twice the widest gap between neighbouring poses.
+        How wide a hollow the boundary follows; by default 2.5 times the radius that takes in 95 % of the poses.
     out
         Folder for what is written, or a PNG, PDF or SVG file for the figure, with the others beside it; the sweep's
         folder by default.
@@ -205,6 +205,7 @@ def _body(body: Boundary) -> str:
     from softnlp.workspace.boundary import Extent
 
     radius = "" if body.radius is None else f", radius {body.radius / MILLIMETRE:.2f} mm, of {body.points:,} poses"
+    radius += f", {body.outside:,} outside" if body.outside else ""
     if body.extent is Extent.SOLID:
         return f"{body.volume / CM**3:.4g} cm^3, surface {body.area / CM**2:.4g} cm^2{radius}"
     if body.extent is Extent.FLAT:

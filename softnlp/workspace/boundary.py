@@ -2,8 +2,9 @@
 
 The concave boundary is made of the Delaunay simplices whose circumscribed sphere is not larger than a radius
 (Edelsbrunner and Mücke, ACM Trans. Graph. 13, 1994): hollows and gaps wider than that radius stay outside. Without a
-radius it is twice the smallest that leaves no point out and keeps the body in one piece; at the smallest itself a cloud
-of random points is riddled with holes. Clouds that fill no volume are named, not refused.
+radius it is 2.5 times the smallest that takes in 95 % of the points: at the smallest itself a cloud of random points is
+riddled with holes, and the last few points, at tips and corners, would ask for spheres that fill every hollow. Clouds
+that fill no volume are named, not refused.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ Index = NDArray[np.int64]
 
 FLATNESS = 1e-6  # of the largest extent: a cloud that is thinner is flat
 MOST_POINTS = 20_000  # of a Delaunay triangulation; more are thinned to one a cell
-WIDENING = 2.0  # the radius over the smallest one that takes in every point
+TAKEN_IN, WIDENING = 0.95, 2.5  # of the points by the smallest radius, and the radius over that one
 _SLIVER = 1e-12  # volume of a flat simplex, of its longest edge's power
 _CIRCLE = 1e-6  # corners that are so near to a common circle lie on it
 
@@ -60,7 +61,8 @@ class Boundary:
     flat cloud covers [m^2], else 0. length : around a flat cloud, or of a line [m], else 0.
     vertices : (V, 3) [m]. facets : (F, 3) or (F, 2) rows of `vertices`.
     radius : of the alpha shape [m], None for a convex hull and where there is none.
-    points : how many points it was made of, those left out by thinning not counted.
+    points : how many points it was made of, those left out by thinning not counted. outside : how many of them an alpha
+    shape leaves out.
     """
 
     extent: Extent
@@ -71,6 +73,7 @@ class Boundary:
     facets: Index
     radius: float | None
     points: int
+    outside: int = 0
 
 
 @dataclass(frozen=True)
@@ -123,8 +126,8 @@ def alpha_shape(
     Parameters
     ----------
     points : the cloud; of more than `most`, one a cell of a grid is taken (`thinned`).
-    radius : largest radius of a circumscribed sphere [m]; by default twice the smallest that takes in every point and
-        keeps one piece.
+    radius : largest radius of a circumscribed sphere [m]; by default 2.5 times the smallest that takes in 95 % of
+        the points. Those that it leaves out are counted.
     parameters : as in `convex_hull`; a surface or a curve in space has no concave boundary, and gets none.
     """
     cloud = _flattened(points)
@@ -135,7 +138,7 @@ def alpha_shape(
     chosen = np.arange(len(points)) if most is None else thinned(cloud.local, most)
     local, scale = cloud.local[chosen], cloud.scale
     made = _delaunay(local / scale)
-    limit = WIDENING * _smallest_radius(made, len(local)) if radius is None else radius / scale
+    limit = WIDENING * _usual_radius(made, len(local)) if radius is None else radius / scale
     kept = made.radii <= limit
     facets = _outside_facets(made, kept)
     used, numbered = np.unique(facets, return_inverse=True)
@@ -149,6 +152,7 @@ def alpha_shape(
         numbered.reshape(facets.shape).astype(np.int64),
         limit * scale,
         len(local),
+        _outside(made.simplices[kept], local),
     )
 
 
@@ -257,34 +261,20 @@ def _delaunay(points: Array) -> _Triangulation:
     return _Triangulation(simplices, found.neighbors.astype(np.int64), radii)
 
 
-def _smallest_radius(made: _Triangulation, points: int) -> float:
-    """Return the smallest radius at which every point is a corner and the simplices hang together by their facets."""
+def _usual_radius(made: _Triangulation, points: int) -> float:
+    """Return the radius at which all but a few points are a corner of a simplex that is kept."""
     finite = np.isfinite(made.radii)
     least = np.full(points, np.inf)
     for column in made.simplices[finite].T:
         np.minimum.at(least, column, made.radii[finite])
-    # a point that is in no simplex, a duplicate for instance, cannot be taken in
-    needed = float(least[np.isfinite(least)].max(initial=0.0))
-    candidates = np.unique(made.radii[finite & (made.radii >= needed)])
-    low, high = 0, len(candidates) - 1
-    while low < high:
-        middle = (low + high) // 2
-        if _in_one_piece(made.across, made.radii <= candidates[middle]):
-            high = middle
-        else:
-            low = middle + 1
-    return float(candidates[low]) if len(candidates) else needed
+    # a point that is in no simplex, a duplicate for instance, has none
+    return float(np.quantile(least[np.isfinite(least)], TAKEN_IN))
 
 
-def _in_one_piece(across: Index, kept: NDArray[np.bool_]) -> bool:
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    owner, facet = np.nonzero((across >= 0) & kept[across] & kept[:, None])
-    numbers = np.cumsum(kept) - 1
-    n = int(kept.sum())
-    links = (np.ones(len(owner), np.int8), (numbers[owner], numbers[across[owner, facet]]))
-    return bool(connected_components(coo_array(links, shape=(n, n)), directed=False)[0] == 1)
+def _outside(simplices: Index, points: Array) -> int:
+    """Return how many places have a point but no simplex; a point given twice is one place."""
+    inside = np.unique(simplices)
+    return len(np.unique(points, axis=0)) - len(inside)
 
 
 def _outside_facets(made: _Triangulation, kept: NDArray[np.bool_]) -> Index:
