@@ -44,7 +44,7 @@ def arcs(pressures: np.ndarray, model: Model = MODEL) -> dict[str, np.ndarray]:
     balance = made.section(c, stretch)[1]
     newton = ca.Function("newton", [c, stretch], [balance, ca.jacobian(balance, stretch)])
     found = np.ones((1, N))
-    for _ in range(40):
+    for _ in range(12):
         value, slope = newton(column, found)
         found = found - np.asarray(value) / np.asarray(slope)
     L_0 = model.robot.length
