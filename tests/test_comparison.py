@@ -358,6 +358,7 @@ def blocks(language: str) -> list[str]:
 
 def test_the_document_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("softnlp.plots.style.DPI", 30)  # quicker, and as good here
     write_workspace(Path("results/D25L60"), grid(4))
     write_workspace(Path("results/D25L60_loaded"), grid(4), move=np.array([1e-3, 0, 0]))
     Path("measured.csv").write_text(blocks("csv")[0])
