@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_WIDTH, _HEIGHT, _ROW = 11.0, 11.5, 2.65
+_WIDTH, _HEIGHT, _ROW = 11.0, 11.8, 2.65
 _LEFT, _RIGHT, _GAP = 0.17, 0.985, 0.05
 
 
