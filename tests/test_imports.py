@@ -40,7 +40,10 @@ LAYERS = (
     *("workspace.batch", "workspace.contact_batch", "workspace.pose_lane", "workspace.blocked_lane"),
     *("workspace.chunk", "workspace.*"),
     *("scenario_schema", "scenario_check", "pressures", "scenario_contact", "scenario"),
-    *("runner_blocked", "runner", "results", "plots", "cli", "__main__"),
+    *("runner_blocked", "runner", "results"),
+    *("workspace.read", "workspace.boundary", "workspace.dexterity", "workspace.summary", "workspace.export"),
+    *("workspace.measured", "workspace.again", "workspace.comparison"),
+    *("plots", "cli", "__main__"),
 )
 MIXED = ("results", "plots", "cli")
 LONGEST_FILE = 400

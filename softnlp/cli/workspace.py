@@ -1,0 +1,247 @@
+"""`softnlp workspace`: a finished sweep in numbers and figures, and compared with a measurement or another sweep."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from softnlp.cli.console import SOLVED, SOME_UNSOLVED, progress, say
+from softnlp.errors import InputError
+from softnlp.units import BAR, DEGREE, MILLIMETRE
+
+if TYPE_CHECKING:
+    from softnlp.workspace.boundary import Boundary
+    from softnlp.workspace.comparison import Comparison
+    from softnlp.workspace.measured import Measured
+    from softnlp.workspace.read import Workspace
+    from softnlp.workspace.summary import Summary
+
+CM = 1e-2
+_FIGURES = (".png", ".pdf", ".svg")
+
+
+def workspace(
+    results: Path,
+    /,
+    *,
+    colour: str = "bending_angle_deg",
+    against: Path | None = None,
+    within_bar: float = 1e-5,
+    voxel_mm: float | None = None,
+    radius_mm: float | None = None,
+    out: Path | None = None,
+    csv: Path | None = None,
+) -> int:
+    """Show where a sweep's tip goes: reach, volume and dexterity as a table, the cloud as a figure.
+
+    Writes workspace.png and dexterity.png, and with --against comparison.png and comparison.csv. The exit status is 3
+    when the pose at a measured pressure has no solution.
+
+    Parameters
+    ----------
+    results
+        Folder of a sweep, or its workspace.nc.
+    colour
+        What colours the poses: a number of the file by name, p1_bar or tip_position_z_mm for instance.
+    against
+        A measured CSV file with columns t_s, p1_bar, ..., x_mm, y_mm, z_mm, or another sweep.
+    within_bar
+        Pressures that differ by no more are compared; a measured pressure farther from any pose is solved for.
+    voxel_mm
+        Edge of the voxels of the dexterity; a twentieth of the cloud's extent by default.
+    radius_mm
+        How wide a hollow the boundary follows; by default 2.5 times the radius that takes in 95 % of the poses.
+    out
+        Folder for what is written, or a PNG, PDF or SVG file for the figure, with the others beside it; the sweep's
+        folder by default.
+    csv
+        Write all poses to this CSV file as well.
+    """
+    from softnlp.plots import save_figure
+    from softnlp.plots.dexterity import dexterity_figure
+    from softnlp.plots.workspace import workspace_figure
+    from softnlp.workspace.export import export_csv
+    from softnlp.workspace.read import load_workspace
+    from softnlp.workspace.summary import summarise
+
+    for key, value in (("--voxel-mm", voxel_mm), ("--radius-mm", radius_mm)):
+        if value is not None and not (np.isfinite(value) and value > 0):
+            raise InputError(f"expected a number above 0, got {value:g}", key=key)
+    found = load_workspace(results)
+    figure = workspace_figure(found, colour)
+    compared = None if against is None else _compared(found, against, within_bar)
+    summary = summarise(
+        found,
+        radius=None if radius_mm is None else radius_mm * MILLIMETRE,
+        voxel=None if voxel_mm is None else voxel_mm * MILLIMETRE,
+    )
+    cloud, others = _places(found, out)
+    say("\n".join(_aligned(_summary_rows(found, summary))))
+    written = [save_figure(figure, cloud)]
+    if summary.dexterity is not None:
+        drawn = dexterity_figure(summary.dexterity, found.title, found.robot.name)
+        written.append(save_figure(drawn, others("dexterity", cloud.suffix)))
+    if compared is not None:
+        written += _write_comparison(found, *compared, others("comparison", cloud.suffix), others("comparison", ".csv"))
+    if csv is not None:
+        written.append(export_csv(found, csv))
+    say("\n".join(f"written to {path}" for path in written))
+    asked_in_vain = compared is not None and compared[1] is not None and compared[0].unsolved
+    return SOME_UNSOLVED if asked_in_vain else SOLVED
+
+
+class _Places:
+    """Where the other files go: in the folder of the figure, named after it unless it has its usual name."""
+
+    def __init__(self, cloud: Path, own_name: bool) -> None:
+        self._folder, self._stem = cloud.parent, f"{cloud.stem}-" if own_name else ""
+
+    def __call__(self, name: str, suffix: str) -> Path:
+        return self._folder / f"{self._stem}{name}{suffix}"
+
+
+def _places(found: Workspace, out: Path | None) -> tuple[Path, _Places]:
+    """Return the file of the figure, and what names the others; a folder is made where it is missing."""
+    from softnlp.results.files import make_folder
+
+    if out is not None and out.suffix.lower() in _FIGURES and not out.is_dir():
+        return out, _Places(out, True)
+    folder = make_folder(found.file.parent if out is None else out)
+    cloud = folder / "workspace.png"
+    return cloud, _Places(cloud, False)
+
+
+def _compared(found: Workspace, against: Path, within_bar: float) -> tuple[Comparison, Measured | None]:
+    """Compare with whatever is there."""
+    from softnlp.workspace.comparison import compare_measured, compare_workspaces
+    from softnlp.workspace.measured import load_measured
+    from softnlp.workspace.read import load_workspace
+
+    if not (np.isfinite(within_bar) and within_bar >= 0):
+        raise InputError(f"expected a number of at least 0, got {within_bar:g}", key="--within-bar")
+    within = within_bar * BAR
+    if against.is_dir() or against.suffix.lower() == ".nc":
+        return compare_workspaces(found, load_workspace(against), within=within), None
+    measured = load_measured(against, found.robot.chamber_sets)
+    with progress(len(measured.pressure), f"poses of {against.name}") as (advance, stop_asked):
+
+        def told(done: int, total: int) -> None:
+            advance(len(measured.pressure) - total + done)
+            if stop_asked():
+                raise KeyboardInterrupt
+
+        return compare_measured(found, measured, within=within, progress=told), measured
+
+
+def _write_comparison(
+    found: Workspace, compared: Comparison, measured: Measured | None, drawn: Path, table: Path
+) -> list[Path]:
+    """Print and write a comparison; return the files."""
+    from softnlp.plots import save_figure
+    from softnlp.plots.comparison import comparison_figure
+    from softnlp.results.files import placed_whole
+    from softnlp.workspace.comparison import comparison_rows
+
+    say("\n".join(["", *_comparison_lines(compared)]))
+    header, rows = comparison_rows(compared, measured)
+    with placed_whole(table) as part, part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
+    return [save_figure(comparison_figure(found, compared), drawn), table]
+
+
+def _aligned(rows: Iterator[tuple[str, str]]) -> list[str]:
+    listed = list(rows)
+    width = max(len(name) for name, _ in listed)
+    return [f"{name.ljust(width)}  {value}" for name, value in listed]
+
+
+def _summary_rows(found: Workspace, s: Summary) -> Iterator[tuple[str, str]]:
+    """Yield what a sweep comes to, as name and value."""
+    mm, deg = MILLIMETRE, DEGREE
+    yield "workspace", f"{found.title}: {found.robot.name}, {found.material}"
+    yield "poses", f"{s.poses:,}"
+    yield "solved", f"{s.solved:,}" + (f" ({s.unstable:,} unstable)" if s.unstable else "")
+    yield "failed", ", ".join(f"{n:,} {status}" for status, n in s.failed.items()) or "0"
+    if s.dexterity is None:
+        return
+    r = s.reach
+    yield "reach from the base axis", f"{r.nearest_to_axis / mm:.2f} to {r.farthest_from_axis / mm:.2f} mm"
+    yield "reach from the base", f"{r.nearest_to_base / mm:.2f} to {r.farthest_from_base / mm:.2f} mm"
+    yield "height", f"{r.lowest / mm:.2f} to {r.highest / mm:.2f} mm"
+    yield "convex hull", _body(s.hull)
+    yield "boundary", _body(s.boundary)
+    d = s.dexterity
+    tilts = [
+        d.lowest_tilt.min() / deg,
+        d.highest_tilt.max() / deg,
+        np.median(d.tilt_range) / deg,
+        d.tilt_range.max() / deg,
+    ]
+    yield (
+        "tilts",
+        f"{tilts[0]:.1f} to {tilts[1]:.1f} deg; within a voxel {tilts[2]:.1f} (median), {tilts[3]:.1f} (most)",
+    )
+    yield (
+        "dexterity",
+        f"{100 * d.overall:.1f} % of directions anywhere; in a voxel {100 * float(np.mean(d.coverage)):.2f} % (mean), "
+        f"{100 * float(d.coverage.max()):.2f} % (most)",
+    )
+    yield (
+        "voxels",
+        f"{len(d.voxel):,} of {d.size / mm:.3g} mm, {float(np.median(d.poses)):.0f} poses (median); "
+        f"{d.directions} directions of {d.resolution / deg:.1f} deg",
+    )
+    yield "worst residual", f"{s.worst_residual:.1e}"
+
+
+def _body(body: Boundary) -> str:
+    """Return the measures of a hull or a boundary, or what it is instead."""
+    from softnlp.workspace.boundary import Extent
+
+    radius = "" if body.radius is None else f", radius {body.radius / MILLIMETRE:.2f} mm, of {body.points:,} poses"
+    radius += f", {body.outside:,} outside" if body.outside else ""
+    if body.extent is Extent.SOLID:
+        return f"{body.volume / CM**3:.4g} cm^3, surface {body.area / CM**2:.4g} cm^2{radius}"
+    if body.extent is Extent.FLAT:
+        return f"{body.area / CM**2:.4g} cm^2 ({body.extent.meaning}{radius})"
+    if body.volume:
+        return f"{body.volume / CM**3:.4g} cm^3 about {body.extent.meaning}"
+    return f"none: {body.extent.meaning}"
+
+
+def _comparison_lines(compared: Comparison) -> list[str]:
+    """Return the table of the distances, by group and in all, and what was left out."""
+    from softnlp.workspace.comparison import groups, statistics
+
+    every = np.ones(len(compared.row), bool)
+    table = [["pressurised", "pairs", "mean", "median", "RMSE", "max [mm]", "mean [%]"]]
+    for name, mask in [*groups(compared.pressure), ("all", every)]:
+        s = statistics(compared.distance[mask] / MILLIMETRE)
+        numbers = [s.mean, s.median, s.root_mean_square, s.largest, 100 * s.mean * MILLIMETRE / compared.length]
+        table.append([name, f"{s.count:,}", *(f"{v:.3f}" for v in numbers)])
+    widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
+    lines = [f"tip against {compared.against}; % of the length {compared.length / MILLIMETRE:.4g} mm"]
+    for row in table:
+        cells = [row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))]
+        lines.append("  ".join(cells))
+    if compared.angle is not None:
+        s = statistics(compared.angle / DEGREE)
+        lines.append(
+            f"bending angle: mean difference {s.mean:.3f} deg, RMSE {s.root_mean_square:.3f}, max {s.largest:.3f}"
+        )
+    counts = (
+        (int(compared.solved_again.sum()), "pairs whose pose was solved for this"),
+        (compared.skipped, "rows with blanks skipped"),
+        (
+            compared.unmatched,
+            f"rows without a pose at their pressure{f' ({compared.reason})' if compared.reason else ''}",
+        ),
+        (compared.unsolved, "rows whose pose has no solution"),
+    )
+    return lines + [f"{n:,} {words}" for n, words in counts if n]
