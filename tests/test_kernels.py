@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softnlp.workspace.compiled import cache_folder, compiler, library
-from softnlp.workspace.csource import WIDTH, Kernels, c_source
-from softnlp.workspace.grids import grid_level, whole_groups
-from softnlp.workspace.interpreted import Interpreted
-from softnlp.workspace.predictor import predicted
-from softnlp.workspace.shooting import Compiled, shooting
+from softnlp.batch.compiled import cache_folder, compiler, library
+from softnlp.batch.csource import WIDTH, Kernels, c_source
+from softnlp.batch.grids import grid_level, whole_groups
+from softnlp.batch.interpreted import Interpreted
+from softnlp.batch.predictor import predicted
+from softnlp.batch.shooting import Compiled, shooting
 
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 
@@ -92,7 +92,7 @@ def test_what_was_compiled_is_found_again(monkeypatch: pytest.MonkeyPatch, tmp_p
     assert library(source, build=False) is None
     assert library(source) is not None
     assert len(list(tmp_path.rglob("*.so"))) == 1
-    monkeypatch.setattr("softnlp.workspace.compiled._build", lambda *_: pytest.fail("compiled again"))
+    monkeypatch.setattr("softnlp.batch.compiled._build", lambda *_: pytest.fail("compiled again"))
     assert library(source, build=False) is not None
 
 
@@ -109,7 +109,7 @@ def test_a_library_that_does_not_load_is_made_again(monkeypatch: pytest.MonkeyPa
     source = c_source(Kernels({"decay": decay()}, {}))
     assert source is not None
     with monkeypatch.context() as cut_short:
-        cut_short.setattr("softnlp.workspace.compiled._build", lambda _, __, path: path.write_bytes(b"half") > 0)
+        cut_short.setattr("softnlp.batch.compiled._build", lambda _, __, path: path.write_bytes(b"half") > 0)
         assert library(source) is None
     assert library(source, build=False) is None
     assert library(source) is not None

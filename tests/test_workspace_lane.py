@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from softnlp import BAR, Loads, Numerics, material, robot
+from softnlp.batch import shooting
+from softnlp.batch.compiled import compiler
+from softnlp.batch.reduced import reduced_rod
 from softnlp.branch import branch_function, stretch_on_branch
 from softnlp.contact_settings import ContactSettings
 from softnlp.conventions import Coefficients
@@ -14,13 +17,11 @@ from softnlp.quantities import Model
 from softnlp.status import Status
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.statics import PoseSolver
-from softnlp.workspace import pose_lane, shooting
+from softnlp.workspace import pose_lane
 from softnlp.workspace.chunk import ChunkSolver
-from softnlp.workspace.compiled import compiler
 from softnlp.workspace.plan import Plan, cells
 from softnlp.workspace.pose_lane import PoseLane
 from softnlp.workspace.poses import STATUSES, Lane, Rows
-from softnlp.workspace.reduced import reduced_rod
 
 REPRODUCTION_SET = Coefficients()
 LOADED = Loads(tip_force=(0.02, 0.01, -0.015), tip_moment=(1e-4, -2e-4, 1e-4), gravity=(0.0, 0.0, -9.80665))

@@ -7,20 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.batch.arrays import joined, some, spread
+from softnlp.batch.contact_newton import PATH, BlockedShot, ContactBatch, Stage
+from softnlp.batch.csource import Kernels
+from softnlp.batch.reduced import POSITION
+from softnlp.batch.reduced_contact import reduced_contact
+from softnlp.batch.shooting import shooting
 from softnlp.contact_settings import ContactSettings
 from softnlp.loadcase import rod_functions
 from softnlp.rod import Loads
 from softnlp.studies.statics import PoseSolver
 from softnlp.studies.wall import Wall, standing_wall
 from softnlp.tip import tip_conditions
-from softnlp.workspace.columns import joined, some, spread
-from softnlp.workspace.contact_batch import PATH, BlockedShot, ContactBatch, Stage
-from softnlp.workspace.csource import Kernels
 from softnlp.workspace.plan import LOADS, Plan
 from softnlp.workspace.pose_lane import WORTH_COMPILING, PoseLane, Poses, Sections, entries
-from softnlp.workspace.reduced import POSITION
-from softnlp.workspace.reduced_contact import reduced_contact
-from softnlp.workspace.shooting import shooting
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

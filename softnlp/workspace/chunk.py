@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.batch.arrays import some
+from softnlp.batch.reduced import POSITION, ROTATION, STATE
 from softnlp.quantities import Model, with_symbols
 from softnlp.rod import Loads
 from softnlp.status import Status
@@ -16,11 +18,9 @@ from softnlp.studies.pose_grid import Solved
 from softnlp.studies.statics import PoseSolver
 from softnlp.studies.step import Step
 from softnlp.workspace.blocked_lane import CLOSURES, BlockedLane, BlockedPoses, wall_of_plan
-from softnlp.workspace.columns import some
 from softnlp.workspace.plan import Plan
 from softnlp.workspace.pose_lane import PoseLane, Poses
 from softnlp.workspace.poses import STATUSES, Block, Lane, Rows, unsolved_rows
-from softnlp.workspace.reduced import POSITION, ROTATION, STATE
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.batch.arrays import some
+from softnlp.batch.csource import Kernels
+from softnlp.batch.newton import Batch, BatchSolver, Shot
+from softnlp.batch.reduced import reduced_rod
+from softnlp.batch.shooting import shooting
+from softnlp.batch.stretches import Stretches, stretch_maps
 from softnlp.loadcase import rod_functions
-from softnlp.workspace.batch import Batch, BatchSolver, Shot
-from softnlp.workspace.columns import some
-from softnlp.workspace.csource import Kernels
 from softnlp.workspace.plan import LOADS, Plan
-from softnlp.workspace.reduced import reduced_rod
-from softnlp.workspace.shooting import shooting
-from softnlp.workspace.stretches import Stretches, stretch_maps
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.batch.arrays import replaced, some
+from softnlp.batch.csource import WIDTH
+from softnlp.batch.grids import MOST_INTERVALS, grid_level, whole_groups
+from softnlp.batch.predictor import predicted
+from softnlp.batch.reduced import MOMENT, POSITION, ROTATION, STATE
+from softnlp.batch.shooting import Shooting
 from softnlp.loadcase import RodFunctions
 from softnlp.rod import STATE_SIZE
-from softnlp.workspace.columns import replaced, some
-from softnlp.workspace.csource import WIDTH
-from softnlp.workspace.grids import MOST_INTERVALS, grid_level, whole_groups
-from softnlp.workspace.predictor import predicted
-from softnlp.workspace.reduced import MOMENT, POSITION, ROTATION, STATE
-from softnlp.workspace.shooting import Shooting
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.batch.arrays import replaced, some
+from softnlp.batch.csource import WIDTH
+from softnlp.batch.grids import MOST_INTERVALS, grid_level, whole_groups
+from softnlp.batch.reduced import MOMENT, POSITION, ROTATION, STATE
+from softnlp.batch.reduced_contact import UNKNOWN
+from softnlp.batch.shooting import Shooting
 from softnlp.condensed import plane_directions
 from softnlp.loadcase import RodFunctions
-from softnlp.workspace.columns import replaced, some
-from softnlp.workspace.csource import WIDTH
-from softnlp.workspace.grids import MOST_INTERVALS, grid_level, whole_groups
-from softnlp.workspace.reduced import MOMENT, POSITION, ROTATION, STATE
-from softnlp.workspace.reduced_contact import UNKNOWN
-from softnlp.workspace.shooting import Shooting
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

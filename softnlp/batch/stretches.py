@@ -11,10 +11,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.batch.shooting import Shooting
 from softnlp.branch import branch_function
 from softnlp.loadcase import RodFunctions
 from softnlp.units import BAR
-from softnlp.workspace.shooting import Shooting
 
 Array = NDArray[np.float64]
 

@@ -8,16 +8,16 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.workspace.compiled import library
-from softnlp.workspace.csource import WIDTH, Kernels, c_source
-from softnlp.workspace.interpreted import Interpreted, padded
+from softnlp.batch.compiled import library
+from softnlp.batch.csource import WIDTH, Kernels, c_source
+from softnlp.batch.interpreted import Interpreted, padded
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 
 class Shooting(Protocol):
-    """Runs `softnlp.workspace.csource.Kernels`."""
+    """Runs `softnlp.batch.csource.Kernels`."""
 
     def run(self, step: str, intervals: Counts, data: Array, state: Array) -> Array:
         """Return the states at the tip.
@@ -32,7 +32,7 @@ class Shooting(Protocol):
 
 
 class Compiled:
-    """Kernels in a library of `softnlp.workspace.compiled`."""
+    """Kernels in a library of `softnlp.batch.compiled`."""
 
     def __init__(self, code: ctypes.CDLL, kernels: Kernels) -> None:
         self._code = code

@@ -1,6 +1,6 @@
 """The rod against a wall with its base force and moment as unknowns: single shooting over many poses at once.
 
-As in `softnlp.workspace.reduced` the force is known up to a constant, n(s) = N_0 + F_P R e3 - f_e s; with a wall and
+As in `softnlp.batch.reduced` the force is known up to a constant, n(s) = N_0 + F_P R e3 - f_e s; with a wall and
 chamber reactions N_0 is unknown beside m(0) and the forces y of the tip conditions. A state is [p, R, m, chamber
 lengths]; data stacks the constants c of the load case and N_0.
 """
@@ -13,9 +13,9 @@ from typing import Any
 import casadi as ca
 
 from softnlp import rod
+from softnlp.batch.reduced import MOMENT, ROTATION, STATE, rk_integral
 from softnlp.loadcase import RodFunctions, unpack_section
 from softnlp.transcription import RK4, rk_step
-from softnlp.workspace.reduced import MOMENT, ROTATION, STATE, rk_integral
 
 UNKNOWN = 6
 """Directions of a shooting: N_0, then m(0)."""
