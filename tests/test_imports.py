@@ -33,7 +33,13 @@ LAYERS = (
     *("studies.free_shape", "studies.blocked_grid", "studies.blocked_step", "studies.blocked", "studies.multistart"),
     *("studies.force_inversion", "studies.*"),
     *("workspace", "workspace.poses", "workspace.plan", "workspace.chunk", "workspace.*"),
-    *("scenario_schema", "scenario_check", "pressures", "scenario_contact", "scenario"),
+    *("workspace.task", "workspace.table", "workspace.manufacture"),
+    "scenario_schema",
+    "schema_workspace",
+    *("scenario_check", "pressures", "scenario_contact"),
+    "scenario_workspace",
+    "scenario",
+    *("workspace.planning", "workspace.journal", "workspace.worker", "workspace.pool", "workspace.run"),
     *("runner_blocked", "runner", "results", "plots", "cli", "__main__"),
 )
 MIXED = ("results", "plots", "cli")
