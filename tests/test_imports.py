@@ -39,8 +39,10 @@ LAYERS = (
     *("scenario_check", "pressures", "scenario_contact"),
     "scenario_workspace",
     "scenario",
-    *("workspace.planning", "workspace.journal", "workspace.worker", "workspace.pool", "workspace.run"),
-    *("runner_blocked", "runner", "results", "plots", "cli", "__main__"),
+    *("workspace.planning", "workspace.journal", "workspace.worker", "workspace.pool"),
+    *("runner_blocked", "runner", "results"),
+    *("workspace.columns", "workspace.sink", "workspace.dataset", "workspace.run"),
+    *("plots", "cli", "__main__"),
 )
 MIXED = ("results", "plots", "cli")
 LONGEST_FILE = 400

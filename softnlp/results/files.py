@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
 
@@ -19,16 +20,31 @@ def write_whole(path: str | PathLike[str], content: bytes) -> Path:
         When the folder does not exist or cannot be written, the disk is full, or the path is a folder. What stood
         there before is then unchanged.
     """
+    with placed_whole(path) as part:
+        part.write_bytes(content)
+    return Path(path)
+
+
+@contextmanager
+def placed_whole(path: str | PathLike[str]) -> Iterator[Path]:
+    """Yield the name under which a file is to be written; at the end it is put in place in one move.
+
+    Raises
+    ------
+    InputError
+        As `write_whole`, for an OSError of writing it too.
+    """
     target = Path(path)
     part = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
-        part.write_bytes(content)
+        yield part
         os.replace(part, target)
-    except (OSError, ValueError) as error:  # ValueError: a NUL character in the name
+    except BaseException as error:
         with suppress(OSError, ValueError):  # the folder may refuse this too; the first error says why
             part.unlink(missing_ok=True)
-        raise InputError(f"cannot be written: {_reason(error)}", source=str(target)) from None
-    return target
+        if isinstance(error, OSError) or (isinstance(error, ValueError) and "\0" in str(target)):
+            raise InputError(f"cannot be written: {_reason(error)}", source=str(target)) from None
+        raise
 
 
 def make_folder(path: str | PathLike[str]) -> Path:

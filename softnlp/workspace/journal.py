@@ -163,6 +163,13 @@ class Journal:
                     raise self._damaged(f"chunk {chunk} is missing")
                 yield self._block(found)
 
+    def messages(self) -> Iterator[tuple[int, str]]:
+        """Yield (pose, text) of every pose that ended otherwise than solved, chunk by chunk."""
+        with self._named():
+            for (text,) in self._file.execute("SELECT messages FROM chunk WHERE messages != '[]' ORDER BY number"):
+                for pose, message in json.loads(text):
+                    yield int(pose), str(message)
+
     def note(self, key: str, value: str) -> None:
         """Keep a text under a key."""
         with self._named(), self._transaction():
