@@ -22,24 +22,19 @@ from numpy.typing import NDArray
 from softnlp.errors import InputError
 from softnlp.reading import one_line, shown
 from softnlp.workspace.plan import Plan
-from softnlp.workspace.poses import STATUSES, Block, Rows
+from softnlp.workspace.poses import STATUSES, Block
 
 FORMAT = 1
 APPLICATION_ID = 0x736E6C70  # "snlp", in the header of the file
 COMMIT_EVERY = 0.25  # [s]
 _PAGE = 16_384  # bytes; a chunk has some hundred thousand
-_FAILED = np.array([k for k, status in enumerate(STATUSES) if not status.has_solution])
+_FAILED = [k for k, status in enumerate(STATUSES) if not status.has_solution]
 
 _TABLES = (
     "CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL)",
     "CREATE TABLE chunk (number INTEGER PRIMARY KEY, rows BLOB NOT NULL, messages TEXT NOT NULL, "
     "checksum INTEGER NOT NULL)",
 )
-
-
-def failures(rows: Rows) -> int:
-    """Return how many rows carry no solution."""
-    return int(np.isin(rows["status"], _FAILED).sum())
 
 
 def identity(plan: Plan, version: str) -> dict[str, str]:
@@ -56,7 +51,8 @@ def identity(plan: Plan, version: str) -> dict[str, str]:
 class Journal:
     """The open journal of one plan; a context manager, which keeps what was added when it is left.
 
-    path : of the file. done : (chunks,) whether a chunk is confirmed. poses, failed : of the confirmed chunks.
+    path : of the file. done : (chunks,) whether a chunk is confirmed. counts : (statuses,) confirmed poses by how they
+    ended, in the order of `STATUSES`.
     """
 
     def __init__(self, path: Path, plan: Plan, version: str, *, resume: bool) -> None:
@@ -74,8 +70,7 @@ class Journal:
         self._waiting: list[Block] = []
         self._committed = time.monotonic()
         self.done: NDArray[np.bool_] = np.zeros(plan.chunks, bool)
-        self.poses = 0
-        self.failed = 0
+        self.counts: NDArray[np.int64] = np.zeros(len(STATUSES), np.int64)
         with self._named():
             self._file = sqlite3.connect(path, timeout=0.0, isolation_level=None)
         try:
@@ -101,6 +96,16 @@ class Journal:
             return
         with suppress(InputError):  # the first error says what is wrong
             self.close()
+
+    @property
+    def poses(self) -> int:
+        """The number of confirmed poses."""
+        return int(self.counts.sum())
+
+    @property
+    def failed(self) -> int:
+        """The number of confirmed poses without a solution."""
+        return int(self.counts[_FAILED].sum())
 
     def add(self, block: Block) -> None:
         """Take the rows of a chunk; they are committed within `COMMIT_EVERY` of each other, at the latest by `commit`.
@@ -129,9 +134,7 @@ class Journal:
         with self._named(), self._transaction():
             self._file.executemany("INSERT INTO chunk VALUES (?, ?, ?, ?)", map(_record, self._waiting))
         for block in self._waiting:
-            self.done[block.chunk] = True
-            self.poses += block.rows.size
-            self.failed += failures(block.rows)
+            self._confirm(block)
         self._waiting.clear()
         self._committed = time.monotonic()
 
@@ -169,16 +172,6 @@ class Journal:
             for (text,) in self._file.execute("SELECT messages FROM chunk WHERE messages != '[]' ORDER BY number"):
                 for pose, message in json.loads(text):
                     yield int(pose), str(message)
-
-    def note(self, key: str, value: str) -> None:
-        """Keep a text under a key."""
-        with self._named(), self._transaction():
-            self._file.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, value))
-
-    def noted(self, key: str) -> str | None:
-        """Return the text kept under a key."""
-        with self._named():
-            return self._meta().get(key)
 
     def _lock(self) -> None:
         """Take the file for as long as it is open."""
@@ -233,9 +226,11 @@ class Journal:
     def _count(self) -> None:
         """Count what is there, which checks every checksum."""
         for block in self.blocks():
-            self.done[block.chunk] = True
-            self.poses += block.rows.size
-            self.failed += failures(block.rows)
+            self._confirm(block)
+
+    def _confirm(self, block: Block) -> None:
+        self.done[block.chunk] = True
+        self.counts += np.bincount(block.rows["status"], minlength=len(STATUSES))
 
     def _block(self, record: tuple[Any, ...]) -> Block:
         """Return a chunk of a record."""

@@ -18,14 +18,15 @@ from softnlp.errors import SoftnlpError
 from softnlp.reading import one_line
 from softnlp.results.files import make_folder
 from softnlp.workspace.chunk import ChunkSolver
-from softnlp.workspace.dataset import fingerprint_of, write_workspace
+from softnlp.workspace.dataset import fingerprint_of, write_csv, write_workspace
 from softnlp.workspace.journal import Journal
 from softnlp.workspace.plan import Plan
 from softnlp.workspace.pool import Crew, executor_crew, process_crew
-from softnlp.workspace.poses import Block
+from softnlp.workspace.poses import STATUSES, Block
 
 JOURNAL_FILE = "journal.sqlite"
 WORKSPACE_FILE = "workspace.nc"
+CSV_FILE = "workspace.csv"
 
 _FEW_CHUNKS = 2  # are solved here: a pool of processes would take longer to start
 _MOST_DEATHS = 3
@@ -52,18 +53,18 @@ class SweepSummary:
     """What a sweep came to.
 
     poses : of the plan. done, failed : confirmed, and of those without a solution. already : that were there before.
-    seconds : all of this run. stopped : before the end, when asked. file : the result, None without one. written :
-    whether it was written by this run.
+    statuses : confirmed poses by how they ended. seconds : all of this run. stopped : before the end, when asked.
+    written : the files that this run wrote.
     """
 
     poses: int
     done: int
     failed: int
     already: int
+    statuses: Mapping[str, int]
     seconds: float
     stopped: bool
-    file: Path | None
-    written: bool
+    written: tuple[Path, ...]
 
     @property
     def rate(self) -> float:
@@ -86,6 +87,7 @@ def run_sweep(
     progress: Report | None = None,
     stop: Stop | None = None,
     about: Mapping[str, str] | None = None,
+    csv: bool = False,
 ) -> SweepSummary:
     """Solve every pose of a plan and write `workspace.nc`: the same, whoever solves what and in however many runs.
 
@@ -98,6 +100,7 @@ def run_sweep(
     progress : called where poses were confirmed, the first time after the workers have started.
     stop : asked now and then whether to stop; what is being solved is finished and kept.
     about : further attributes of the result file, such as its title.
+    csv : write `workspace.csv` as well; one that is there is replaced in any case.
 
     Raises
     ------
@@ -108,7 +111,7 @@ def run_sweep(
     """
     began = time.monotonic()
     folder = make_folder(out)
-    result = folder / WORKSPACE_FILE
+    result, table = folder / WORKSPACE_FILE, folder / CSV_FILE
     with Journal(folder / JOURNAL_FILE, plan, __version__, resume=resume) as journal:
         already = journal.poses
 
@@ -117,20 +120,23 @@ def run_sweep(
                 seconds = time.monotonic() - began
                 progress(SweepProgress(journal.poses, journal.failed, plan.poses, already, seconds))
 
-        def summary(stopped: bool, file: Path | None, written: bool) -> SweepSummary:
+        def summary(stopped: bool, *written: Path) -> SweepSummary:
             seconds = time.monotonic() - began
-            return SweepSummary(plan.poses, journal.poses, journal.failed, already, seconds, stopped, file, written)
+            counts = {status.value: int(n) for status, n in zip(STATUSES, journal.counts, strict=True) if n}
+            return SweepSummary(plan.poses, journal.poses, journal.failed, already, counts, seconds, stopped, written)
 
         todo = [int(chunk) for chunk in np.flatnonzero(~journal.done)]
-        if not todo and fingerprint_of(result) == plan.fingerprint():
-            return summary(False, result, False)
-        stopped = _solve(plan, todo, journal, executor, workers, report, stop or _never)
-        journal.commit()
-        report()
-        if stopped:
-            return summary(True, None, False)
-        write_workspace(result, plan, journal, about or {})
-        return summary(False, result, True)
+        finished = not todo and fingerprint_of(result) == plan.fingerprint()
+        if not finished:
+            stopped = _solve(plan, todo, journal, executor, workers, report, stop or _never)
+            journal.commit()
+            report()
+            if stopped:
+                return summary(True)
+        written = [] if finished else [write_workspace(result, plan, journal, about or {})]
+        if (csv and not table.exists()) or (written and table.exists()):
+            written.append(write_csv(table, plan, journal))
+        return summary(False, *written)
 
 
 def _never() -> bool:
