@@ -163,13 +163,17 @@ def _slabs(plan: Plan, journal: Journal, memory: int = MEMORY) -> Iterator[tuple
     size = max(plan.chunk, memory // kind.itemsize)
     place = np.empty(plan.poses, np.int64)
     place[plan.order] = np.arange(plan.poses)
+    whole = f"V{kind.itemsize}"  # rows are moved as bytes, not field by field
     for start in range(0, plan.poses, size):
         stop = min(start + size, plan.poses)
         rows = np.empty(stop - start, kind)
-        whole = stop - start == plan.poses
-        for block in journal.blocks(None if whole else np.unique(place[start:stop] // plan.chunk).tolist()):
-            inside = (block.rows["pose"] >= start) & (block.rows["pose"] < stop)
-            rows[block.rows["pose"][inside] - start] = block.rows[inside]
+        everything = stop - start == plan.poses
+        for block in journal.blocks(None if everything else np.unique(place[start:stop] // plan.chunk).tolist()):
+            numbers, given = block.rows["pose"], block.rows.view(whole)
+            if not everything:
+                inside = (numbers >= start) & (numbers < stop)
+                numbers, given = numbers[inside], given[inside]
+            rows.view(whole)[numbers - start] = given
         yield start, rows
 
 
