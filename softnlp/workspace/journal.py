@@ -7,6 +7,7 @@ killed at any moment. The file is locked for as long as the sweep runs.
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
 import time
 import zlib
@@ -276,6 +277,8 @@ class Journal:
             return "another sweep is writing here; wait for it, or choose another folder"
         if name == "SQLITE_FULL":
             return f"cannot be written, the disk is full; {kept}"
+        if not _writable(self.path.parent):
+            return "cannot be written: its folder is read-only"
         if name.startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY", "SQLITE_PERM")):
             return f"cannot be written ({one_line(str(error))})"
         if name.startswith(("SQLITE_NOTADB", "SQLITE_CORRUPT")):
@@ -289,6 +292,11 @@ class Journal:
 
     def _error(self, message: str) -> InputError:
         return InputError(message, source=str(self.path))
+
+
+def _writable(folder: Path) -> bool:
+    """Whether this process may write into a folder."""
+    return os.access(folder, os.W_OK | os.X_OK, effective_ids=os.access in os.supports_effective_ids)
 
 
 def _record(block: Block) -> tuple[int, bytes, str, int]:
