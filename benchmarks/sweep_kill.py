@@ -48,7 +48,8 @@ def child(folder: Path, levels: int) -> None:
     def told(news: SweepProgress) -> None:
         print(news.already, news.done, flush=True)
 
-    run_sweep(plan(levels), folder, workers=WORKERS, resume=True, progress=told)
+    summary = run_sweep(plan(levels), folder, workers=WORKERS, resume=True, progress=told)
+    print(summary.already, summary.done, flush=True)
     print("end", flush=True)
 
 
@@ -77,7 +78,7 @@ def run_child(folder: Path, levels: int, kill_after: float | None = None) -> Out
         process.send_signal(signal.SIGKILL)
     output, _ = process.communicate()
     lines = output.splitlines()
-    news = [tuple(map(int, line.split())) for line in lines if line != "end" and line.count(" ") == 1]
+    news = [tuple(map(int, line.split())) for line in lines if line != "end"]
     if kill_after is None and (process.returncode or not news):
         raise RuntimeError(f"the sweep ended with {process.returncode}")
     return Outcome(

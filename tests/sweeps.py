@@ -14,7 +14,7 @@ import numpy as np
 
 from softnlp.scenario import Scenario, scenario_from_text
 from softnlp.status import Status
-from softnlp.workspace.plan import Plan
+from softnlp.workspace.plan import Plan, cells
 from softnlp.workspace.planning import plan_of
 from softnlp.workspace.poses import STATUSES, Block, unsolved_rows
 
@@ -36,7 +36,9 @@ def scenario(tables: str = GRID, head: str = HEAD) -> Scenario:
 
 def plan(tables: str = GRID + QUICK, chunk: int = 4, head: str = HEAD) -> Plan:
     """Return a plan in small chunks."""
-    return replace(plan_of(scenario(tables, head)), chunk=chunk)
+    whole = plan_of(scenario(tables, head))
+    order = whole.order if "[pressure]" in tables else cells(whole.values, chunk)
+    return replace(whole, chunk=chunk, order=order)
 
 
 def made_up(plan: Plan, chunk: int) -> Block:

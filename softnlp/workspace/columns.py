@@ -20,7 +20,7 @@ Array = NDArray[Any]
 TEXT = "text"
 _STATUS_NAMES = np.array([status.value for status in STATUSES], dtype=object)
 _STABLE_FLAGS = {"not_solved": -1, "unstable": 0, "stable": 1}
-_DECIMALS = 12  # of an input in its file unit: 0.3, not 0.30000000000000004
+_DECIMALS = 12
 
 
 @dataclass(frozen=True)
@@ -135,8 +135,7 @@ def _varied(plan: Plan, name: str) -> list[Column]:
     if table == "material":
         constant = next(c for c in plan.model.material.law.constants if c.name == entry)
         meaning = f"constant {constant.name} of the silicone"
-        # constants may be so small that decimals would be lost
-        return [_given(f"material_{constant.file_key}", (), constant.unit, meaning, value, constant.scale, None)]
+        return [_given(f"material_{constant.file_key}", (), constant.unit, meaning, value, constant.scale)]
     return [_given(name.replace(".", "_"), (), "1", f"coefficient {entry.replace('_', ' ')}", value, 1.0)]
 
 
@@ -147,12 +146,14 @@ def _given(
     meaning: str,
     values: Array,
     scale: float,
-    decimals: int | None = _DECIMALS,
 ) -> Column:
     """Return a column of what the plan gives."""
-    return Column(name, dims, "f8", unit, meaning, partial(_in_file_unit, values, scale, decimals))
+    return Column(name, dims, "f8", unit, meaning, partial(_in_file_unit, values, scale))
 
 
-def _in_file_unit(values: Array, scale: float, decimals: int | None, rows: Rows, numbers: NDArray[np.int64]) -> Array:
-    converted = values[numbers] / scale
-    return converted if decimals is None else np.round(converted, decimals)
+def _in_file_unit(values: Array, scale: float, rows: Rows, numbers: NDArray[np.int64]) -> Array:
+    """Return values in another unit, those that are short decimals as such: 0.3, not 0.30000000000000004."""
+    given = values[numbers]
+    converted = given / scale
+    tidy = np.round(converted, _DECIMALS)
+    return np.asarray(np.where(tidy * scale == given, tidy, converted))

@@ -64,7 +64,7 @@ def write_workspace(path: str | PathLike[str], plan: Plan, journal: Journal, abo
                 file.attrs.update(_attributes(plan) | dict(about))
                 _declare(file, plan, listed)
                 sink.check()
-                for start, rows in _slabs(plan, journal):
+                for start, rows in _slabs(plan, journal, MEMORY):
                     numbers = np.arange(start, start + rows.size, dtype=np.int64)
                     for column in listed:
                         file.variables[column.name][start : start + rows.size] = column.of(rows, numbers)
@@ -157,7 +157,7 @@ def _said(unit: str, meaning: str) -> dict[str, Any]:
     return {"units": unit, "long_name": meaning}
 
 
-def _slabs(plan: Plan, journal: Journal, memory: int = MEMORY) -> Iterator[tuple[int, Rows]]:
+def _slabs(plan: Plan, journal: Journal, memory: int) -> Iterator[tuple[int, Rows]]:
     """Yield the first number and the rows of consecutive poses, in the order of the plan."""
     kind = plan.row_type
     size = max(plan.chunk, memory // kind.itemsize)

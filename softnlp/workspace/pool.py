@@ -21,6 +21,9 @@ from softnlp.workspace.poses import Block
 from softnlp.workspace.worker import PlanFile, prepare, solve, solve_prepared
 
 
+CONNECT_PATIENCE = "10s"
+
+
 class Crew(Protocol):
     """Solves chunks side by side. window : how many it is given at once."""
 
@@ -123,7 +126,7 @@ def cluster_executor(address: str) -> Iterator[Executor]:
     except ImportError:
         raise InputError("needs Dask: install softnlp[cluster]", key="--cluster") from None
     try:
-        client = client_of(address, timeout="10s")
+        client = client_of(address, timeout=CONNECT_PATIENCE)
     except (OSError, ValueError, TypeError) as error:
         reason = one_line(" ".join(str(error).split()), 200)
         raise InputError(f"no Dask scheduler answers at {address!r} ({reason})", key="--cluster") from None

@@ -17,6 +17,7 @@ from softnlp import __version__
 from softnlp.errors import SoftnlpError
 from softnlp.reading import one_line
 from softnlp.results.files import make_folder
+from softnlp.units import BAR
 from softnlp.workspace.chunk import ChunkSolver
 from softnlp.workspace.dataset import fingerprint_of, write_csv, write_workspace
 from softnlp.workspace.journal import Journal
@@ -30,6 +31,7 @@ CSV_FILE = "workspace.csv"
 
 _FEW_CHUNKS = 2  # are solved here: a pool of processes would take longer to start
 _MOST_DEATHS = 3
+_KEPT = "what was solved is kept, and --resume goes on from there"
 _PATIENCE = 0.1  # [s] between two looks at whether to stop
 
 
@@ -166,8 +168,12 @@ def _solve_here(plan: Plan, todo: list[int], journal: Journal, report: _Tell, st
     for chunk in todo:
         if stop():
             return True
-        solver = solver or ChunkSolver(plan)
-        journal.add(solver.solve(chunk))
+        try:
+            solver = solver or ChunkSolver(plan)
+            block = solver.solve(chunk)
+        except Exception as error:
+            raise _unsolvable(plan, chunk, error) from error
+        journal.add(block)
         report()
     return False
 
@@ -224,11 +230,8 @@ class _Foreman:
             except BrokenExecutor:
                 lost.append(chunk)
                 continue
-            except CancelledError:
-                raise SweepError(f"{self._named(chunk)} was cancelled by its executor; {self._kept()}") from None
-            except Exception as error:
-                told = one_line(f"{type(error).__name__}: {error}", 300)
-                raise SweepError(f"{self._named(chunk)} cannot be solved ({told}); {self._kept()}") from error
+            except (Exception, CancelledError) as error:
+                raise _unsolvable(self._plan, chunk, error) from error
             self._journal.add(block)
             self._suspects.discard(chunk)
             if not self._suspects:
@@ -245,10 +248,10 @@ class _Foreman:
         self._deaths += 1
         self._suspects.update(lost)
         if self._deaths >= _MOST_DEATHS:
-            what = self._named(lost[0]) if len(lost) == 1 else f"one of {len(lost)} chunks"
-            raise SweepError(f"workers died {self._deaths} times, the last one while solving {what}; {self._kept()}")
+            what = _named(self._plan, lost[0]) if len(lost) == 1 else f"one of {len(lost)} chunks"
+            raise SweepError(f"workers died {self._deaths} times, the last one while solving {what}; {_KEPT}")
         if not self._crew.restart():
-            raise SweepError(f"the executor lost its workers; {self._kept()}")
+            raise SweepError(f"the executor lost its workers; {_KEPT}")
         self._waiting.extendleft(reversed(lost))
 
     def _drop(self) -> None:
@@ -257,10 +260,14 @@ class _Foreman:
             del self._pending[future]
         self._waiting.clear()
 
-    def _named(self, chunk: int) -> str:
-        first = int(self._plan.members(chunk)[0])
-        pressure = ", ".join(f"{p / 1e5:.4g}" for p in self._plan.pressures()[first])
-        return f"chunk {chunk} (its first pose is number {first + 1}, at {pressure} bar)"
 
-    def _kept(self) -> str:
-        return "what was solved is kept, and --resume goes on from there"
+def _unsolvable(plan: Plan, chunk: int, error: BaseException) -> SweepError:
+    """Return what to raise where a solver or an executor raised."""
+    told = one_line(f"{type(error).__name__}: {' '.join(str(error).split())}", 300)
+    return SweepError(f"{_named(plan, chunk)} cannot be solved ({told}); {_KEPT}")
+
+
+def _named(plan: Plan, chunk: int) -> str:
+    first = int(plan.members(chunk)[0])
+    pressure = ", ".join(f"{p / BAR:.4g}" for p in plan.pressures()[first])
+    return f"chunk {chunk} (its first pose is number {first + 1}, at {pressure} bar)"
