@@ -278,7 +278,7 @@ def test_a_robot_that_cannot_be_made_is_named_unless_it_is_allowed() -> None:
         scenario(GRID + vary, thick)
     assert str(caught.value).startswith("sweep.toml: [workspace] vary: outer_diameter_mm = 23.5: wall_thickness: ")
     assert scenario(GRID + vary, thick.replace("= 1.4", '= 1.4\nallow = ["wall_thickness"]')).step_count == 27 * 5
-    sampled = vary.replace(", levels = 4", "")
+    sampled = vary.replace(", levels = 5", "")
     with pytest.raises(InputError, match=r"\[workspace\] vary: outer_diameter_mm = "):
         scenario("[workspace]\nsamples = 40\nto_bar = 1.0\n" + sampled, thick)
 
