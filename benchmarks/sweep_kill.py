@@ -67,19 +67,25 @@ class Outcome:
     orphans: int
 
 
-def run_child(folder: Path, levels: int, kill_after: float | None = None) -> Outcome:
-    """Run a sweep in a process, killed after so many seconds."""
+def run_child(folder: Path, levels: int, kill_after: float | None = None, kill_at: int | None = None) -> Outcome:
+    """Run a sweep in a process, killed after so many seconds or as soon as so many poses are confirmed."""
     command = [sys.executable, "-m", "benchmarks.sweep_kill", "--child", str(folder), "--levels", str(levels)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[1])
+    assert process.stdout is not None
     workers: list[int] = []
+    lines: list[str] = []
     if kill_after is not None:
         time.sleep(kill_after)
+    while kill_at is not None and (line := process.stdout.readline().strip()):
+        lines.append(line)
+        if int(line.split()[-1]) >= kill_at:
+            break
+    if kill_after is not None or kill_at is not None:
         workers = children(process.pid)
         process.send_signal(signal.SIGKILL)
-    output, _ = process.communicate()
-    lines = output.splitlines()
+    lines += process.communicate()[0].splitlines()
     news = [tuple(map(int, line.split())) for line in lines if line != "end"]
-    if kill_after is None and (process.returncode or not news):
+    if kill_after is None and kill_at is None and (process.returncode or not news):
         raise RuntimeError(f"the sweep ended with {process.returncode}")
     return Outcome(
         already=news[0][0] if news else 0,
