@@ -24,6 +24,7 @@ from softnlp.rod import Loads
 from softnlp.scenario_check import first_of, parse
 from softnlp.scenario_contact import contact_settings, contact_task
 from softnlp.scenario_schema import RobotTable, ScenarioFile
+from softnlp.scenario_workspace import workspace_task
 from softnlp.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
@@ -270,7 +271,12 @@ def _contact_task(given: Read) -> Task:
     return contact_task(given.file.contact, given.steps.pressures)
 
 
+def _workspace_task(given: Read) -> Task:
+    return workspace_task(given.file, given.robot, given.material, given.steps.pressures)
+
+
 TASKS: Mapping[str, tuple[str, Callable[[Read], Task]]] = {
     "blocked-force": ("contact", _contact_task),
+    "workspace": ("workspace", _workspace_task),
 }
 """For each study with tables of its own: the table that its errors are about, and what reads them."""

@@ -73,7 +73,7 @@ def progress(total: int, title: str) -> Iterator[tuple[Advance, Callable[[], boo
     steps: in the middle of a solve CasADi loses the interrupt or makes another error of it. A second Ctrl-C ends the
     process at once.
     """
-    with _bar(total, title) as (advance, describe), _interrupt_asked(describe) as asked:
+    with _bar(total, title) as (advance, describe), interrupt_asked(describe) as asked:
         yield advance, asked
 
 
@@ -97,7 +97,7 @@ def _bar(total: int, title: str) -> Iterator[tuple[Advance, Callable[[str], None
 
 
 @contextmanager
-def _interrupt_asked(describe: Callable[[str], None]) -> Iterator[Callable[[], bool]]:
+def interrupt_asked(describe: Callable[[str], None]) -> Iterator[Callable[[], bool]]:
     """Take the first Ctrl-C as a request; yields whether it was made."""
     if threading.current_thread() is not threading.main_thread():  # no signal comes here
         yield lambda: False

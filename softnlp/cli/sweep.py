@@ -1,0 +1,247 @@
+"""`softnlp sweep`: a workspace solved in parallel, kept as it goes, and continued where it was stopped."""
+
+from __future__ import annotations
+
+import json as json_module
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, interrupt_asked, say
+from softnlp.errors import InputError
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from softnlp.scenario import Scenario
+    from softnlp.workspace.run import SweepProgress, SweepSummary
+
+
+def sweep(
+    scenario: Path,
+    /,
+    *,
+    out: Path | None = None,
+    workers: int | None = None,
+    cluster: str | None = None,
+    resume: bool = False,
+    csv: bool = False,
+) -> int:
+    """Solve every pose of a workspace.
+
+    Solved poses are kept in journal.sqlite as they come, so that nothing is lost when the sweep is stopped or killed:
+    --resume continues it, with the same result. At the end workspace.nc holds every pose, and the last line printed is
+    "N poses, F failed, S s, R poses/s". The exit status is 0 when every pose solved, 3 when some did not, 2 for bad
+    input or where it cannot go on, 130 when stopped by Ctrl-C.
+
+    Parameters
+    ----------
+    scenario
+        TOML file of study "workspace"; docs/workspace.md lists what it may hold.
+    out
+        Folder for the journal and the results; by default results/NAME, where NAME is that of the scenario file.
+    workers
+        Processes that solve side by side; by default one for each processor.
+    cluster
+        Address of a Dask scheduler, such as tcp://10.0.0.5:8786, whose workers solve instead.
+    resume
+        Continue the sweep that has begun in that folder, if one has.
+    csv
+        Write workspace.csv as well.
+    """
+    from softnlp.scenario import load_scenario
+
+    if workers is not None and workers < 1:
+        raise InputError(f"expected a number of at least 1, got {workers}", key="--workers")
+    if workers is not None and cluster is not None:
+        raise InputError("not together with --cluster, whose workers are its own", key="--workers")
+    asked = load_scenario(scenario)
+    if asked.study != "workspace":
+        raise InputError(f"expected a scenario of study 'workspace'; {asked.path} is of study {asked.study!r}")
+    folder = out or Path("results") / scenario.stem
+    summary = _run(asked, folder, workers=workers or _processors(), cluster=cluster, resume=resume, csv=csv)
+    return _told(asked, folder, summary)
+
+
+def run_study(asked: Scenario, out: Path | None, json: bool) -> int:
+    """Run a scenario of study "workspace" for `softnlp run`; a sweep that has begun in the folder is continued."""
+    if not json:
+        folder = out or Path("results") / asked.path.stem
+        return _told(asked, folder, _run(asked, folder))
+    with ExitStack() as stack:
+        folder = out or Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="softnlp-")))
+        summary = _run(asked, folder)
+        say(json_module.dumps(_document(asked, folder, summary, kept=out is not None), indent=2, allow_nan=False))
+        return STOPPED if summary.stopped else _status(summary)
+
+
+def _run(
+    asked: Scenario,
+    folder: Path,
+    *,
+    workers: int | None = None,
+    cluster: str | None = None,
+    resume: bool = True,
+    csv: bool = False,
+) -> SweepSummary:
+    """Run a sweep with a progress bar, and write what goes beside its result."""
+    from softnlp.workspace.planning import plan_of
+    from softnlp.workspace.pool import cluster_executor
+    from softnlp.workspace.run import run_sweep
+
+    plan = plan_of(asked)
+    with ExitStack() as stack:
+        executor: Executor | None = None if cluster is None else stack.enter_context(cluster_executor(cluster))
+        bar = stack.enter_context(_bar(asked.title))
+        stop = stack.enter_context(interrupt_asked(bar.stopping))
+        summary = run_sweep(
+            plan,
+            folder,
+            executor=executor,
+            workers=workers or _processors(),
+            resume=resume,
+            progress=bar.show,
+            stop=stop,
+            about={"title": asked.title, "scenario": asked.text},
+            csv=csv,
+        )
+    if summary.written:
+        _write_beside(asked, folder)
+    return summary
+
+
+def _write_beside(asked: Scenario, folder: Path) -> None:
+    """Write what goes beside a result that was just written: what was asked, and what computed it."""
+    from softnlp.results import write_whole
+    from softnlp.results.inputs import versions
+
+    write_whole(folder / "scenario.toml", asked.text.encode())
+    write_whole(folder / "versions.json", (json_module.dumps(versions(), indent=2) + "\n").encode())
+
+
+def _told(asked: Scenario, folder: Path, summary: SweepSummary) -> int:
+    """Print what a sweep came to; return the exit status."""
+    model = f"{asked.robot.name}, {asked.material.name} ({asked.material.law.name})"
+    say(f"{asked.title}: {model}")
+    if summary.already and summary.already == summary.poses and not summary.written:
+        say("this sweep was finished already; nothing was rewritten")
+    elif summary.already:
+        say(f"{summary.already} of {summary.poses} poses were there already")
+    unsolved = {status: n for status, n in summary.statuses.items() if status != "solved"}
+    if unsolved:
+        say("ended otherwise than solved: " + ", ".join(f"{n} {status}" for status, n in unsolved.items()))
+    if summary.stopped:
+        complain(
+            f"stopped after {summary.done} of {summary.poses} poses, which are kept; "
+            f"`softnlp sweep {asked.path} --out {folder} --resume` continues"
+        )
+    else:
+        say(f"results in {folder}")
+    say(f"{summary.done} poses, {summary.failed} failed, {summary.seconds:.2f} s, {summary.rate:.0f} poses/s")
+    return STOPPED if summary.stopped else _status(summary)
+
+
+def _status(summary: SweepSummary) -> int:
+    return SOME_UNSOLVED if summary.failed else SOLVED
+
+
+def _document(asked: Scenario, folder: Path, summary: SweepSummary, *, kept: bool) -> dict[str, Any]:
+    """Return the JSON document of a sweep."""
+    from softnlp import __version__
+    from softnlp.workspace.run import WORKSPACE_FILE
+
+    return {
+        "softnlp": __version__,
+        "title": asked.title,
+        "study": asked.study,
+        "conventions": asked.conventions.name,
+        "poses": summary.poses,
+        "done": summary.done,
+        "failed": summary.failed,
+        "already": summary.already,
+        "statuses": dict(summary.statuses),
+        "seconds": summary.seconds,
+        "poses_per_s": summary.rate,
+        "file": str(folder / WORKSPACE_FILE) if kept and not summary.stopped else None,
+        "warnings": list(asked.warnings),
+    }
+
+
+def _processors() -> int:
+    """Return how many processors this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on Linux
+        return os.cpu_count() or 1
+
+
+class _Bar:
+    """A progress bar that begins with the first news: its thread must not run yet when worker processes are forked."""
+
+    def __init__(self, stack: ExitStack, begin: Callable[[], Any]) -> None:
+        self._stack = stack
+        self._begin = begin
+        self._shown: Any = None
+        self._task: Any = None
+        self._note = ""
+
+    def show(self, news: SweepProgress) -> None:
+        """Show how far the sweep is."""
+        if self._shown is None:
+            self._shown = self._stack.enter_context(self._begin())
+            self._task = self._shown.add_task("", total=news.poses, completed=news.already, failed="", rate="")
+        rate = (news.done - news.already) / news.seconds if news.seconds > 0 else 0.0
+        self._shown.update(
+            self._task,
+            completed=news.done,
+            failed=f"{news.failed} failed" if news.failed else "",
+            rate=f"{rate:.0f} poses/s",
+            description=self._note or None,
+        )
+
+    def stopping(self, _: str) -> None:
+        """Say that the sweep will stop."""
+        self._note = "stopping (Ctrl-C again: at once)"
+        if self._shown is not None:
+            self._shown.update(self._task, description=self._note)
+
+
+class _NoBar:
+    """In place of a bar where standard error is no terminal."""
+
+    def show(self, news: SweepProgress) -> None:
+        """Show nothing."""
+
+    def stopping(self, _: str) -> None:
+        """Say nothing."""
+
+
+@contextmanager
+def _bar(title: str) -> Iterator[_Bar | _NoBar]:
+    """Yield a progress bar on standard error when that is a terminal."""
+    if not sys.stderr.isatty():
+        yield _NoBar()
+        return
+
+    def begin() -> Any:
+        from rich.console import Console
+        from rich.markup import escape
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = (
+            TextColumn(escape(title)),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[rate]}"),
+            TimeRemainingColumn(),
+            TextColumn("[red]{task.fields[failed]}"),
+            TextColumn("{task.description}"),
+        )
+        return Progress(*columns, console=Console(stderr=True), transient=True)
+
+    with ExitStack() as stack:
+        yield _Bar(stack, begin)

@@ -1,0 +1,64 @@
+"""What runs where poses are solved: one solver a process, made once for the plan that is being swept."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import threading
+from dataclasses import dataclass
+from multiprocessing import connection, parent_process
+from pathlib import Path
+
+from softnlp.workspace.chunk import ChunkSolver
+from softnlp.workspace.plan import Plan
+from softnlp.workspace.poses import Block
+
+
+@dataclass(frozen=True)
+class PlanFile:
+    """A plan on a disk that every worker sees."""
+
+    path: Path
+
+    def load(self) -> Plan:
+        """Return the plan."""
+        with self.path.open("rb") as file:
+            plan = pickle.load(file)
+        assert isinstance(plan, Plan)
+        return plan
+
+
+# What a process keeps between two chunks. The lock is there because a CasADi solver is no good to two threads at once:
+# the threads of one process take turns, and it is processes that work side by side.
+_lock = threading.Lock()
+_solvers: dict[str, ChunkSolver] = {}
+_plans: dict[str, Plan] = {}
+
+
+def solve(source: Plan | PlanFile, fingerprint: str, chunk: int) -> Block:
+    """Return the solved poses of a chunk; the solver is made when a plan comes for the first time."""
+    with _lock:
+        if fingerprint not in _solvers:
+            _solvers.clear()
+            _solvers[fingerprint] = ChunkSolver(source.load() if isinstance(source, PlanFile) else source)
+        return _solvers[fingerprint].solve(chunk)
+
+
+def prepare(plan: Plan, fingerprint: str) -> None:
+    """Begin a worker of a process pool: keep the plan, leave Ctrl-C to the parent, and end when the parent has gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _plans[fingerprint] = plan
+    if (parent := parent_process()) is not None:
+        # A parent that was killed tells nobody; its workers would wait for the next chunk for ever.
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+
+
+def solve_prepared(fingerprint: str, chunk: int) -> Block:
+    """Return the solved poses of a chunk of the plan that `prepare` got."""
+    return solve(_plans[fingerprint], fingerprint, chunk)
+
+
+def _end_with(sentinel: int) -> None:
+    connection.wait([sentinel])
+    os._exit(1)
