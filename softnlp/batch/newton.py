@@ -203,17 +203,22 @@ def _start(base: Array) -> Array:
     return state
 
 
+def cross(a: Array, b: Array) -> Array:
+    """Return a x b of columns (3, poses), without the care that `numpy.cross` takes of every other shape."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
 def _solved(J: Array, right: Array) -> Array:
     """Return x with J x = right for many 3x3 systems, (3, poses), by Cramer's rule; not finite where singular."""
     a, b, c = J[:, 0], J[:, 1], J[:, 2]
-    normal = np.cross(b, c, axis=0)
+    normal = cross(b, c)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         inverse = 1.0 / (a * normal).sum(axis=0)
         x = np.stack(
             [
                 (right * normal).sum(axis=0) * inverse,
-                (right * np.cross(c, a, axis=0)).sum(axis=0) * inverse,
-                (right * np.cross(a, b, axis=0)).sum(axis=0) * inverse,
+                (right * cross(c, a)).sum(axis=0) * inverse,
+                (right * cross(a, b)).sum(axis=0) * inverse,
             ]
         )
     return x
@@ -229,6 +234,6 @@ def _turns(R: Array, V: Array) -> Array:
 def _smallest_minor(S: Array) -> Array:
     """Return the least leading minor of symmetric matrices (3, 3, poses)."""
     second = S[0, 0] * S[1, 1] - S[0, 1] ** 2
-    third = (S[0] * np.cross(S[1], S[2], axis=0)).sum(axis=0)
+    third = (S[0] * cross(S[1], S[2])).sum(axis=0)
     least: Array = np.minimum(S[0, 0], np.minimum(second, third))
     return least

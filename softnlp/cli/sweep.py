@@ -140,7 +140,7 @@ def _told(asked: Scenario, folder: Path, summary: SweepSummary) -> int:
             f"`softnlp sweep {asked.path} --out {folder} --resume` continues"
         )
     else:
-        say(f"results in {folder}")
+        say(f"results in {folder}; `softnlp workspace {folder}` draws and measures them")
     say(f"{summary.done} poses, {summary.failed} failed, {summary.seconds:.2f} s, {summary.rate:.0f} poses/s")
     return STOPPED if summary.stopped else _status(summary)
 

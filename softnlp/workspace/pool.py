@@ -18,7 +18,7 @@ from softnlp.errors import InputError
 from softnlp.reading import one_line
 from softnlp.workspace.plan import Plan
 from softnlp.workspace.poses import Block
-from softnlp.workspace.worker import PlanFile, prepare, solve, solve_prepared
+from softnlp.workspace.worker import PlanFile, keep, prepare, solve, solve_prepared
 
 CONNECT_PATIENCE = "10s"
 
@@ -61,7 +61,10 @@ class ProcessCrew:
         self._pool.shutdown(wait=True, cancel_futures=True)
 
     def _start(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(self._workers, mp_context=_context(), initializer=prepare, initargs=self._given)
+        context = _context()
+        if context.get_start_method() == "fork":
+            keep(*self._given)  # what is made here need not be made by each of them
+        return ProcessPoolExecutor(self._workers, mp_context=context, initializer=prepare, initargs=self._given)
 
 
 class ExecutorCrew:

@@ -39,10 +39,20 @@ _plans: dict[str, Plan] = {}
 def solve(source: Plan | PlanFile, fingerprint: str, chunk: int) -> Block:
     """Return the solved poses of a chunk; the solver is made when a plan comes for the first time."""
     with _lock:
-        if fingerprint not in _solvers:
-            _solvers.clear()
-            _solvers[fingerprint] = ChunkSolver(source.load() if isinstance(source, PlanFile) else source)
-        return _solvers[fingerprint].solve(chunk)
+        return _kept(source, fingerprint).solve(chunk)
+
+
+def keep(plan: Plan, fingerprint: str) -> None:
+    """Make the solver of a plan in this process, which workers that are forked from it then have."""
+    with _lock:
+        _kept(plan, fingerprint)
+
+
+def _kept(source: Plan | PlanFile, fingerprint: str) -> ChunkSolver:
+    if fingerprint not in _solvers:
+        _solvers.clear()
+        _solvers[fingerprint] = ChunkSolver(source.load() if isinstance(source, PlanFile) else source)
+    return _solvers[fingerprint]
 
 
 def prepare(plan: Plan, fingerprint: str) -> None:
