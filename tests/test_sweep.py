@@ -433,6 +433,23 @@ def test_run_sweeps_too(tmp_path: Path, cli: Cli, no_solving: None) -> None:
     assert json.loads(cli("run", path, "--json", "--out", tmp_path / "out")[1])["already"] == 27
 
 
+def test_warnings_of_the_robot_are_told_and_kept(tmp_path: Path, cli: Cli, no_solving: None) -> None:
+    thin = HEAD.replace('"D25L60"', '"D25L60"\nminimum_wall_mm = 3.0\nallow = ["wall_thickness"]')
+    path, out = written(tmp_path, head=thin), tmp_path / "out"
+    _, told, _ = cli("sweep", path, "--out", out)
+    assert told.splitlines()[1].startswith("warning: wall_thickness: ")
+    (warning,) = json.loads(opened(out).attrs["warnings"])
+    assert warning.startswith("wall_thickness: ")
+
+
+def test_what_a_full_disk_left_out_is_written_when_it_is_continued(tmp_path: Path, cli: Cli, no_solving: None) -> None:
+    path, out = written(tmp_path), tmp_path / "out"
+    cli("sweep", path, "--out", out)
+    (out / "scenario.toml").unlink()
+    cli("sweep", path, "--out", out, "--resume")
+    assert (out / "scenario.toml").read_text() == path.read_text()
+
+
 @pytest.mark.parametrize(
     ("words", "named"),
     [

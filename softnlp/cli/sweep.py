@@ -106,27 +106,32 @@ def _run(
             resume=resume,
             progress=bar.show,
             stop=stop,
-            about={"title": asked.title, "scenario": asked.text},
+            about={"title": asked.title, "scenario": asked.text, "warnings": json_module.dumps(asked.warnings)},
             csv=csv,
         )
-    if summary.written:
-        _write_beside(asked, folder)
+    if not summary.stopped:
+        _write_beside(asked, folder, replace=bool(summary.written))
     return summary
 
 
-def _write_beside(asked: Scenario, folder: Path) -> None:
-    """Write what goes beside a result that was just written: what was asked, and what computed it."""
+def _write_beside(asked: Scenario, folder: Path, *, replace: bool) -> None:
+    """Write what was asked and what computed it beside a finished result; without `replace` only what is missing."""
     from softnlp.results import write_whole
     from softnlp.results.inputs import versions
 
-    write_whole(folder / "scenario.toml", asked.text.encode())
-    write_whole(folder / "versions.json", (json_module.dumps(versions(), indent=2) + "\n").encode())
+    contents = {
+        "scenario.toml": asked.text.encode(),
+        "versions.json": (json_module.dumps(versions(), indent=2) + "\n").encode(),
+    }
+    for name, content in contents.items():
+        if replace or not (folder / name).exists():
+            write_whole(folder / name, content)
 
 
 def _told(asked: Scenario, folder: Path, summary: SweepSummary) -> int:
     """Print what a sweep came to; return the exit status."""
     model = f"{asked.robot.name}, {asked.material.name} ({asked.material.law.name})"
-    say(f"{asked.title}: {model}")
+    say("\n".join([f"{asked.title}: {model}", *(f"warning: {warning}" for warning in asked.warnings)]))
     if summary.already and summary.already == summary.poses and not summary.written:
         say("this sweep was finished already; nothing was rewritten")
     elif summary.already:

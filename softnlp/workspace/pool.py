@@ -103,7 +103,8 @@ def executor_crew(executor: Executor, plan: Plan, fingerprint: str) -> Iterator[
     """
     client = getattr(executor, "_client", None)
     if client is not None and hasattr(client, "scatter"):
-        threads = max(1, sum(client.nthreads().values()))
+        if not (threads := sum(client.nthreads().values())):
+            raise InputError("the Dask cluster has no workers", key="--cluster")
         scattered = client.scatter(plan, broadcast=True, hash=False)
         yield ExecutorCrew(executor, scattered, fingerprint, 3 * threads + 2)
         return
