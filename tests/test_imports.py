@@ -26,6 +26,7 @@ LAYERS = (
         "studies.step",
         "studies.pose",
         "studies.statics",
+        "studies.arc",
         "studies.forward",
         "studies.wall",
         "studies.weighted",

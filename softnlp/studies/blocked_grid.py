@@ -11,7 +11,7 @@ from softnlp.condensed import CondensedSolver, plane_directions
 from softnlp.loadcase import LoadCase
 from softnlp.problem import CompiledProblem
 from softnlp.solver import Engine, Solution
-from softnlp.studies.statics import Solved
+from softnlp.studies.free_shape import Free
 from softnlp.studies.wall import Situation
 from softnlp.studies.weighted import Weighted
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 class BlockedGrid:
     """Everything compiled for one number of intervals, in a plane of symmetry or in space.
 
-    condensed, judge : the tip equations at the nodes, in the plane and in space.
+    condensed : the tip equations at the nodes, in the plane. judge : in space.
     """
 
     case: LoadCase
@@ -55,17 +55,13 @@ class BlockedGrid:
         """Return the largest change of a scaled position or of a direction cosine."""
         return float(np.max(np.abs(self.states(change)[:12])))
 
-    def determinant(self, solution: Solution) -> float:
-        """Return the determinant of the tip equations, in the plane where there is one."""
-        return self.condensed.determinant(self._at_nodes(solution.x), solution.p)
-
-    def sideways(self, solution: Solution, plane: Array | None) -> float:
-        """Return the determinant of the tip equations out of the plane; 1 in space."""
-        if plane is None:
-            return 1.0
+    def determinants(self, solution: Solution, plane: Array | None) -> tuple[float, float]:
+        """Return the determinants of the tip equations in the plane and out of it; in space, of all of them and 1."""
         matrix = self.judge.tip_system(self._at_nodes(solution.x), solution.p).matrix
-        outside = plane_directions(plane, len(matrix))[1]
-        return float(np.linalg.det(outside.T @ matrix @ outside))
+        if plane is None:
+            return float(np.linalg.det(matrix)), 1.0
+        inside, outside = (float(np.linalg.det(V.T @ matrix @ V)) for V in plane_directions(plane, len(matrix)))
+        return inside, outside
 
     def _at_nodes(self, x: Array) -> Array:
         """Return x with the states of the nodes alone."""
@@ -78,7 +74,7 @@ class Blocked:
 
     constants : what the field takes beside the states. error : estimated tip position error over L_0. refinement_error
     : the same for position, rotation and forces. slips : pressure [Pa] of the most pressurised set above which a planar
-    shape may slip sideways, or None. sideways : determinant out of the plane. free : the free shape there.
+    shape may slip sideways, or None. determinants : in and out of the plane. free : the free shape there.
     """
 
     situation: Situation
@@ -89,5 +85,5 @@ class Blocked:
     error: float
     refinement_error: float
     slips: float | None
-    sideways: float
-    free: Solved
+    determinants: tuple[float, float]
+    free: Free

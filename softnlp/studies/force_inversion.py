@@ -161,7 +161,12 @@ def _jointly(solver: BlockedSolver, near: Blocked, direction: Array, pressure: f
     values.pop("contact.free_lengths")
     p = problem.pack({**values, "pressure": direction * pressure, "target force": force})
     grid = solver.poses.grid(intervals)
-    free = grid.engine.solve(near.free.solution.p, solver.poses.transfer(near.free, grid))
+    x_free = (
+        solver.poses.transfer(near.free.solved, grid)
+        if near.free.solved is not None
+        else solver.poses.arc_guess(grid, near.free.column, near.free.stretch)
+    )
+    free = grid.engine.solve(near.free.column, x_free)
     solution = Engine(problem).solve(p, np.concatenate([[1.0], free.x, near.solution.x]))
     if not solution.holds(solver.numerics.tolerance):
         return None
