@@ -11,20 +11,25 @@ from witness_blocked import Wall as WitnessWall
 from witness_blocked import Weights, follow
 from witness_section import BODIES, published, section
 
-from softnlp import BAR, InputError, Loads, Numerics, material, robot
+from softnlp import (
+    BAR,
+    InputError,
+    Loads,
+    Numerics,
+    blocked_force,
+    constrained_pose,
+    force_against_offset,
+    material,
+    pressure_for_force,
+    robot,
+    weight_sensitivity,
+)
 from softnlp.condensed import CondensedSolver
 from softnlp.contact_settings import ClosureWeights, ContactSettings
 from softnlp.loadcase import load_case, rod_functions
 from softnlp.problem import compile_problem
 from softnlp.quantities import Model
 from softnlp.status import Status
-from softnlp.studies.blocked_force import (
-    blocked_force,
-    constrained_pose,
-    force_against_offset,
-    pressure_for_force,
-    weight_sensitivity,
-)
 from softnlp.studies.forward import forward
 from softnlp.studies.step import Run, Step
 from softnlp.tip import tip_conditions
@@ -186,6 +191,19 @@ def test_the_characteristic_curve_falls_to_the_free_tip() -> None:
     assert forces[1] == pytest.approx(force(one(1.2, ContactSettings(offset=-0.02))), rel=1e-5)
 
 
+def test_a_leaning_wall_is_moved_along_the_normal_in_which_it_pushes() -> None:
+    lean = (float(np.cos(0.2)), 0.0, float(np.sin(0.2)))
+    wall = ContactSettings(wall_point=(-0.02, 0.0, 0.01), wall_normal=lean)
+    run = force_against_offset(D25L60, ECOFLEX, [1.2 * BAR, 0, 0], [0.0, -4e-3, 4e-3, -20e-3], wall)
+    forces = [force(s) for s in run.steps]
+    assert forces[2] > forces[0] > forces[1] > 0  # a positive offset is a wall moved towards the robot
+    assert run.steps[3].status is Status.NO_CONTACT
+    for k, h in enumerate((0.0, -4e-3, 4e-3)):
+        point = (-0.02 + h * lean[0], 0.0, 0.01 + h * lean[2])
+        alone = one(1.2, ContactSettings(wall_point=point, wall_normal=lean))
+        assert forces[k] == pytest.approx(force(alone), rel=1e-5)
+
+
 @pytest.mark.parametrize("closure", ["free", "compliant", "rigid", "weighted"])
 def test_a_force_gives_back_its_pressure(closure: str) -> None:
     contact = ContactSettings(closure=closure)  # type: ignore[arg-type]
@@ -301,6 +319,22 @@ def test_weights_matter_as_they_are_said_to() -> None:
     # all weights scaled alike change nothing
     assert sum(by_name.values()) == pytest.approx(0, abs=2e-3)
     assert by_name["length"] > 0 > by_name["moment"]
+    # and the tangent of the force itself, by a step five times smaller
+    weights = [ClosureWeights(1.0, 1.0, 5.0 * f, None) for f in (1.02, 1 / 1.02)]
+    up, down = (force(one(0.9, ContactSettings(closure="weighted", weights=w))) for w in weights)
+    assert by_name["length"] == pytest.approx(np.log(up / down) / (2 * np.log(1.02)), rel=0.02)
+
+
+def test_weight_sensitivity_of_a_run_is_that_of_its_steps() -> None:
+    contact = ContactSettings(closure="weighted", weights=ClosureWeights(force=1.0, moment=1.0, length=5.0))
+    run = blocked_force(D25L60, ECOFLEX, [[0.45 * BAR, 0, 0], [0.9 * BAR, 0, 0]], contact, weight_sensitivity=True)
+    alone = weight_sensitivity(D25L60, ECOFLEX, [0.9 * BAR, 0, 0], contact)[1]
+    assert run.steps[1].contact is not None
+    followed = run.steps[1].contact.sensitivity
+    assert [s.weight for s in followed] == ["force", "moment", "length"]
+    np.testing.assert_allclose([s.elasticity for s in followed], [s.elasticity for s in alone], rtol=1e-4)
+    with pytest.raises(InputError, match="weights"):
+        blocked_force(D25L60, ECOFLEX, [0, 0, 0], ContactSettings(closure="weighted"), weight_sensitivity=True)
 
 
 def test_other_starts_do_not_replace_the_followed_shape() -> None:

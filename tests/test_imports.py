@@ -32,7 +32,7 @@ LAYERS = (
         "studies.weighted",
     ),
     *("studies.free_shape", "studies.blocked_grid", "studies.blocked_step", "studies.blocked", "studies.multistart"),
-    *("studies.force_inversion", "studies.*"),
+    *("studies.force_inversion", "studies.sensitivity", "studies.*"),
     *("scenario_schema", "scenario_check", "pressures", "scenario_contact", "scenario"),
     *("runner_blocked", "runner", "results", "plots", "cli", "__main__"),
 )

@@ -83,6 +83,10 @@ def test_weighted_says_what_it_left() -> None:
     left = {line["equation"]: (abs(line["value"]), line["unit"]) for line in step["weighted_residual"]}
     assert left.keys() == {"e_n", "e_m", "e_L", "e_h"}
     assert left["e_L"][1] == "m"
+    answers = [step[f"force_elasticity_to_weight_{name}"] for name in ("force", "moment", "length")]
+    assert sum(answers) == pytest.approx(0, abs=2e-3)  # all weights scaled alike change nothing
+    assert answers[2] > 0.1
+    assert step["force_elasticity_to_weight_position"] is None
     assert 1e3 * left["e_L"][0] == pytest.approx(abs(step["length_error_mm"]))
 
 

@@ -49,7 +49,7 @@ def table_lines(run: Run) -> Group:
             cells.append(NONE if step.time is None else format(step.time, times))
         cells += [format(p / BAR, pressures) for p in step.pressure]
         style = "" if step.status.has_solution else "red"
-        table.add_row(*cells, Text(step.status.value, style), *[_offset(step)] * moving, *numbers(step))
+        table.add_row(*cells, Text(step.status.value, style), *[_offset(run, step)] * moving, *numbers(step))
 
     lines = [Text(line, style) for line, style in _notes(run)]
     return Group(table, *lines)
@@ -93,9 +93,14 @@ def _wall_moves(run: Run) -> bool:
     return any((point != points[0]).any() for point in points)
 
 
-def _offset(step: Step) -> str:
-    """Return where the wall stands along x."""
-    return NONE if step.contact is None else _millimetres(float(step.contact.wall_point[0]))
+def _offset(run: Run, step: Step) -> str:
+    """Return where the wall stands along x, or for one given by a point how far it was moved the way it pushes."""
+    if step.contact is None:
+        return NONE
+    given = run.contact.wall_point if run.contact is not None else None
+    if given is None:
+        return _millimetres(float(step.contact.wall_point[0]))
+    return _millimetres(float(step.contact.normal @ (step.contact.wall_point - given)))
 
 
 def _notes(run: Run) -> Iterator[tuple[str, str]]:
@@ -103,8 +108,17 @@ def _notes(run: Run) -> Iterator[tuple[str, str]]:
     failed = [(k, f"{s.status.value}: {s.message}") for k, s in enumerate(run.steps, start=1) if s in run.failed]
     warned = [(k, f"warning: {text}") for k, s in enumerate(run.steps, start=1) for text in s.warnings]
     yield from ((line, "red") for line in _grouped(failed))
+    yield from ((f"step {k} {text}", "") for k, text in _sensitivities(run))
     yield from ((f"warning: {text}", "yellow") for text in run.warnings)
     yield from ((line, "yellow") for line in _grouped(warned))
+
+
+def _sensitivities(run: Run) -> Iterator[tuple[int, str]]:
+    """Yield how the force of `weighted` answers to its weights, where that was asked for."""
+    for k, step in enumerate(run.steps, start=1):
+        if step.contact is not None and step.contact.sensitivity:
+            parts = [f"{line.elasticity:+.3f} % ({line.weight})" for line in step.contact.sensitivity]
+            yield k, f"force per 1 % of a weight: {', '.join(parts)}"
 
 
 def _grouped(notes: Sequence[tuple[int, str]]) -> Iterator[str]:
