@@ -9,10 +9,15 @@ import pytest
 from witness_blocked import Loads as WitnessLoads
 from witness_blocked import Wall as WitnessWall
 from witness_blocked import Weights, follow
+from witness_section import AS_PRINTED as WITNESS_AS_PRINTED
 from witness_section import BODIES, published, section
+from witness_section import CALIBRATED as WITNESS_CALIBRATED
+from witness_section import REPRODUCTION as WITNESS_REPRODUCTION
 
 from softnlp import (
+    AS_PRINTED,
     BAR,
+    COEFFICIENT_SETS,
     InputError,
     Loads,
     Numerics,
@@ -103,6 +108,25 @@ def test_closures_agree_with_the_witness(name: str, bar: float, cap: float) -> N
         assert ours.contact is not None
         assert ours.contact.force == pytest.approx(exact.force, rel=1e-5)
         np.testing.assert_allclose(ours.contact.chamber_reaction, exact.reaction, rtol=1e-5, atol=1e-8)
+
+
+@pytest.mark.parametrize(("name", "bar", "cap"), [("D25L60", 1.1, 0.0), ("D20L40", 0.9, 3e-3)])
+@pytest.mark.parametrize("reading", ["calibrated", "as_printed"])
+def test_other_coefficients_and_readings_agree_with_the_witness(
+    reading: str, name: str, bar: float, cap: float
+) -> None:
+    choices, k_c = (WITNESS_CALIBRATED, 0.943) if reading == "calibrated" else (WITNESS_AS_PRINTED, 1.45)
+    given = {"coefficients": COEFFICIENT_SETS["calibrated"]} if reading == "calibrated" else {"conventions": AS_PRINTED}
+    ours = one(bar, ContactSettings(tip_cap=cap), name, **given).contact
+    wall = WitnessWall("compliant", L_t=cap, k_c=k_c)
+    exact, plain = (
+        follow(BODIES[name], WITNESS_ECOFLEX, [bar * BAR, 0, 0], [1.0], w, choices=c, first_step=0.5, tolerance=1e-6)[0]
+        for w, c in ((wall, choices), (WitnessWall(L_t=cap), WITNESS_REPRODUCTION))
+    )
+    assert ours is not None
+    assert ours.force == pytest.approx(exact.force, rel=1e-5)
+    assert abs(exact.force - plain.force) > 1e-3 * plain.force
+    np.testing.assert_allclose(ours.chamber_reaction, exact.reaction, rtol=1e-5, atol=1e-8)
 
 
 @pytest.mark.parametrize("weights", [(1.0, 1.0, 1.0, None), (1.0, 1.0, 5.0, 1e3), (2.0, 100.0, 30.0, None)])
@@ -337,9 +361,41 @@ def test_weight_sensitivity_of_a_run_is_that_of_its_steps() -> None:
         blocked_force(D25L60, ECOFLEX, [0, 0, 0], ContactSettings(closure="weighted"), weight_sensitivity=True)
 
 
-def test_other_starts_do_not_replace_the_followed_shape() -> None:
-    plain, checked = (one(0.5, branches=n) for n in (0, 20))
-    assert force(plain) == force(checked)
+def test_a_fold_is_not_stepped_over_onto_the_part_of_the_curve_beyond_it() -> None:
+    # the branch folds at 1.292 bar; close by the curve rises again, with other forces and the same sign
+    for bars in ([1.5], [1.36, 1.5], [0.9, 1.2, 1.32, 1.5]):
+        P = [[bar * BAR, 0, 0] for bar in bars]
+        run = blocked_force(robot("D10L40"), ECOFLEX, P, ContactSettings(closure="rigid", offset=-0.02))
+        for step, bar in zip(run.steps, bars, strict=True):
+            assert step.status is Status.FOLD if bar > 1.3 else step.status.has_solution
+
+
+@pytest.mark.parametrize(
+    ("name", "bar", "closure", "other"), [("D10L60", 1.3, "compliant", 2), ("D15L60", 1.3, "free", 2)]
+)
+def test_another_equilibrium_is_reported_and_not_returned(name: str, bar: float, closure: str, other: int) -> None:
+    contact = ContactSettings(closure=closure)  # type: ignore[arg-type]
+    plain, checked = (one(bar, contact, name, branches=n) for n in (0, 40))
+    told = [w for w in checked.warnings if "another equilibrium" in w]
+    assert len(told) == other
+    assert not any("another equilibrium" in w for w in plain.warnings)
+    for warning in told:
+        found = float(warning.split("force of ")[1].split(" N")[0])
+        assert found > 1.5 * force(plain)
+    # the result stays the one that was followed: the witness's, which follows as well
+    assert force(checked) == force(plain)
+    assert checked.pose is not None
+    assert plain.pose is not None
+    np.testing.assert_array_equal(checked.pose.tip_position, plain.pose.tip_position)
+    wall = WitnessWall(closure)
+    exact = follow(BODIES[name], WITNESS_ECOFLEX, [bar * BAR, 0, 0], [1.0], wall, first_step=0.34, tolerance=1e-6)[0]
+    assert force(checked) == pytest.approx(exact.force, rel=1e-5)
+
+
+def test_other_starts_find_nothing_where_there_is_nothing_else() -> None:
+    checked = one(0.5, branches=20)
+    assert not checked.warnings
+    assert force(checked) == force(one(0.5))
 
 
 @pytest.mark.parametrize(

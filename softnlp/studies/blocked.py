@@ -223,9 +223,12 @@ class BlockedSolver:
         if grid is not near.grid:
             return None
         p = grid.problem.pack(self.values(end, pressed, free.lengths))
-        rough = grid.stepper.solve(p, near.solution.x)
-        near_enough = grid.distance(rough.x - near.solution.x) <= _LARGEST_JUMP
-        if not near_enough or not rough.holds(10 * grid.stepper.tolerance):
+        x = near.solution.x
+        guess = grid.predicted(x, p) if grid.has_tangent else x
+        rough = grid.stepper.solve(p, guess)
+        if not rough.holds(10 * grid.stepper.tolerance) or not grid.distance(rough.x - x) <= _LARGEST_JUMP:
+            return None
+        if grid.has_tangent and not grid.same_way(guess - x, rough.x - x):
             return None
         determinants = grid.determinants(rough, plane)
         if determinants[0] * near.determinants[0] <= 0:
@@ -313,6 +316,8 @@ class BlockedSolver:
             smallest_step=1 / 2048,
             largest_jump=_LARGEST_JUMP,
             same_branch=same_branch,
+            predict=grid.predicted if grid.has_tangent else None,
+            same_way=grid.same_way,
         )
         spent = begun.iterations + followed.iterations
         if followed.arrived:

@@ -18,6 +18,11 @@ from softnlp.studies.weighted import Weighted
 Array = NDArray[np.float64]
 
 
+_FORCE_SHARE = 0.1  # of a scaled force beside a scaled position in what a step changes
+_LARGEST_MISS = 0.5  # of a step's change: a prediction that is off by more does not tell which branch was met
+_SMALL = 1e-3  # a change that tells nothing of its prediction
+
+
 @dataclass(frozen=True, eq=False)
 class BlockedGrid:
     """Everything compiled for one number of intervals, in a plane of symmetry or in space.
@@ -50,6 +55,31 @@ class BlockedGrid:
     def tip_forces(self, x: Array) -> Array:
         """Return the scaled forces that the tip conditions add."""
         return x[1 + self.state_size * len(self.case.transcribed.points) :]
+
+    @property
+    def has_tangent(self) -> bool:
+        """Whether `predicted` can be used: not for a minimum, and where the nodes are the only states."""
+        return isinstance(self.engine, Engine) and self.engine.linear is not None
+
+    def predicted(self, x: Array, p: Array) -> Array:
+        """Return x moved along the tangent from a solution towards the one at p; x where the tangent is singular."""
+        try:
+            return x + self.condensed.solve(x, p, np.asarray(self.problem.residual(x, p)).ravel())
+        except np.linalg.LinAlgError:
+            return x
+
+    def same_way(self, predicted: Array, change: Array) -> bool:
+        """Whether a step went where it was predicted to; small steps do.
+
+        Past a fold another part of the curve may be so near that its distance alone does not tell it, also with the
+        same sign of the determinant; its forces are others.
+        """
+
+        def size(move: Array) -> float:
+            forces = float(np.max(np.abs(self.tip_forces(move)), initial=0.0))
+            return max(self.distance(move), _FORCE_SHARE * forces)
+
+        return size(change - predicted) <= max(_LARGEST_MISS * size(change), _SMALL)
 
     def distance(self, change: Array) -> float:
         """Return the largest change of a scaled position or of a direction cosine."""
