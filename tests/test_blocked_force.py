@@ -142,6 +142,18 @@ def test_weighted_agrees_with_the_witness(weights: tuple[float, float, float, fl
     assert (left["e_h"] == 0) == (weights[3] is None)
 
 
+def test_weighted_goes_on_where_the_square_equations_are_singular_and_folds_where_the_minimum_ends() -> None:
+    weights = (10.0, 10.0, 20.0, None)
+    contact = ContactSettings(closure="weighted", weights=ClosureWeights(*weights))
+    ours = one(1.5, contact, "D10L60")
+    wall = WitnessWall("weighted", weights=Weights(*weights))
+    exact = follow(BODIES["D10L60"], WITNESS_ECOFLEX, [1.5 * BAR, 0, 0], [1.0], wall, first_step=0.2, tolerance=1e-6)[0]
+    assert force(ours) == pytest.approx(exact.force, rel=1e-5)
+    lost = one(1.5, contact, "D20L60")
+    assert lost.status is Status.FOLD
+    assert float(lost.message.split(" is at ")[1].split(",")[0]) == pytest.approx(1.345, abs=0.005)
+
+
 def test_loads_act_as_in_the_witness() -> None:
     F, M, cap = (0.02, 0.0, -0.05), (0.0, 1e-3, 0.0), 4e-3
     ours = one(0.9, ContactSettings(tip_cap=cap), loads=Loads(tip_force=F, tip_moment=M, gravity=DOWN))

@@ -231,7 +231,7 @@ class BlockedSolver:
         if grid.has_tangent and not grid.same_way(guess - x, rough.x - x):
             return None
         determinants = grid.determinants(rough, plane)
-        if determinants[0] * near.determinants[0] <= 0:
+        if not grid.is_minimum and determinants[0] * near.determinants[0] <= 0:
             return None
         return self._arrived(
             grid, rough, near.situation, end, pressed, free, [(0.0, near.determinants), (1.0, determinants)], near
@@ -299,7 +299,7 @@ class BlockedSolver:
 
         def same_branch(u: float, solution: Solution) -> bool:
             determinants = grid.determinants(solution, plane)
-            if trace and determinants[0] * trace[0][1][0] <= 0:
+            if trace and not grid.is_minimum and determinants[0] * trace[0][1][0] <= 0:
                 return False
             trace.append((u, determinants))
             return True
@@ -328,7 +328,7 @@ class BlockedSolver:
                 return found
         reached = begin.towards(end, t_0 + followed.fraction * (1 - t_0))
         sizes = [abs(size) for _, (size, _) in trace]
-        folded = len(sizes) > 1 and sizes[-1] < _NEAR_FOLD * max(sizes)
+        folded = len(sizes) > 1 and (grid.is_minimum or sizes[-1] < _NEAR_FOLD * max(sizes))
         return _Ended(reached, folded, spent)
 
     def _free_guess(self, grid: BlockedGrid, situation: Situation, shapes: FreeShapes) -> Array:

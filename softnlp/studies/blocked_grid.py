@@ -57,9 +57,14 @@ class BlockedGrid:
         return x[1 + self.state_size * len(self.case.transcribed.points) :]
 
     @property
+    def is_minimum(self) -> bool:
+        """Whether the solution is a minimum of weighted squares, which may go on where the equations are singular."""
+        return isinstance(self.engine, Weighted)
+
+    @property
     def has_tangent(self) -> bool:
         """Whether `predicted` can be used: not for a minimum, and where the nodes are the only states."""
-        return isinstance(self.engine, Engine) and self.engine.linear is not None
+        return not self.is_minimum and self.engine.linear is not None
 
     def predicted(self, x: Array, p: Array) -> Array:
         """Return x moved along the tangent from a solution towards the one at p; x where the tangent is singular."""
