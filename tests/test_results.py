@@ -627,7 +627,8 @@ def test_terminal_table_of_a_blocked_force() -> None:
     contact = offset_run().steps[1].contact
     assert contact is not None
     assert moved[5] == f"{30 * -contact.normal[0]:.2f}"
-    assert max(map(len, curve)) <= 100
+    assert max(map(len, curve)) <= 80
+    assert max(map(len, lines[:9])) <= 80
     body = robot("D25L60")
     wide = [
         blocked_step(body, [1.2345e5, 0.0, 1.1111e5], 12.34567, time=1234.56, solve_time=12.3) if k else

@@ -20,7 +20,8 @@ NONE = "-"
 def table_lines(run: Run) -> Group:
     """Return a table of the steps and, below it, why steps failed and what to be warned of; print it with rich.
 
-    With three chamber sets it fits 100 columns; colours are added to words, never instead of them.
+    With three chamber sets it fits 100 columns, of a blocked force 80. Colours are added to words, never instead of
+    them.
     """
     from rich.box import SIMPLE_HEAD
     from rich.console import Group
@@ -38,7 +39,10 @@ def table_lines(run: Run) -> Group:
     blocked = run.study == BLOCKED_FORCE
     moving = blocked and _wall_moves(run)
     numbers = _blocked_numbers if blocked else _numbers
-    for header in [*["offset\n[mm]"] * moving, *(_BLOCKED_HEADERS if blocked else _HEADERS)]:
+    titles = [*(_BLOCKED_HEADERS if blocked else _HEADERS)]
+    if moving:  # the offset tells what the gap does
+        titles[:2] = ["offset\n[mm]", titles[0]]
+    for header in titles:
         table.add_column(Text(header), justify="right", no_wrap=True)
 
     pressures = _alike([p / BAR for step in steps for p in step.pressure], most=3)
@@ -49,7 +53,10 @@ def table_lines(run: Run) -> Group:
             cells.append(NONE if step.time is None else format(step.time, times))
         cells += [format(p / BAR, pressures) for p in step.pressure]
         style = "" if step.status.has_solution else "red"
-        table.add_row(*cells, Text(step.status.value, style), *[_offset(run, step)] * moving, *numbers(step))
+        found = numbers(step)
+        if moving:
+            found[:2] = [_offset(run, step), found[0]]
+        table.add_row(*cells, Text(step.status.value, style), *found)
 
     lines = [Text(line, style) for line, style in _notes(run)]
     return Group(table, *lines)
@@ -57,7 +64,7 @@ def table_lines(run: Run) -> Group:
 
 _TIP = ("bending\n[deg]", "tip x\n[mm]", "y\n[mm]", "z\n[mm]")
 _HEADERS = (*_TIP, "stretch", "stable", "resid.", "error", "time\n[s]")
-_BLOCKED_HEADERS = ("force\n[N]", "gap\n[mm]", *_TIP, "stable", "resid.", "time\n[s]")
+_BLOCKED_HEADERS = ("force\n[N]", "gap\n[mm]", *_TIP, "resid.")
 
 
 def _numbers(step: Step) -> list[str]:
@@ -78,13 +85,16 @@ def _numbers(step: Step) -> list[str]:
 
 
 def _blocked_numbers(step: Step) -> list[str]:
-    """Return what follows the status of a blocked force; dashes where there is no wall."""
+    """Return what follows the status of a blocked force; dashes where there is no wall.
+
+    What is not stable is a warning below the table, so that the table fits 80 columns.
+    """
     plain = _numbers(step)
     wall = [NONE, NONE]
     if step.contact is not None and step.status.has_solution:
         gap = _millimetres(step.contact.gap) if step.contact.normal.any() else NONE
         wall = [f"{step.contact.force:.4f}", gap]
-    return [*wall, *plain[:4], *plain[5:7], plain[8]]
+    return [*wall, *plain[:4], plain[6]]
 
 
 def _wall_moves(run: Run) -> bool:
