@@ -31,6 +31,7 @@ class Weights:
 class BlockedAnswer:
     """The wall's force along +x [N], base (6,), errors e_n (3,) [N], e_m (3,) [N m], e_L, e_h [m] and counts.
 
+    converged : whether MINPACK met a tolerance within its number of evaluations.
     evaluations counts the integrations of the blocked shape, its Jacobians included; free_evaluations the free shape's.
     """
 
@@ -41,6 +42,7 @@ class BlockedAnswer:
     e_m: Array
     e_L: float
     e_h: float
+    converged: bool
     evaluations: int
     free_evaluations: int
 
@@ -106,6 +108,7 @@ def solve_blocked(
         e_m=e[3:6],
         e_L=float(e[6]),
         e_h=float(e[7]),
+        converged=found.status > 0,
         evaluations=evaluations,
         free_evaluations=free.evaluations,
     )

@@ -12,6 +12,8 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from softnlp.contact_settings import ClosureWeights as ClosureWeights
+    from softnlp.contact_settings import ContactSettings as ContactSettings
     from softnlp.conventions import AS_PRINTED as AS_PRINTED
     from softnlp.conventions import COEFFICIENT_SETS as COEFFICIENT_SETS
     from softnlp.conventions import REPRODUCTION as REPRODUCTION
@@ -38,7 +40,12 @@ if TYPE_CHECKING:
     from softnlp.runner import run_scenario as run_scenario
     from softnlp.scenario import load_scenario as load_scenario
     from softnlp.status import Status as Status
+    from softnlp.studies.blocked_force import blocked_force as blocked_force
+    from softnlp.studies.blocked_force import constrained_pose as constrained_pose
+    from softnlp.studies.blocked_force import force_against_offset as force_against_offset
+    from softnlp.studies.force_inversion import pressure_for_force as pressure_for_force
     from softnlp.studies.forward import forward as forward
+    from softnlp.studies.sensitivity import weight_sensitivity as weight_sensitivity
     from softnlp.studies.step import Run as Run
     from softnlp.studies.step import Step as Step
     from softnlp.units import BAR as BAR
@@ -47,6 +54,7 @@ if TYPE_CHECKING:
     from softnlp.units import NEWTON_MILLIMETRE as NEWTON_MILLIMETRE
 
 _HOMES = {
+    "contact_settings": ("ClosureWeights", "ContactSettings"),
     "conventions": ("AS_PRINTED", "COEFFICIENT_SETS", "REPRODUCTION", "Coefficients", "Conventions"),
     "errors": ("IllPosedError", "InputError", "MaterialError", "RobotError", "SoftnlpError"),
     "laws": ("formula_law", "function_law"),
@@ -58,7 +66,10 @@ _HOMES = {
     "runner": ("run_scenario",),
     "scenario": ("load_scenario",),
     "status": ("Status",),
+    "studies.blocked_force": ("blocked_force", "constrained_pose", "force_against_offset"),
+    "studies.force_inversion": ("pressure_for_force",),
     "studies.forward": ("forward",),
+    "studies.sensitivity": ("weight_sensitivity",),
     "studies.step": ("Run", "Step"),
     "units": ("BAR", "DEGREE", "MILLIMETRE", "NEWTON_MILLIMETRE"),
 }

@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 
 _LARGEST_STRETCH = 10.0
 _GRID = 1500
+_FIRST_PART = 150  # of the grid, up to a stretch of 1.9
+_SECANTS, _ROUNDING = 80, 1e-15
 _ZOOMS, _ZOOM_GRID = 10, 42  # an interval of the first grid is cut 41-fold ten times, which is past round-off
 
 
@@ -80,9 +82,12 @@ def stretch_on_branch(function: ca.Function, column: Array, pressures: Array) ->
 
     reference = np.asarray(function(column, 1.0)).ravel()[2:6]
     grid = np.linspace(1.0, _LARGEST_STRETCH, _GRID)
-    t, k = sample(grid)
-    falls = np.append(t[1:] < t[:-1] - 1e-13, False)
-    events = np.flatnonzero((t >= 1.0) | ~(k > 0) | falls)
+    for size in (_FIRST_PART, _GRID):  # most branches arrive early
+        t, k = sample(grid[:size])
+        falls = np.append(t[1:] < t[:-1] - 1e-13, False)
+        events = np.flatnonzero((t >= 1.0) | ~(k > 0) | falls)
+        if events.size and events[0] < size - 1:  # the last point does not know whether it falls
+            break
     if events.size == 0:
         return _ended(Status.NO_EQUILIBRIUM, grid[-1], float(t[-1]), pressures, "goes beyond any stretch of use")
     j = int(events[0])
@@ -113,12 +118,30 @@ def stretch_on_branch(function: ca.Function, column: Array, pressures: Array) ->
         values = sample(np.array([stretch]))
         return float(values[0][0]), float(values[1][0])
 
-    root = first_beyond(lambda s: sample(s)[0] >= 1.0, low, high) if at(high)[0] >= 1.0 else high
+    root = _crossing(lambda s: at(s)[0] - 1.0, low, high) if at(high)[0] >= 1.0 else high
     if at(root)[1] > 0:
         return BranchPoint(Status.SOLVED, root, 1.0, "on the branch from zero pressure")
     lost = first_beyond(lambda s: ~(sample(s)[1] > 0), low, root)
     how = "meets a tangent stiffness that loses its sign"
     return _ended(Status.UNSTABLE_MATERIAL, lost, at(lost)[0], pressures, how)
+
+
+def _crossing(excess: Callable[[float], float], a: float, b: float) -> float:
+    """Return where a function that is below 0 at a and not at b is 0, to round-off, by the Illinois method."""
+    f_a, f_b, side = excess(a), excess(b), 0
+    for _ in range(_SECANTS):
+        with np.errstate(invalid="ignore", divide="ignore"):
+            middle = float(b - np.float64(f_b) * (b - a) / (f_b - f_a))
+        if not a <= middle <= b:  # an end where the function is infinite
+            middle = (a + b) / 2
+        f = excess(middle)
+        if min(middle - a, b - middle) <= _ROUNDING or f == 0:
+            return middle
+        if f > 0:
+            b, f_b, f_a, side = middle, f, f_a / 2 if side > 0 else f_a, 1
+        else:
+            a, f_a, f_b, side = middle, f, f_b / 2 if side < 0 else f_b, -1
+    return b
 
 
 def _ended(status: Status, stretch: float, fraction: float, pressures: Array, how: str) -> BranchPoint:

@@ -78,10 +78,6 @@ class CondensedSolver:
         states = system.directions @ np.append(found[:known], 1.0)
         return np.concatenate([[system.d_stretch], states.T.ravel(), found[known:]])
 
-    def determinant(self, x: Array, p: Array) -> float:
-        """Return the determinant of the tip equations; it changes its sign where the solution turns or branches."""
-        return float(np.linalg.det(self._into @ self.tip_system(x, p).matrix))
-
     def tip_moves(self, x: Array, p: Array) -> Array:
         """Return how the tip's state moves when the tip equations are off by given errors, (nx, 6 + n_y)."""
         system = self.tip_system(x, p)

@@ -47,11 +47,13 @@ class ContactTask:
 
     offsets : h of a characteristic curve at the one pressure given [m]. target_force : the force to find the pressure
     for, bounded by the last pressure given [N]. constrained : no wall; the chambers' lengths are held under the loads.
+    weight_sensitivity : how the force of `weighted` answers to its weights, in each step as well.
     """
 
     offsets: tuple[float, ...] | None = None
     target_force: float | None = None
     constrained: bool = False
+    weight_sensitivity: bool = False
 
     def step_count(self, pressures: int) -> int:
         """Return how many steps the run has, for so many pressures of the scenario."""

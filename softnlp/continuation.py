@@ -44,14 +44,17 @@ def follow(
     most_solves: int = 400,
     most_iterations: int | None = None,
     same_branch: Callable[[float, Solution], bool] | None = None,
+    predict: Callable[[Array, Array], Array] | None = None,
+    same_way: Callable[[Array, Array], bool] | None = None,
 ) -> Followed:
     """Follow a solution along p = path(t) from t = 0, where `start` is a solution or close to one, to t = 1.
 
     The step is halved when a solve fails or lands further than `largest_jump` (scaled) from its prediction, which is
-    how another branch shows, and grows again after success. The predictor is the secant. `distance` measures a change
-    of x. A solve counts when it meets ten times the engine's own tolerance, so an engine for a path may be a loose one.
-    `most_iterations` bounds what is spent. `same_branch(t, solution)` may refuse a solution that the distance does not
-    tell from the branch.
+    how another branch shows, and grows again after success. The predictor is the secant, or predict(x, p) of a solution
+    x and the values p of the next one; same_way(predicted change, change) may refuse a step that went another way.
+    `distance` measures a change of x. A solve counts when it meets ten times the engine's own tolerance, so an engine
+    for a path may be a loose one. `most_iterations` bounds what is spent.
+    `same_branch(t, solution)` may refuse a solution that the distance does not tell from the branch.
     """
     tolerance = 10 * engine.tolerance
     current = engine.solve(path(0.0), start)
@@ -65,11 +68,16 @@ def follow(
             break
         target = min(1.0, done + step)
         guess = current.x
-        if previous is not None:
+        predicted = predict is not None or previous is not None
+        if predict is not None:
+            guess = predict(current.x, path(target))
+        elif previous is not None:
             guess = guess + (current.x - previous[1]) * (target - done) / (done - previous[0])
         trial = engine.solve(path(target), guess)
         iterations += trial.iterations
         found = trial.holds(tolerance) and distance(trial.x - guess) <= largest_jump
+        if found and predicted and same_way is not None:
+            found = same_way(guess - current.x, trial.x - current.x)
         if found and (same_branch is None or same_branch(target, trial)):
             previous, current, done = (done, current.x), trial, target
             if done >= 1.0:

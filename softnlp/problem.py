@@ -67,6 +67,14 @@ class CompiledProblem:
         x, p, g = (self.nlp[name] for name in "xpg")
         return ca.Function("jacobian", [x, p], [ca.jacobian(g, x)])
 
+    @cached_property
+    def _fixed_column(self) -> _Column:
+        return _column(self.fixed, "a fixed")
+
+    @cached_property
+    def _free_column(self) -> _Column:
+        return _column(self.free, "a free")
+
     @property
     def free_size(self) -> int:
         """The number of entries of x that are free quantities."""
@@ -77,7 +85,7 @@ class CompiledProblem:
 
         Raises `IllPosedError` for a name that is not a fixed quantity of this problem, or a value of another size.
         """
-        return _column(self.fixed, values, "a fixed")
+        return self._fixed_column.filled(values)
 
     def free_values(self, x: Array) -> dict[str, Array]:
         """Return the free quantities in x by name, SI."""
@@ -90,23 +98,38 @@ class CompiledProblem:
     def pack_free(self, values: Mapping[str, Any]) -> Array:
         """Return the head of x from SI values of the free quantities; nominal where not named. Raises as `pack`."""
         scales = np.repeat([q.scale for q in self.free], [q.size for q in self.free])
-        scaled: Array = _column(self.free, values, "a free") / scales
+        scaled: Array = self._free_column.filled(values) / scales
         return scaled
 
 
-def _column(among: Sequence[Quantity], values: Mapping[str, Any], kind: str) -> Array:
-    """Stack the values of quantities, SI."""
-    known = {q.name for q in among}
-    for name in values:
-        if name not in known:
-            raise IllPosedError(f"'{name}' is not {kind} quantity of this problem{nearest(name, known)}")
-    parts = [np.zeros(0)]
+@dataclass(frozen=True, eq=False)
+class _Column:
+    """Where each of some quantities stands in a column, and the column of nominal values, SI."""
+
+    places: Mapping[str, slice]
+    nominal: Array
+    kind: str
+
+    def filled(self, values: Mapping[str, Any]) -> Array:
+        """Return the column with values in place of the nominal ones."""
+        column = self.nominal.copy()
+        for name, given in values.items():
+            if name not in self.places:
+                raise IllPosedError(f"'{name}' is not {self.kind} quantity of this problem{nearest(name, self.places)}")
+            value, place = np.asarray(given, float).ravel(), self.places[name]
+            if value.size not in (1, place.stop - place.start):
+                raise IllPosedError(f"'{name}' takes {place.stop - place.start} numbers, got {value.size}")
+            column[place] = value
+        return column
+
+
+def _column(among: Sequence[Quantity], kind: str) -> _Column:
+    """Stack quantities."""
+    places, start = {}, 0
     for q in among:
-        value = np.asarray(values.get(q.name, q.nominal), float).ravel()
-        if value.size not in (1, q.size):
-            raise IllPosedError(f"'{q.name}' takes {q.size} numbers, got {value.size}")
-        parts.append(np.broadcast_to(value, q.size))
-    return np.concatenate(parts)
+        places[q.name] = slice(start, start + q.size)
+        start += q.size
+    return _Column(places, np.concatenate([np.zeros(0), *(q.nominal for q in among)]), kind)
 
 
 def compile_problem(

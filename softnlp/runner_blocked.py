@@ -47,6 +47,7 @@ def run_blocked(scenario: Scenario, progress: Progress | None, branches: int = 0
     settings |= {"title": scenario.title, "progress": progress}
     if task.offsets is not None:
         return force_against_offset(*model, scenario.pressures[0], task.offsets, contact, **settings)
+    settings["weight_sensitivity"] = task.weight_sensitivity
     times = None if scenario.times is None else scenario.times.tolist()
     return blocked_force(*model, scenario.pressures, contact, times=times, branches=branches, **settings)
 

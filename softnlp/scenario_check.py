@@ -118,6 +118,7 @@ _KINDS = {
     "float_type": "a number",
     "finite_number": "a finite number",
     "int_type": "a whole number",
+    "bool_type": "true or false",
     "string_type": "text in quotes",
     "list_type": "a list",
     "dict_type": "a table",

@@ -12,6 +12,7 @@ from softnlp.units import MILLIMETRE, NEWTON_MILLIMETRE
 
 Array = NDArray[np.float64]
 
+_WEIGHTS = ("weight_force_per_N", "weight_moment_per_Nmm", "weight_length_per_mm", "weight_position_per_mm")
 _OFFSETS = ("offset_mm", "offsets_mm", "offset_ramp")
 _WALL = (*_OFFSETS, "wall_point_mm", "wall_normal", "target_force_N", "tip_cap_mm")
 
@@ -32,11 +33,11 @@ def contact_settings(table: ContactTable) -> ContactSettings:
     offsets = [key for key in _OFFSETS if getattr(table, key) is not None]
     if len(offsets) > 1:
         raise InputError(f"expected at most one of {', '.join(_OFFSETS)}, got {' and '.join(offsets)}", key=offsets[1])
-    if table.wall_point_mm is not None and offsets:
-        raise InputError(f"expected either {offsets[0]} or wall_point_mm and wall_normal, got both", key=offsets[0])
+    if table.wall_point_mm is not None and table.offset_mm is not None:
+        raise InputError("expected either offset_mm or wall_point_mm and wall_normal, got both", key="offset_mm")
     if table.closure != "weighted":
         for key in ContactTable.model_fields:
-            if key.startswith("weight_") and getattr(table, key) is not None:
+            if key.startswith("weight_") and key in table.model_fields_set:
                 raise InputError(f"expected only with closure = 'weighted', got closure = {table.closure!r}", key=key)
     point = None
     if table.wall_point_mm is not None:
@@ -62,6 +63,19 @@ def _per(weight: float | None, unit: float) -> float | None:
     return None if weight is None else weight / unit
 
 
+def _check_sensitivity(table: ContactTable) -> None:
+    """Refuse weight_sensitivity without a weight, and with what has no force at each pressure."""
+    if not any(key in table.model_fields_set for key in _WEIGHTS):
+        raise InputError(f"expected at least one of {', '.join(_WEIGHTS)} with it", key="weight_sensitivity")
+    asked: list[str] = [key for key in ("offsets_mm", "offset_ramp", "target_force_N") if key in table.model_fields_set]
+    if table.mode == "constrained":
+        asked.append("mode = 'constrained'")
+    if asked:
+        raise InputError(
+            f"expected only where the force is asked for at each pressure, got {asked[0]}", key="weight_sensitivity"
+        )
+
+
 def contact_task(table: ContactTable, pressures: Array) -> ContactTask:
     """Return what is asked of the wall.
 
@@ -75,6 +89,8 @@ def contact_task(table: ContactTable, pressures: Array) -> ContactTask:
         As `contact_settings`, and where the pressures do not fit what is asked.
     """
     given = [key for key in _WALL if key in table.model_fields_set]
+    if table.weight_sensitivity:
+        _check_sensitivity(table)
     if table.mode == "constrained":
         if given:
             raise InputError("expected only with mode = 'blocked': mode = 'constrained' has no wall", key=given[0])
@@ -101,7 +117,7 @@ def contact_task(table: ContactTable, pressures: Array) -> ContactTask:
         ramp = table.offset_ramp
         offsets = np.linspace(ramp.from_mm, ramp.to_mm, ramp.steps).tolist()
     if offsets is None:
-        return ContactTask()
+        return ContactTask(weight_sensitivity=table.weight_sensitivity)
     if len(pressures) != 1:
         raise InputError(
             f"expected one step in [pressure] with several offsets, got {len(pressures)}; give sequence_bar one row",

@@ -206,6 +206,7 @@ class ContactTable(Table):
     weight_moment_per_Nmm: Positive | None = None
     weight_length_per_mm: Positive | None = None
     weight_position_per_mm: Positive | None = None
+    weight_sensitivity: bool = False
 
 
 class SolverTable(Table):

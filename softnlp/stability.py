@@ -71,10 +71,9 @@ def conjugate_points(transition: ca.Function, tip_variation: ca.Function, nodes:
     A, B, C, D = Phi[:, :6, :6], Phi[:, :6, 6:], Phi[:, 6:, :6], Phi[:, 6:, 6:]
     before = D @ np.linalg.inv(B)  # force at a node by its pose, with the node before it held
     beyond = -np.asarray(tip_variation(nodes[:, K], constants))  # and by the part of the rod beyond it
-    count = 0
+    every = np.empty((K, 6, 6))
     for k in range(K - 1, -1, -1):
-        H = before[k] - beyond
-        count += int(np.sum(np.linalg.eigvalsh((H + H.T) / 2) < 0))
+        every[k] = before[k] - beyond
         # Carry the stiffness of the rod beyond over the interval: f_left as a function of the pose at its left.
         beyond = np.linalg.solve(D[k] - beyond @ B[k], beyond @ A[k] - C[k])
-    return count
+    return int(np.sum(np.linalg.eigvalsh((every + every.transpose(0, 2, 1)) / 2) < 0))

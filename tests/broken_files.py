@@ -525,7 +525,17 @@ CONTACTS = [
         (("offsets_mm = [0.0, -1.0]",), ("offsets_mm", "one step in [pressure]", "got 3")),
         (("offsets_mm = [0.0]", "offset_mm = 1.0"), ("offsets_mm", "at most one", "offset_mm and offsets_mm")),
         (("offsets_mm = [1.0]", "target_force_N = 0.1"), ("target_force_N", "at most one")),
-        (("offsets_mm = [2.0]", "wall_normal = [1, 0, 0]", "wall_point_mm = [0, 0, 0]"), ("offsets_mm", "wall_normal")),
+        (("weight_sensitivity = true",), ("weight_sensitivity", "'weighted'")),
+        (("weight_sensitivity = 1", "closure = 'weighted'"), ("weight_sensitivity", "true or false")),
+        (("closure = 'weighted'", "weight_sensitivity = true"), ("weight_sensitivity", "weight_force_per_N")),
+        (
+            ("weight_force_per_N = 1", "weight_sensitivity = true", "closure = 'weighted'", "target_force_N = 0.1"),
+            ("weight_sensitivity", "each pressure", "target_force_N"),
+        ),
+        (
+            ("weight_force_per_N = 2", "weight_sensitivity = true", "closure = 'weighted'", "mode = 'constrained'"),
+            ("weight_sensitivity", "each pressure", "constrained"),
+        ),
         (("offset_ramp = -5.0",), ("offset_ramp", "a table")),
         (("offset_ramp = { from_mm = 0, to_mm = -5 }",), ("offset_ramp.steps", "missing")),
         (("offset_ramp = { from_mm = 0, to_mm = -5, steps = 1 }",), ("offset_ramp.steps", "at least 2")),

@@ -9,22 +9,32 @@ import pytest
 from witness_blocked import Loads as WitnessLoads
 from witness_blocked import Wall as WitnessWall
 from witness_blocked import Weights, follow
+from witness_section import AS_PRINTED as WITNESS_AS_PRINTED
 from witness_section import BODIES, published, section
+from witness_section import CALIBRATED as WITNESS_CALIBRATED
+from witness_section import REPRODUCTION as WITNESS_REPRODUCTION
 
-from softnlp import BAR, InputError, Loads, Numerics, material, robot
+from softnlp import (
+    AS_PRINTED,
+    BAR,
+    COEFFICIENT_SETS,
+    InputError,
+    Loads,
+    Numerics,
+    blocked_force,
+    constrained_pose,
+    force_against_offset,
+    material,
+    pressure_for_force,
+    robot,
+    weight_sensitivity,
+)
 from softnlp.condensed import CondensedSolver
 from softnlp.contact_settings import ClosureWeights, ContactSettings
 from softnlp.loadcase import load_case, rod_functions
 from softnlp.problem import compile_problem
 from softnlp.quantities import Model
 from softnlp.status import Status
-from softnlp.studies.blocked_force import (
-    blocked_force,
-    constrained_pose,
-    force_against_offset,
-    pressure_for_force,
-    weight_sensitivity,
-)
 from softnlp.studies.forward import forward
 from softnlp.studies.step import Run, Step
 from softnlp.tip import tip_conditions
@@ -100,6 +110,25 @@ def test_closures_agree_with_the_witness(name: str, bar: float, cap: float) -> N
         np.testing.assert_allclose(ours.contact.chamber_reaction, exact.reaction, rtol=1e-5, atol=1e-8)
 
 
+@pytest.mark.parametrize(("name", "bar", "cap"), [("D25L60", 1.1, 0.0), ("D20L40", 0.9, 3e-3)])
+@pytest.mark.parametrize("reading", ["calibrated", "as_printed"])
+def test_other_coefficients_and_readings_agree_with_the_witness(
+    reading: str, name: str, bar: float, cap: float
+) -> None:
+    choices, k_c = (WITNESS_CALIBRATED, 0.943) if reading == "calibrated" else (WITNESS_AS_PRINTED, 1.45)
+    given = {"coefficients": COEFFICIENT_SETS["calibrated"]} if reading == "calibrated" else {"conventions": AS_PRINTED}
+    ours = one(bar, ContactSettings(tip_cap=cap), name, **given).contact
+    wall = WitnessWall("compliant", L_t=cap, k_c=k_c)
+    exact, plain = (
+        follow(BODIES[name], WITNESS_ECOFLEX, [bar * BAR, 0, 0], [1.0], w, choices=c, first_step=0.5, tolerance=1e-6)[0]
+        for w, c in ((wall, choices), (WitnessWall(L_t=cap), WITNESS_REPRODUCTION))
+    )
+    assert ours is not None
+    assert ours.force == pytest.approx(exact.force, rel=1e-5)
+    assert abs(exact.force - plain.force) > 1e-3 * plain.force
+    np.testing.assert_allclose(ours.chamber_reaction, exact.reaction, rtol=1e-5, atol=1e-8)
+
+
 @pytest.mark.parametrize("weights", [(1.0, 1.0, 1.0, None), (1.0, 1.0, 5.0, 1e3), (2.0, 100.0, 30.0, None)])
 def test_weighted_agrees_with_the_witness(weights: tuple[float, float, float, float | None]) -> None:
     ours = one(0.9, ContactSettings(closure="weighted", weights=ClosureWeights(*weights))).contact
@@ -111,6 +140,18 @@ def test_weighted_agrees_with_the_witness(weights: tuple[float, float, float, fl
     assert left["e_m"] == pytest.approx(np.abs(exact.e_m).max(), rel=1e-4)
     assert left["e_L"] == pytest.approx(abs(exact.e_L), rel=1e-4)
     assert (left["e_h"] == 0) == (weights[3] is None)
+
+
+def test_weighted_goes_on_where_the_square_equations_are_singular_and_folds_where_the_minimum_ends() -> None:
+    weights = (10.0, 10.0, 20.0, None)
+    contact = ContactSettings(closure="weighted", weights=ClosureWeights(*weights))
+    ours = one(1.5, contact, "D10L60")
+    wall = WitnessWall("weighted", weights=Weights(*weights))
+    exact = follow(BODIES["D10L60"], WITNESS_ECOFLEX, [1.5 * BAR, 0, 0], [1.0], wall, first_step=0.2, tolerance=1e-6)[0]
+    assert force(ours) == pytest.approx(exact.force, rel=1e-5)
+    lost = one(1.5, contact, "D20L60")
+    assert lost.status is Status.FOLD
+    assert float(lost.message.split(" is at ")[1].split(",")[0]) == pytest.approx(1.345, abs=0.005)
 
 
 def test_loads_act_as_in_the_witness() -> None:
@@ -184,6 +225,19 @@ def test_the_characteristic_curve_falls_to_the_free_tip() -> None:
     assert np.all(np.diff(forces) < 0)
     assert run.steps[-1].status is Status.NO_CONTACT
     assert forces[1] == pytest.approx(force(one(1.2, ContactSettings(offset=-0.02))), rel=1e-5)
+
+
+def test_a_leaning_wall_is_moved_along_the_normal_in_which_it_pushes() -> None:
+    lean = (float(np.cos(0.2)), 0.0, float(np.sin(0.2)))
+    wall = ContactSettings(wall_point=(-0.02, 0.0, 0.01), wall_normal=lean)
+    run = force_against_offset(D25L60, ECOFLEX, [1.2 * BAR, 0, 0], [0.0, -4e-3, 4e-3, -20e-3], wall)
+    forces = [force(s) for s in run.steps]
+    assert forces[2] > forces[0] > forces[1] > 0  # a positive offset is a wall moved towards the robot
+    assert run.steps[3].status is Status.NO_CONTACT
+    for k, h in enumerate((0.0, -4e-3, 4e-3)):
+        point = (-0.02 + h * lean[0], 0.0, 0.01 + h * lean[2])
+        alone = one(1.2, ContactSettings(wall_point=point, wall_normal=lean))
+        assert forces[k] == pytest.approx(force(alone), rel=1e-5)
 
 
 @pytest.mark.parametrize("closure", ["free", "compliant", "rigid", "weighted"])
@@ -301,11 +355,59 @@ def test_weights_matter_as_they_are_said_to() -> None:
     # all weights scaled alike change nothing
     assert sum(by_name.values()) == pytest.approx(0, abs=2e-3)
     assert by_name["length"] > 0 > by_name["moment"]
+    # and the tangent of the force itself, by a step five times smaller
+    weights = [ClosureWeights(1.0, 1.0, 5.0 * f, None) for f in (1.02, 1 / 1.02)]
+    up, down = (force(one(0.9, ContactSettings(closure="weighted", weights=w))) for w in weights)
+    assert by_name["length"] == pytest.approx(np.log(up / down) / (2 * np.log(1.02)), rel=0.02)
 
 
-def test_other_starts_do_not_replace_the_followed_shape() -> None:
-    plain, checked = (one(0.5, branches=n) for n in (0, 20))
-    assert force(plain) == force(checked)
+def test_weight_sensitivity_of_a_run_is_that_of_its_steps() -> None:
+    contact = ContactSettings(closure="weighted", weights=ClosureWeights(force=1.0, moment=1.0, length=5.0))
+    run = blocked_force(D25L60, ECOFLEX, [[0.45 * BAR, 0, 0], [0.9 * BAR, 0, 0]], contact, weight_sensitivity=True)
+    alone = weight_sensitivity(D25L60, ECOFLEX, [0.9 * BAR, 0, 0], contact)[1]
+    assert run.steps[1].contact is not None
+    followed = run.steps[1].contact.sensitivity
+    assert [s.weight for s in followed] == ["force", "moment", "length"]
+    np.testing.assert_allclose([s.elasticity for s in followed], [s.elasticity for s in alone], rtol=1e-4)
+    with pytest.raises(InputError, match="weights"):
+        blocked_force(D25L60, ECOFLEX, [0, 0, 0], ContactSettings(closure="weighted"), weight_sensitivity=True)
+
+
+def test_a_fold_is_not_stepped_over_onto_the_part_of_the_curve_beyond_it() -> None:
+    # the branch folds at 1.292 bar; close by the curve rises again, with other forces and the same sign
+    for bars in ([1.5], [1.36, 1.5], [0.9, 1.2, 1.32, 1.5]):
+        P = [[bar * BAR, 0, 0] for bar in bars]
+        run = blocked_force(robot("D10L40"), ECOFLEX, P, ContactSettings(closure="rigid", offset=-0.02))
+        for step, bar in zip(run.steps, bars, strict=True):
+            assert step.status is Status.FOLD if bar > 1.3 else step.status.has_solution
+
+
+@pytest.mark.parametrize(
+    ("name", "bar", "closure", "other"), [("D10L60", 1.3, "compliant", 2), ("D15L60", 1.3, "free", 2)]
+)
+def test_another_equilibrium_is_reported_and_not_returned(name: str, bar: float, closure: str, other: int) -> None:
+    contact = ContactSettings(closure=closure)  # type: ignore[arg-type]
+    plain, checked = (one(bar, contact, name, branches=n) for n in (0, 40))
+    told = [w for w in checked.warnings if "another equilibrium" in w]
+    assert len(told) == other
+    assert not any("another equilibrium" in w for w in plain.warnings)
+    for warning in told:
+        found = float(warning.split("force of ")[1].split(" N")[0])
+        assert found > 1.5 * force(plain)
+    # the result stays the one that was followed: the witness's, which follows as well
+    assert force(checked) == force(plain)
+    assert checked.pose is not None
+    assert plain.pose is not None
+    np.testing.assert_array_equal(checked.pose.tip_position, plain.pose.tip_position)
+    wall = WitnessWall(closure)
+    exact = follow(BODIES[name], WITNESS_ECOFLEX, [bar * BAR, 0, 0], [1.0], wall, first_step=0.34, tolerance=1e-6)[0]
+    assert force(checked) == pytest.approx(exact.force, rel=1e-5)
+
+
+def test_other_starts_find_nothing_where_there_is_nothing_else() -> None:
+    checked = one(0.5, branches=20)
+    assert not checked.warnings
+    assert force(checked) == force(one(0.5))
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,7 @@ LAYERS = (
         "studies.pose_grid",
         "studies.attempts",
         "studies.statics",
+        "studies.arc",
         "studies.forward",
         "studies.wall",
         "studies.weighted",

@@ -47,7 +47,7 @@ from softnlp.scenario_contact import contact_settings
 from softnlp.scenario_schema import ContactTable
 from softnlp.solver import EquationResidual
 from softnlp.status import Status
-from softnlp.studies.step import Run
+from softnlp.studies.step import Run, WeightSensitivity
 
 STEP_KEYS = {
     *("pressure_bar", "status", "message", "stretch", "stable", "tip_position_mm", "tip_displacement_mm"),
@@ -510,6 +510,24 @@ def test_what_was_asked_of_the_wall_is_a_table_that_a_scenario_accepts() -> None
         assert getattr(again.weights, name) == pytest.approx(getattr(settings.weights, name))
 
 
+def test_sensitivity_to_the_weights_is_in_every_format_where_it_was_asked_for() -> None:
+    run = weighted_run()
+    assert not any("elasticity" in key for key in to_json(run)["steps"][0])
+    contact = run.steps[1].contact
+    assert contact is not None
+    lines = (WeightSensitivity("force", 2.0, "1/N", 0.25), WeightSensitivity("length", 4e3, "1/m", -0.5))
+    step = replace(run.steps[1], contact=replace(contact, sensitivity=lines))
+    run = replace(run, steps=(run.steps[0], step, run.steps[2]))
+    entries = [[s[f"force_elasticity_to_weight_{w}"] for w in ("force", "position")] for s in to_json(run)["steps"]]
+    assert entries == [[None, None], [0.25, None], [None, None]]
+    row = list(csv.DictReader(io.StringIO(table_text(run))))[1]
+    assert (row["force_elasticity_to_weight_length"], row["force_elasticity_to_weight_position"]) == ("-0.5", "")
+    found = to_dataset(run).force_elasticity_to_weight_length
+    assert found.sel(step=2) == -0.5
+    assert np.isnan(found.sel(step=[1, 3])).all()
+    assert "step 2 force per 1 % of a weight: +0.250 % (force), -0.500 % (length)" in " ".join(printed(run))
+
+
 def test_what_weighted_left_is_in_every_format_with_its_unit() -> None:
     run = weighted_run()
     entries = to_json(run)["steps"]
@@ -603,7 +621,14 @@ def test_terminal_table_of_a_blocked_force() -> None:
     curve = printed(offset_run())
     assert "offset" in curve[0]
     assert next(line.split() for line in curve if line.split()[:1] == ["2"])[5:7] == ["-10.00", "0.8000"]
-    assert max(map(len, curve)) <= 100
+    # a wall given by a point: how far it was moved from it, the way it pushes
+    wall = ContactSettings(wall_point=(0.02, 0.0, 0.0), wall_normal=(-1.0, 0.0, 0.0))
+    moved = next(line.split() for line in printed(replace(offset_run(), contact=wall)) if line.split()[:1] == ["2"])
+    contact = offset_run().steps[1].contact
+    assert contact is not None
+    assert moved[5] == f"{30 * -contact.normal[0]:.2f}"
+    assert max(map(len, curve)) <= 80
+    assert max(map(len, lines[:9])) <= 80
     body = robot("D25L60")
     wide = [
         blocked_step(body, [1.2345e5, 0.0, 1.1111e5], 12.34567, time=1234.56, solve_time=12.3) if k else

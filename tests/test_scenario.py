@@ -439,6 +439,10 @@ def test_what_is_asked_of_the_wall() -> None:
     assert steps == 4
     assert task is not None
     assert task.offsets == pytest.approx((0, -0.01, -0.02, -0.03))
+    moved = "wall_point_mm = [-10, 0, 0]\nwall_normal = [1, 0, 0]\noffsets_mm = [0, -5]"
+    assert blocked_task(moved, one) == (ContactTask(offsets=(0.0, -0.005)), 2)
+    weighted = "closure = 'weighted'\nweight_force_per_N = 1\nweight_sensitivity = true"
+    assert blocked_task(weighted) == (ContactTask(weight_sensitivity=True), 3)
     assert read(scenario()).task is None
 
 

@@ -47,6 +47,34 @@ def test_every_measured_robot_has_a_blocked_force() -> None:
         assert f"Measured: {force:.2f} N" in shipped[name]
 
 
+def documented_forces() -> dict[str, list[float]]:
+    """Return the rows of the documented comparison: measured, then each model; NaN where it says fold."""
+    text = (FOLDER.parents[1] / "docs" / "blocked-force.md").read_text()
+    lines = text.split("## Against measurement")[1].split("## What can be asked")[0].splitlines()
+    table = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")]
+    rows = {row[0]: row[1:] for row in table[2:]}
+    return {name: [float("nan") if c in ("fold", "") else float(c) for c in row] for name, row in rows.items()}
+
+
+def test_the_documented_comparison_is_that_of_the_benchmark() -> None:
+    from benchmarks.blocked_measured import LENGTH_WEIGHTS, MEASURED, MODELS, forces, with_length_weight
+
+    documented = documented_forces()
+    for name, force in MEASURED.items():
+        assert documented[name][0] == force
+        assert len(documented[name]) == 1 + len(MODELS)
+    for name in ("D25L40", "D10L60"):
+        found = [forces(name, model)[-1] for model in MODELS]
+        np.testing.assert_allclose(documented[name][1:], found, atol=6e-4)
+    for k, _ in enumerate(MODELS, start=1):
+        errors = [abs(documented[name][k] / force - 1) for name, force in MEASURED.items()]
+        assert documented["mean error at 1.5 bar [%]"][k] == pytest.approx(100 * np.nanmean(errors), abs=0.6)
+    text = " ".join((FOLDER.parents[1] / "docs" / "blocked-force.md").read_text().split())
+    force, left = with_length_weight(LENGTH_WEIGHTS[-1])
+    assert f"{force:.2f} N with {LENGTH_WEIGHTS[-1]:.0f} /m" in text
+    assert f"{1e3 * left:.0f} N mm" in text
+
+
 def test_a_tip_cap_lowers_the_force() -> None:
     bare, capped = (blocked_steps(name)[-1]["blocked_force_N"] for name in ("D25L60", "D25L60_tip_cap"))
     assert bare == pytest.approx(1.22, rel=0.02)
@@ -83,6 +111,10 @@ def test_weighted_says_what_it_left() -> None:
     left = {line["equation"]: (abs(line["value"]), line["unit"]) for line in step["weighted_residual"]}
     assert left.keys() == {"e_n", "e_m", "e_L", "e_h"}
     assert left["e_L"][1] == "m"
+    answers = [step[f"force_elasticity_to_weight_{name}"] for name in ("force", "moment", "length")]
+    assert sum(answers) == pytest.approx(0, abs=2e-3)  # all weights scaled alike change nothing
+    assert answers[2] > 0.1
+    assert step["force_elasticity_to_weight_position"] is None
     assert 1e3 * left["e_L"][0] == pytest.approx(abs(step["length_error_mm"]))
 
 

@@ -86,8 +86,11 @@ def _abscissa(view: RunView, contact: ContactView) -> Abscissa:
     if known.size > 1 and np.ptp(known) > 1e-6:
         # Failed steps have no wall; equal steps are the rule.
         steps = np.arange(len(h))
+        n = contact.normal[np.isfinite(h)]
+        along_x = np.all(np.abs(n[:, 0]) > 1 - _ALONG_X)
+        label = "wall offset [mm]" if along_x else "wall position along its normal [mm]"
         slope, start = np.polyfit(steps[np.isfinite(h)], known, 1)
-        return Abscissa(np.where(np.isfinite(h), h, start + slope * steps), "wall offset [mm]", False, MILLIMETRE)
+        return Abscissa(np.where(np.isfinite(h), h, start + slope * steps), label, False, MILLIMETRE)
     return abscissa(view)
 
 

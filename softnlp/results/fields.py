@@ -195,6 +195,24 @@ CONTACT_FIELDS: tuple[Field, ...] = (
     ),
 )
 
+
+def _elasticity(weight: str) -> Callable[[Step, Pose], Any]:
+    """Take the answer of the force to a weight; None where it was not asked for."""
+    return _contact(lambda c: next((line.elasticity for line in c.sensitivity if line.weight == weight), None))
+
+
+# Beside `weighted`, where the scenario asks for it: d ln F / d ln W.
+SENSITIVITY_FIELDS = tuple(
+    Field(
+        f"force_elasticity_to_weight_{weight}",
+        (),
+        "1",
+        f"relative change of the blocked force over that of the weight of {what}",
+        _elasticity(weight),
+    )
+    for weight, what in (("force", "e_n"), ("moment", "e_m"), ("length", "e_L"), ("position", "e_h"))
+)
+
 FREE_SHAPE_FIELDS: tuple[Field, ...] = (
     Field(
         "free_position_mm",
@@ -216,6 +234,8 @@ FREE_SHAPE_FIELDS: tuple[Field, ...] = (
 def document_fields(run: Run) -> tuple[Field, ...]:
     """Return what JSON and CSV hold of a step, in order."""
     contact = CONTACT_FIELDS if run.study == BLOCKED_FORCE else ()
+    if any(step.contact is not None and step.contact.sensitivity for step in run.steps):
+        contact = (*contact, *SENSITIVITY_FIELDS)
     return (*POSE_FIELDS, *contact, *SOLVE_FIELDS)
 
 

@@ -20,7 +20,8 @@ NONE = "-"
 def table_lines(run: Run) -> Group:
     """Return a table of the steps and, below it, why steps failed and what to be warned of; print it with rich.
 
-    With three chamber sets it fits 100 columns; colours are added to words, never instead of them.
+    With three chamber sets it fits 100 columns, of a blocked force 80. Colours are added to words, never instead of
+    them.
     """
     from rich.box import SIMPLE_HEAD
     from rich.console import Group
@@ -38,7 +39,10 @@ def table_lines(run: Run) -> Group:
     blocked = run.study == BLOCKED_FORCE
     moving = blocked and _wall_moves(run)
     numbers = _blocked_numbers if blocked else _numbers
-    for header in [*["offset\n[mm]"] * moving, *(_BLOCKED_HEADERS if blocked else _HEADERS)]:
+    titles = [*(_BLOCKED_HEADERS if blocked else _HEADERS)]
+    if moving:  # the offset tells what the gap does
+        titles[:2] = ["offset\n[mm]", titles[0]]
+    for header in titles:
         table.add_column(Text(header), justify="right", no_wrap=True)
 
     pressures = _alike([p / BAR for step in steps for p in step.pressure], most=3)
@@ -49,7 +53,10 @@ def table_lines(run: Run) -> Group:
             cells.append(NONE if step.time is None else format(step.time, times))
         cells += [format(p / BAR, pressures) for p in step.pressure]
         style = "" if step.status.has_solution else "red"
-        table.add_row(*cells, Text(step.status.value, style), *[_offset(step)] * moving, *numbers(step))
+        found = numbers(step)
+        if moving:
+            found[:2] = [_offset(run, step), found[0]]
+        table.add_row(*cells, Text(step.status.value, style), *found)
 
     lines = [Text(line, style) for line, style in _notes(run)]
     return Group(table, *lines)
@@ -57,7 +64,7 @@ def table_lines(run: Run) -> Group:
 
 _TIP = ("bending\n[deg]", "tip x\n[mm]", "y\n[mm]", "z\n[mm]")
 _HEADERS = (*_TIP, "stretch", "stable", "resid.", "error", "time\n[s]")
-_BLOCKED_HEADERS = ("force\n[N]", "gap\n[mm]", *_TIP, "stable", "resid.", "time\n[s]")
+_BLOCKED_HEADERS = ("force\n[N]", "gap\n[mm]", *_TIP, "resid.")
 
 
 def _numbers(step: Step) -> list[str]:
@@ -78,13 +85,16 @@ def _numbers(step: Step) -> list[str]:
 
 
 def _blocked_numbers(step: Step) -> list[str]:
-    """Return what follows the status of a blocked force; dashes where there is no wall."""
+    """Return what follows the status of a blocked force; dashes where there is no wall.
+
+    What is not stable is a warning below the table, so that the table fits 80 columns.
+    """
     plain = _numbers(step)
     wall = [NONE, NONE]
     if step.contact is not None and step.status.has_solution:
         gap = _millimetres(step.contact.gap) if step.contact.normal.any() else NONE
         wall = [f"{step.contact.force:.4f}", gap]
-    return [*wall, *plain[:4], *plain[5:7], plain[8]]
+    return [*wall, *plain[:4], plain[6]]
 
 
 def _wall_moves(run: Run) -> bool:
@@ -93,9 +103,14 @@ def _wall_moves(run: Run) -> bool:
     return any((point != points[0]).any() for point in points)
 
 
-def _offset(step: Step) -> str:
-    """Return where the wall stands along x."""
-    return NONE if step.contact is None else _millimetres(float(step.contact.wall_point[0]))
+def _offset(run: Run, step: Step) -> str:
+    """Return where the wall stands along x, or for one given by a point how far it was moved the way it pushes."""
+    if step.contact is None:
+        return NONE
+    given = run.contact.wall_point if run.contact is not None else None
+    if given is None:
+        return _millimetres(float(step.contact.wall_point[0]))
+    return _millimetres(float(step.contact.normal @ (step.contact.wall_point - given)))
 
 
 def _notes(run: Run) -> Iterator[tuple[str, str]]:
@@ -103,8 +118,17 @@ def _notes(run: Run) -> Iterator[tuple[str, str]]:
     failed = [(k, f"{s.status.value}: {s.message}") for k, s in enumerate(run.steps, start=1) if s in run.failed]
     warned = [(k, f"warning: {text}") for k, s in enumerate(run.steps, start=1) for text in s.warnings]
     yield from ((line, "red") for line in _grouped(failed))
+    yield from ((f"step {k} {text}", "") for k, text in _sensitivities(run))
     yield from ((f"warning: {text}", "yellow") for text in run.warnings)
     yield from ((line, "yellow") for line in _grouped(warned))
+
+
+def _sensitivities(run: Run) -> Iterator[tuple[int, str]]:
+    """Yield how the force of `weighted` answers to its weights, where that was asked for."""
+    for k, step in enumerate(run.steps, start=1):
+        if step.contact is not None and step.contact.sensitivity:
+            parts = [f"{line.elasticity:+.3f} % ({line.weight})" for line in step.contact.sensitivity]
+            yield k, f"force per 1 % of a weight: {', '.join(parts)}"
 
 
 def _grouped(notes: Sequence[tuple[int, str]]) -> Iterator[str]:

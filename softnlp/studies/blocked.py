@@ -22,9 +22,8 @@ from softnlp.rod import STATE_SIZE, Loads
 from softnlp.solver import Engine, Solution, discretisation_correction
 from softnlp.studies.blocked_grid import Blocked, BlockedGrid
 from softnlp.studies.blocked_step import failed_step, solved_step, touching_step
-from softnlp.studies.free_shape import FreeShapes
+from softnlp.studies.free_shape import Free, FreeShapes, free_shape, from_zero
 from softnlp.studies.pose import between_nodes, shape_function
-from softnlp.studies.pose_grid import Solved
 from softnlp.studies.statics import MOST_INTERVALS, PoseSolver
 from softnlp.studies.step import Step
 from softnlp.studies.wall import Situation, Wall
@@ -35,7 +34,6 @@ from softnlp.transcription import MultipleShooting, method_named
 Array = NDArray[np.float64]
 
 _TOUCHING = 1e-9  # of the length: a free contact point nearer to the wall than this touches it
-_SCAN = 17
 _NEAR_FOLD = 0.2  # of the largest in-plane determinant on the way: below it a branch that ends has turned
 _LARGEST_JUMP = 0.3
 
@@ -47,6 +45,14 @@ class _Ended:
     situation: Situation
     folded: bool
     iterations: int
+
+
+def _slips(begin: Situation, end: Situation, sideways: list[tuple[float, float]]) -> float | None:
+    """Return the largest set pressure at which the out-of-plane determinant changed its sign, if it has."""
+    for (u, a), (w, b) in pairwise(sideways):
+        if a * b < 0:
+            return float(np.max(begin.towards(end, u + (w - u) * a / (a - b)).pressure))
+    return None
 
 
 class BlockedSolver:
@@ -125,32 +131,38 @@ class BlockedSolver:
         began = time.perf_counter()
         situation = Situation(np.asarray(pressure, float), loads, wall)
         free_loads = loads if self.has_wall else Loads()  # without a wall the chambers keep their unloaded lengths
-        free_step, free = self.poses.solve(situation.pressure, free_loads, near.free if near else None)
-        if free is None or free_step.pose is None:
-            return free_step, None
+        free = free_shape(self.poses, situation.pressure, free_loads, self.contact.tip_cap, near.free if near else None)
+        if isinstance(free, Step):
+            return replace(free, solve_time=time.perf_counter() - began), None
         touch = _TOUCHING + 3 * free.error if situation.is_loaded else _TOUCHING
         if wall is not None:
-            ahead = wall.gap(self.free_tip(free)[1])
+            ahead = wall.gap(free.contact_point)
             if ahead > -touch * float(self.model.robot.length):
+                free_step = free.step or self.poses.solve(situation.pressure, loads)[0]
+                if free_step.pose is None:
+                    return free_step, None
                 step = touching_step(free_step, self.contact, wall, ahead, touch * float(self.model.robot.length))
                 return replace(step, solve_time=time.perf_counter() - began), None
         found, spent = self._settle(situation, free, near)
-        spent += free_step.iterations
+        spent += free.iterations
         if isinstance(found, _Ended):
             return failed_step(situation.pressure, found.situation.pressure, found.folded, spent, began), None
-        return solved_step(self.poses, self.functions, self.contact, found, free_step, spent, began), found
+        pose = free.pose(self.poses)
+        return solved_step(self.poses, self.functions, self.contact, found, pose, spent, began), found
 
-    def _settle(self, situation: Situation, free: Solved, near: Blocked | None) -> tuple[Blocked | _Ended, int]:
+    def _settle(self, situation: Situation, free: Free, near: Blocked | None) -> tuple[Blocked | _Ended, int]:
         """Follow the branch to a situation and refine the grid until its accuracy is met."""
         plane = self._plane(situation)
         pressed = np.array([float(situation.pressure[k] > 0) for k in self.model.robot.set_of_chamber])
-        first = self.numerics.intervals or self.poses.first_intervals(free.solution.p, float(free.solution.x[0]))
+        first = self.numerics.intervals or self.poses.first_intervals(free.column, free.stretch)
         intervals = near.grid.intervals if near else first
         spent = 0
         found: Blocked | _Ended | None = None
         usable = near is not None and self._leads_to(near, situation, pressed, plane)
         if near is not None and usable:
-            found = self._followed(self.grid(intervals, plane), situation, pressed, free, plane, near)
+            found = self._continued(self.grid(intervals, plane), situation, pressed, free, plane, near)
+            if found is None:
+                found = self._followed(self.grid(intervals, plane), situation, pressed, free, plane, near)
             spent += found.solution.iterations if isinstance(found, Blocked) else found.iterations
         if not isinstance(found, Blocked):
             for _ in range(2):
@@ -211,50 +223,92 @@ class BlockedSolver:
         values["contact.pressed"] = pressed
         return values
 
+    def _continued(
+        self, grid: BlockedGrid, end: Situation, pressed: Array, free: Free, plane: Array | None, near: Blocked
+    ) -> Blocked | None:
+        """Solve at once from a neighbouring solution on the same grid; None where that leads off its branch."""
+        if grid is not near.grid:
+            return None
+        p = grid.problem.pack(self.values(end, pressed, free.lengths))
+        x = near.solution.x
+        guess = grid.predicted(x, p) if grid.has_tangent else x
+        rough = grid.stepper.solve(p, guess)
+        if not rough.holds(10 * grid.stepper.tolerance) or not grid.distance(rough.x - x) <= _LARGEST_JUMP:
+            return None
+        if grid.has_tangent and not grid.same_way(guess - x, rough.x - x):
+            return None
+        determinants = grid.determinants(rough, plane)
+        if not grid.is_minimum and determinants[0] * near.determinants[0] <= 0:
+            return None
+        return self._arrived(
+            grid, rough, near.situation, end, pressed, free, [(0.0, near.determinants), (1.0, determinants)], near
+        )
+
+    def _arrived(
+        self,
+        grid: BlockedGrid,
+        rough: Solution,
+        begin: Situation,
+        end: Situation,
+        pressed: Array,
+        free: Free,
+        trace: list[tuple[float, tuple[float, float]]],
+        near: Blocked | None,
+    ) -> Blocked | None:
+        """Solve to the end what a path led to; None where that leads elsewhere.
+
+        trace : (fraction of the way from `begin`, determinants in and out of the plane).
+        """
+        final = grid.engine.solve(rough.p, rough.x)
+        if not final.holds(self.numerics.tolerance) or grid.distance(final.x - rough.x) >= 0.01:
+            return None
+        final = replace(final, iterations=final.iterations + rough.iterations)
+        slips = near.slips if near is not None else None
+        if slips is None:
+            slips = _slips(begin, end, [(u, aside) for u, (_, aside) in trace])
+        return self._examined(grid, final, end, pressed, (slips, trace[-1][1]), free)
+
     def _followed(
         self,
         grid: BlockedGrid,
         end: Situation,
         pressed: Array,
-        free: Solved,
+        free: Free,
         plane: Array | None,
         near: Blocked | None,
     ) -> Blocked | _Ended:
         """Follow the branch to `end` from `near`, or from where contact begins on the way from zero pressure."""
-        shapes = FreeShapes(self.poses, self.functions, free.intervals, self.contact.tip_cap)
+        intervals = free.solved.intervals if free.solved else grid.intervals
+        shapes = FreeShapes(self.poses, self.functions, intervals, self.contact.tip_cap)
         unloaded = not self.has_wall
         if near is not None:
             begin, t_0 = near.situation, 0.0
-            shapes.begin(
-                float(near.solution.x[0]), near.free.solution.x if near.free.intervals == free.intervals else None
-            )
+            solved = near.free.solved
+            on_grid = solved is not None and solved.intervals == intervals
+            shapes.begin(near.free.stretch, solved.solution.x if solved is not None and on_grid else None)
         else:
-            begin, t_0 = self._from_zero(end, shapes)
+            begin, t_0 = from_zero(end, shapes, _TOUCHING * float(self.model.robot.length))
 
         def free_situation(situation: Situation) -> Situation:
             return Situation(situation.pressure, Loads(), None) if unloaded else situation
 
         def path(u: float) -> Array:
             situation = begin.towards(end, t_0 + u * (1 - t_0))
-            lengths = free_lengths if u >= 1.0 else shapes.tip(free_situation(situation))[0]
+            lengths = free.lengths if u >= 1.0 else shapes.tip(free_situation(situation))[0]
             return grid.problem.pack(self.values(situation, pressed, lengths))
 
-        free_lengths = self.free_tip(free)[0]
         if near is not None:
             x = self._transferred(near, grid)
         else:
             first = begin.towards(end, t_0)
             x = self._free_guess(grid, first, shapes)
-        trace: list[tuple[float, float]] = []
-        sideways: list[tuple[float, float]] = [] if near is None else [(0.0, near.sideways)]
+        trace: list[tuple[float, tuple[float, float]]] = []
 
         def same_branch(u: float, solution: Solution) -> bool:
-            size = grid.determinant(solution)
-            if trace and size * trace[0][1] <= 0:
+            determinants = grid.determinants(solution, plane)
+            if trace and not grid.is_minimum and determinants[0] * trace[0][1][0] <= 0:
                 return False
-            trace.append((u, size))
-            if near is None or u >= 1.0:
-                sideways.append((u, grid.sideways(solution, plane)))
+            trace.append((u, determinants))
             return True
 
         begun = grid.stepper.solve(path(0.0), x)
@@ -265,60 +319,24 @@ class BlockedSolver:
             path,
             begun.x,
             distance=grid.distance,
-            first_step=1.0 if near is not None else 0.25,
+            first_step=0.5 if near is not None else 0.25,
             smallest_step=1 / 2048,
             largest_jump=_LARGEST_JUMP,
             same_branch=same_branch,
+            predict=grid.predicted if grid.has_tangent else None,
+            same_way=grid.same_way,
         )
         spent = begun.iterations + followed.iterations
         if followed.arrived:
-            final = grid.engine.solve(path(1.0), followed.solution.x)
-            if final.holds(self.numerics.tolerance) and grid.distance(final.x - followed.solution.x) < 0.01:
-                final = replace(final, iterations=final.iterations + spent)
-                aside = self._slips(begin, end, t_0, sideways, near), sideways[-1][1]
-                return self._examined(grid, final, end, pressed, aside, free)
+            rough = replace(followed.solution, iterations=spent)
+            first = begin.towards(end, t_0)
+            found = self._arrived(grid, rough, first, end, pressed, free, trace, near)
+            if found is not None:
+                return found
         reached = begin.towards(end, t_0 + followed.fraction * (1 - t_0))
-        sizes = [abs(size) for _, size in trace]
-        folded = len(sizes) > 1 and sizes[-1] < _NEAR_FOLD * max(sizes)
+        sizes = [abs(size) for _, (size, _) in trace]
+        folded = len(sizes) > 1 and (grid.is_minimum or sizes[-1] < _NEAR_FOLD * max(sizes))
         return _Ended(reached, folded, spent)
-
-    def _from_zero(self, end: Situation, shapes: FreeShapes) -> tuple[Situation, float]:
-        """Return where a path from zero pressure begins, and the fraction of it at which contact is made for good.
-
-        Where loads or the offset press the robot into the wall already at rest, they grow with the pressure.
-        """
-        nothing = np.zeros_like(end.pressure)
-        shapes.begin(1.0, None)
-        if end.wall is None:
-            return Situation(nothing, Loads(), None), 0.0
-        touch = _TOUCHING * float(self.model.robot.length)
-        rest = Situation(nothing, end.loads, end.wall)
-        ahead = end.wall.gap(shapes.tip(rest)[1])
-        if not ahead >= -touch:
-            shapes.begin(1.0, None)
-            tip = shapes.tip(Situation(nothing, Loads(), None))[1]
-            shift = end.wall.gap(tip)
-            shapes.begin(1.0, None)
-            if shift < 0 or end.is_loaded:
-                wall = Wall(end.wall.point + min(shift, 0.0) * end.wall.normal, end.wall.normal)
-                rest = Situation(nothing, Loads(), wall)
-
-        def gap_at(t: float) -> float:
-            situation = rest.towards(end, t)
-            assert situation.wall is not None
-            return situation.wall.gap(shapes.tip(situation)[1])
-
-        grid = np.linspace(0, 1, _SCAN)
-        gaps = np.array([gap_at(t) for t in grid[:-1]])
-        apart = np.flatnonzero(gaps > touch)
-        if apart.size == 0:
-            shapes.begin(1.0, None)
-            return rest, 0.0
-        low, high = float(grid[apart[-1]]), float(grid[apart[-1] + 1])
-        for _ in range(40):
-            middle = (low + high) / 2
-            low, high = (middle, high) if gap_at(middle) > 0 else (low, middle)
-        return rest, high
 
     def _free_guess(self, grid: BlockedGrid, situation: Situation, shapes: FreeShapes) -> Array:
         """Return x of the free shape without force: exact without loads, else its solution moved to this grid."""
@@ -334,17 +352,6 @@ class BlockedSolver:
                 states = np.vstack([moved[:STATE_SIZE], states[STATE_SIZE:]])
         return np.concatenate([[stretch], states.T.ravel(), np.zeros(self.functions.tip_unknowns)])
 
-    def free_tip(self, free: Solved) -> tuple[Array, Array]:
-        """Return chamber lengths and contact point of a free shape [m], in closed form where no load acts on it."""
-        column, cap = free.solution.p, self.contact.tip_cap
-        sets, L_0 = self.model.robot.chamber_sets, float(self.model.robot.length)
-        if not np.any(column[sets : sets + 9]):  # tip force, tip moment, gravity
-            state = np.asarray(self.functions.arc(column, float(free.solution.x[0]), 1.0)).ravel()
-            return state[STATE_SIZE:] * L_0, state[:3] * L_0 + cap * state[9:12]
-        found = free.grid.problem.outputs(x=free.solution.x, p=column)
-        axis = np.asarray(found["tip_rotation"])[:, 2]
-        return np.asarray(found["chamber_lengths"]).ravel(), np.asarray(found["tip_position"]).ravel() + cap * axis
-
     def _transferred(self, found: Blocked, grid: BlockedGrid) -> Array:
         """Return a solution on another grid."""
         if found.grid.intervals == grid.intervals:
@@ -357,24 +364,14 @@ class BlockedSolver:
 
     def _refined(self, found: Blocked, grid: BlockedGrid) -> Blocked | None:
         """Return a solution solved again on a finer grid, or None where that leads elsewhere."""
-        p = grid.problem.pack(self.values(found.situation, found.pressed, self.free_tip(found.free)[0]))
+        p = grid.problem.pack(self.values(found.situation, found.pressed, found.free.lengths))
         guess = self._transferred(found, grid)
         solution = grid.engine.solve(p, guess)
         if not solution.holds(self.numerics.tolerance) or grid.distance(solution.x - guess) > 0.05:
             return None
-        return self._examined(grid, solution, found.situation, found.pressed, (found.slips, found.sideways), found.free)
-
-    def _slips(
-        self, begin: Situation, end: Situation, t_0: float, sideways: list[tuple[float, float]], near: Blocked | None
-    ) -> float | None:
-        """Return the largest set pressure at which the out-of-plane determinant changed its sign, if it has."""
-        if near is not None and near.slips is not None:
-            return near.slips
-        for (u, a), (w, b) in pairwise(sideways):
-            if a * b < 0:
-                crossing = u + (w - u) * a / (a - b)
-                return float(np.max(begin.towards(end, t_0 + crossing * (1 - t_0)).pressure))
-        return None
+        return self._examined(
+            grid, solution, found.situation, found.pressed, (found.slips, found.determinants), found.free
+        )
 
     def _examined(
         self,
@@ -382,8 +379,8 @@ class BlockedSolver:
         solution: Solution,
         situation: Situation,
         pressed: Array,
-        aside: tuple[float | None, float],
-        free: Solved,
+        aside: tuple[float | None, tuple[float, float]],
+        free: Free,
     ) -> Blocked:
         """Estimate the discretisation error of a solution."""
         linear = grid.engine.linear

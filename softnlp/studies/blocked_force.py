@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,22 +19,13 @@ from softnlp.robot import LOWERABLE_RULES, Robot, check
 from softnlp.rod import Loads
 from softnlp.studies.blocked import BlockedSolver
 from softnlp.studies.blocked_grid import Blocked
-from softnlp.studies.force_inversion import pressure_for_force
 from softnlp.studies.forward import checked_loads, pressure_table
 from softnlp.studies.multistart import other_equilibria
+from softnlp.studies.sensitivity import given_weights, sensitivities
 from softnlp.studies.step import Run, Step
 from softnlp.studies.wall import Wall, checked_contact, standing_wall
 
 Array = NDArray[np.float64]
-
-__all__ = [
-    "WeightSensitivity",
-    "blocked_force",
-    "constrained_pose",
-    "force_against_offset",
-    "pressure_for_force",
-    "weight_sensitivity",
-]
 
 
 def blocked_force(
@@ -51,6 +42,7 @@ def blocked_force(
     title: str = "",
     progress: Callable[[int, Step], None] | None = None,
     branches: int = 0,
+    weight_sensitivity: bool = False,
 ) -> Run:
     """Solve the blocked tip force at each pressure in order, each followed from zero pressure or from the last.
 
@@ -62,6 +54,8 @@ def blocked_force(
         The wall, the tip's cap and the closure.
     branches
         How many other first guesses are tried at each step; other equilibria found are warnings of the step.
+    weight_sensitivity
+        Whether `contact` of each step says how the force of `weighted` answers to each weight that is given.
 
     Returns
     -------
@@ -83,6 +77,8 @@ def blocked_force(
         raise InputError(f"expected one time a step, got {len(times)} times for {len(P)} steps", key="times")
     if branches < 0:
         raise InputError(f"expected a number that is not negative, got {branches}", key="branches")
+    if weight_sensitivity:
+        given_weights(contact)
     solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
     wall = standing_wall(solver.poses, solver.contact, P, loads)
     steps: list[Step] = []
@@ -92,6 +88,8 @@ def blocked_force(
         near = solved or near
         if solved is not None and branches:
             step = replace(step, warnings=(*step.warnings, *other_equilibria(solver, solved, branches)))
+        if solved is not None and step.contact is not None and weight_sensitivity:
+            step = replace(step, contact=replace(step.contact, sensitivity=sensitivities(solver, solved)))
         if times is not None:
             step = replace(step, time=float(times[k]))
         steps.append(step)
@@ -170,57 +168,3 @@ def constrained_pose(
     contact = checked_contact(ContactSettings(closure=closure, weights=weights))  # type: ignore[arg-type]
     solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact, wall=False)
     return solver.solve(P[0], checked_loads(loads), None)[0]
-
-
-@dataclass(frozen=True)
-class WeightSensitivity:
-    """How the force of `weighted` answers to one weight: d ln F / d ln W at the weight used, in `unit`."""
-
-    weight: str
-    value: float
-    unit: str
-    elasticity: float
-
-
-def weight_sensitivity(
-    robot: Robot,
-    material: Material,
-    pressure: Any,
-    contact: ContactSettings,
-    *,
-    loads: Loads = Loads(),
-    coefficients: Coefficients = Coefficients(),
-    conventions: Conventions = REPRODUCTION,
-    numerics: Numerics = Numerics(),
-    factor: float = 1.1,
-) -> tuple[Step, tuple[WeightSensitivity, ...]]:
-    """Return the step of `weighted` and how its force changes with each weight that is given, by central differences.
-
-    Raises
-    ------
-    InputError
-        When the closure is not `weighted`, or no weight is given.
-    """
-    contact = checked_contact(contact)
-    names = {"force": "1/N", "moment": "1/(N m)", "length": "1/m", "position": "1/m"}
-    given = {name: value for name in names if (value := getattr(contact.weights, name)) is not None}
-    if contact.closure != "weighted":
-        raise InputError(f"expected closure = 'weighted', got {contact.closure!r}", key="closure")
-    if not given:
-        raise InputError("expected at least one weight", key="weights")
-
-    P, loads = pressure_table(pressure, robot.chamber_sets), checked_loads(loads)
-    solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
-    wall = standing_wall(solver.poses, solver.contact, P, loads)
-
-    def solved(weights: ClosureWeights) -> Step:
-        return solver.with_contact(replace(contact, weights=weights)).solve(P[-1], loads, wall)[0]
-
-    step = solved(contact.weights)
-    found = []
-    for name, value in given.items():
-        pair = [solved(replace(contact.weights, **{name: value * f})).contact for f in (factor, 1 / factor)]
-        forces = [c.force if c is not None and c.force > 0 else np.nan for c in pair]
-        slope = float(np.log(forces[0] / forces[1]) / (2 * np.log(factor)))
-        found.append(WeightSensitivity(name, value, names[name], slope))
-    return step, tuple(found)

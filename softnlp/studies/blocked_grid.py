@@ -11,18 +11,23 @@ from softnlp.condensed import CondensedSolver, plane_directions
 from softnlp.loadcase import LoadCase
 from softnlp.problem import CompiledProblem
 from softnlp.solver import Engine, Solution
-from softnlp.studies.pose_grid import Solved
+from softnlp.studies.free_shape import Free
 from softnlp.studies.wall import Situation
 from softnlp.studies.weighted import Weighted
 
 Array = NDArray[np.float64]
 
 
+_FORCE_SHARE = 0.1  # of a scaled force beside a scaled position in what a step changes
+_LARGEST_MISS = 0.5  # of a step's change: a prediction that is off by more does not tell which branch was met
+_SMALL = 1e-3  # a change that tells nothing of its prediction
+
+
 @dataclass(frozen=True, eq=False)
 class BlockedGrid:
     """Everything compiled for one number of intervals, in a plane of symmetry or in space.
 
-    condensed, judge : the tip equations at the nodes, in the plane and in space.
+    condensed : the tip equations at the nodes, in the plane. judge : in space.
     """
 
     case: LoadCase
@@ -51,21 +56,47 @@ class BlockedGrid:
         """Return the scaled forces that the tip conditions add."""
         return x[1 + self.state_size * len(self.case.transcribed.points) :]
 
+    @property
+    def is_minimum(self) -> bool:
+        """Whether the solution is a minimum of weighted squares, which may go on where the equations are singular."""
+        return isinstance(self.engine, Weighted)
+
+    @property
+    def has_tangent(self) -> bool:
+        """Whether `predicted` can be used: not for a minimum, and where the nodes are the only states."""
+        return not self.is_minimum and self.engine.linear is not None
+
+    def predicted(self, x: Array, p: Array) -> Array:
+        """Return x moved along the tangent from a solution towards the one at p; x where the tangent is singular."""
+        try:
+            return x + self.condensed.solve(x, p, np.asarray(self.problem.residual(x, p)).ravel())
+        except np.linalg.LinAlgError:
+            return x
+
+    def same_way(self, predicted: Array, change: Array) -> bool:
+        """Whether a step went where it was predicted to; small steps do.
+
+        Past a fold another part of the curve may be so near that its distance alone does not tell it, also with the
+        same sign of the determinant; its forces are others.
+        """
+
+        def size(move: Array) -> float:
+            forces = float(np.max(np.abs(self.tip_forces(move)), initial=0.0))
+            return max(self.distance(move), _FORCE_SHARE * forces)
+
+        return size(change - predicted) <= max(_LARGEST_MISS * size(change), _SMALL)
+
     def distance(self, change: Array) -> float:
         """Return the largest change of a scaled position or of a direction cosine."""
         return float(np.max(np.abs(self.states(change)[:12])))
 
-    def determinant(self, solution: Solution) -> float:
-        """Return the determinant of the tip equations, in the plane where there is one."""
-        return self.condensed.determinant(self._at_nodes(solution.x), solution.p)
-
-    def sideways(self, solution: Solution, plane: Array | None) -> float:
-        """Return the determinant of the tip equations out of the plane; 1 in space."""
-        if plane is None:
-            return 1.0
+    def determinants(self, solution: Solution, plane: Array | None) -> tuple[float, float]:
+        """Return the determinants of the tip equations in the plane and out of it; in space, of all of them and 1."""
         matrix = self.judge.tip_system(self._at_nodes(solution.x), solution.p).matrix
-        outside = plane_directions(plane, len(matrix))[1]
-        return float(np.linalg.det(outside.T @ matrix @ outside))
+        if plane is None:
+            return float(np.linalg.det(matrix)), 1.0
+        inside, outside = (float(np.linalg.det(V.T @ matrix @ V)) for V in plane_directions(plane, len(matrix)))
+        return inside, outside
 
     def _at_nodes(self, x: Array) -> Array:
         """Return x with the states of the nodes alone."""
@@ -78,7 +109,7 @@ class Blocked:
 
     constants : what the field takes beside the states. error : estimated tip position error over L_0. refinement_error
     : the same for position, rotation and forces. slips : pressure [Pa] of the most pressurised set above which a planar
-    shape may slip sideways, or None. sideways : determinant out of the plane. free : the free shape there.
+    shape may slip sideways, or None. determinants : in and out of the plane. free : the free shape there.
     """
 
     situation: Situation
@@ -89,5 +120,5 @@ class Blocked:
     error: float
     refinement_error: float
     slips: float | None
-    sideways: float
-    free: Solved
+    determinants: tuple[float, float]
+    free: Free

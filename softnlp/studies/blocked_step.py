@@ -16,7 +16,7 @@ from softnlp.status import Status
 from softnlp.studies.blocked_grid import Blocked
 from softnlp.studies.pose import SHAPE_POINTS, bending_angle, between_nodes, pose_of, pose_warnings, shape_of
 from softnlp.studies.statics import PoseSolver
-from softnlp.studies.step import Contact, Step
+from softnlp.studies.step import Contact, Pose, Step
 from softnlp.studies.wall import Wall
 from softnlp.units import BAR
 
@@ -67,12 +67,11 @@ def solved_step(
     functions: RodFunctions,
     settings: ContactSettings,
     found: Blocked,
-    free: Step,
+    free: Pose,
     iterations: int,
     began: float,
 ) -> Step:
     """Return the step of a solution with its certificate, the wall and the warnings."""
-    assert free.pose is not None
     model, grid, solution = functions.model, found.grid, found.solution
     problem, situation = grid.problem, found.situation
     L_0, F_0 = (float(v) for v in np.asarray(problem.units(solution.x, solution.p)).ravel())
@@ -90,7 +89,7 @@ def solved_step(
     unloaded = np.asarray(functions.arc(column, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
     # The branch keeps the sign of its determinant, so it is as stable in the plane as the free shape it begins at.
     bending = bending_angle(poses.shape, nodes, found.constants)
-    pose = pose_of(model, result, shape, bending, unloaded, free.pose.stable)
+    pose = pose_of(model, result, shape, bending, unloaded, free.stable)
     warnings = list(pose_warnings(model, pose))
     if found.slips is not None:
         warnings.append(
@@ -110,7 +109,7 @@ def solved_step(
         wall = Wall(pose.tip_position, np.zeros(3))
         gap = 0.0
     else:
-        gap = wall.gap(free.pose.tip_position + settings.tip_cap * free.pose.tip_rotation[:, 2])
+        gap = wall.gap(free.tip_position + settings.tip_cap * free.tip_rotation[:, 2])
     return Step(
         pressure=situation.pressure,
         status=Status.SOLVED,
@@ -130,7 +129,7 @@ def solved_step(
             tip_cap=settings.tip_cap,
             closure=settings.closure,
             chamber_reaction=T * F_0,
-            free=free.pose,
+            free=free,
             gap=gap,
             length_error=float(e_L[0]) * L_0,
             weighted=_left(solution.p, float(e_L[0]), L_0, F_0) if settings.closure == "weighted" else (),

@@ -126,28 +126,30 @@ def _bracketed(
     return P, step, solved
 
 
-def joint_problem(solver: BlockedSolver, intervals: int) -> CompiledProblem:
-    """Return the problem of the free and the blocked shape with shared geometry, material and a free pressure.
+def joint_problem(solver: BlockedSolver, intervals: int, *, free_pressure: bool) -> CompiledProblem:
+    """Return the problem of the free and the blocked shape with shared pressure, geometry and material.
 
-    Free is "pressure scale", of the fixed "pressure"; the constraint is that the wall's force is "target force". The
-    blocked shape takes its free chamber lengths from the free shape's states.
+    The blocked shape takes its free chamber lengths from the free shape's states. With every quantity fixed the wall's
+    force is found for a pressure. With `free_pressure` the pressure is "pressure scale" (free) times "pressure", and
+    the wall's force has to be "target force" [N].
     """
     method = method_named(solver.numerics.transcription, intervals)
     declared = solver.functions.declared()
+    order = tuple(declared)
     free_lengths = declared.pop("contact.free_lengths")
+    shared = dict(declared)
     scale = quantity("pressure scale", "1", 1.0, lower=0.0)
-    target = quantity("target force", "N", 0.0)
-    shared = {**declared, "pressure": replace(declared["pressure"], symbol=scale.symbol * declared["pressure"].symbol)}
+    if free_pressure:
+        pressure = declared["pressure"]
+        shared["pressure"] = replace(pressure, symbol=scale.symbol * pressure.symbol)
     free = load_case("free", solver.poses.functions, shared, method)
-    lengths = replace(free_lengths, symbol=free.outputs["chamber_lengths"])
-    order = {name: lengths if name == "contact.free_lengths" else shared[name] for name in solver.functions.declared()}
-    blocked = load_case("blocked", solver.functions, order, method)
-    wanted = Constraint(
-        "blocked force",
-        blocked.outputs["tip_forces"][0] - target.symbol,
-        unit="N",
-        scale=blocked.force_unit,
-    )
+    shared["contact.free_lengths"] = replace(free_lengths, symbol=free.outputs["chamber_lengths"])
+    blocked = load_case("blocked", solver.functions, {name: shared[name] for name in order}, method)
+    if not free_pressure:
+        return compile_problem(list(declared.values()), [free, blocked])
+    target = quantity("target force", "N", 0.0)
+    error = blocked.outputs["tip_forces"][0] - target.symbol
+    wanted = Constraint("blocked force", error, unit="N", scale=blocked.force_unit)
     return compile_problem(
         [*declared.values(), scale, target], [free, blocked], free=["pressure scale"], constraints=[wanted]
     )
@@ -156,12 +158,17 @@ def joint_problem(solver: BlockedSolver, intervals: int) -> CompiledProblem:
 def _jointly(solver: BlockedSolver, near: Blocked, direction: Array, pressure: float, force: float) -> float | None:
     """Solve both shapes with the pressure free, from a blocked solution nearby; return the pressure [Pa]."""
     intervals = near.grid.intervals
-    problem = joint_problem(solver, intervals)
+    problem = joint_problem(solver, intervals, free_pressure=True)
     values = solver.values(near.situation, near.pressed, np.zeros(0))
     values.pop("contact.free_lengths")
     p = problem.pack({**values, "pressure": direction * pressure, "target force": force})
     grid = solver.poses.grid(intervals)
-    free = grid.engine.solve(near.free.solution.p, solver.poses.transfer(near.free, grid))
+    x_free = (
+        solver.poses.transfer(near.free.solved, grid)
+        if near.free.solved is not None
+        else solver.poses.arc_guess(grid, near.free.column, near.free.stretch)
+    )
+    free = grid.engine.solve(near.free.column, x_free)
     solution = Engine(problem).solve(p, np.concatenate([[1.0], free.x, near.solution.x]))
     if not solution.holds(solver.numerics.tolerance):
         return None

@@ -69,6 +69,19 @@ class Pose:
     shape: Shape
 
 
+@dataclass(frozen=True)
+class WeightSensitivity:
+    """How the force of `weighted` answers to one weight: d ln F / d ln W at the value used, in `unit`.
+
+    weight : force, moment, length or position.
+    """
+
+    weight: str
+    value: float
+    unit: str
+    elasticity: float
+
+
 @dataclass(frozen=True, eq=False)
 class Contact:
     """The wall and what it does to the tip in one step of a blocked force; SI, world frame.
@@ -77,7 +90,8 @@ class Contact:
     wall_point : (3,) a point of the wall [m]. tip_cap : L_t [m]. closure : which equations closed the problem.
     chamber_reaction : (N,) T_i, without P A_c [N]. free : the free shape at the same pressure and loads.
     gap : distance of the free shape's contact point in front of the wall, negative beyond it [m].
-    length_error : e_L, Eq. (14) [m]. weighted : what `weighted` left of e_n, e_m, e_L, e_h.
+    length_error : e_L, Eq. (14) [m]. weighted : what `weighted` left of e_n, e_m, e_L, e_h. sensitivity : of its force
+    to its weights, where that was asked for.
     """
 
     force: float
@@ -90,6 +104,7 @@ class Contact:
     gap: float
     length_error: float
     weighted: tuple[EquationResidual, ...] = ()
+    sensitivity: tuple[WeightSensitivity, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

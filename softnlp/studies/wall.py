@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from softnlp.contact_settings import CLOSURES, ContactSettings
 from softnlp.errors import InputError
 from softnlp.rod import Loads
+from softnlp.status import Status
+from softnlp.studies.arc import unloaded_arc
 from softnlp.studies.statics import PoseSolver
 
 Array = NDArray[np.float64]
@@ -125,11 +127,12 @@ def standing_wall(poses: PoseSolver, contact: ContactSettings, pressures: Array,
     """Return the wall that the settings describe, where the free shape goes at the largest pressure."""
     largest = pressures[int(np.argmax(np.sum(pressures, axis=1)))]
     rest = np.array([0.0, 0.0, float(poses.model.robot.length) + contact.tip_cap])
-    for tried in (loads, Loads()):
-        pose = poses.solve(largest, tried)[0].pose
+    if np.any([loads.tip_force, loads.tip_moment, loads.gravity]):
+        pose = poses.solve(largest, loads)[0].pose
         if pose is not None:
             return wall_of(contact, rest, pose.tip_position + contact.tip_cap * pose.tip_rotation[:, 2])
-    small = poses.solve(1e-3 * largest, Loads())[0].pose
-    if small is None:
-        return wall_of(contact, rest, rest)
-    return wall_of(contact, rest, small.tip_position + contact.tip_cap * small.tip_rotation[:, 2])
+    for pressure in (largest, 1e-3 * largest):
+        branch, arc = unloaded_arc(poses, pressure)
+        if branch.status is Status.SOLVED:
+            return wall_of(contact, rest, arc.position + contact.tip_cap * arc.axis)
+    return wall_of(contact, rest, rest)

@@ -1,8 +1,11 @@
 """The paper's closure: the tip equations and the chamber constraint are met as well as their weights ask, Eq. (14).
 
-With the errors s = (e_n, e_m, e_h) of the tip equations given, the problem is square and e_L is a function of s. The
-sum |W s|^2 + (W_L e_L(s))^2 is then minimised over s: each step replaces e_L(s) by its tangent, for which the minimum
-is in closed form. A weight W_h of None holds e_h = 0 exactly.
+The sum of squares of W_n e_n, W_m e_m, W_h e_h and W_L e_L is minimised over n(0), m(0) and the wall's force, with the
+equations along the rod held: Gauss-Newton steps, in which the interior nodes are eliminated as in `CondensedSolver`,
+sped up by Anderson's mixing. A weight W_h of None holds e_h = 0 exactly.
+
+By collocation the errors s = (e_n, e_m, e_h) are given instead, which makes the problem square, and the squares are
+minimised over s with e_L(s) replaced by its tangent. That fails where the square problem is singular.
 """
 
 from __future__ import annotations
@@ -24,6 +27,7 @@ Array = NDArray[np.float64]
 _GIVEN = 7  # e_n, e_m, e_h are the last of a problem's fixed values
 _STEPS = 60
 _MEMORY = 4
+_DIVERGED = 1e4
 
 
 def scaled_weights(weights: ClosureWeights, length_unit: float, force_unit: float) -> tuple[Array, float]:
@@ -37,6 +41,54 @@ def scaled_weights(weights: ClosureWeights, length_unit: float, force_unit: floa
     W_L = (weights.length or 1 / length_unit) * length_unit
     slack_h = 1 / (weights.position * length_unit) if weights.position else 0.0
     return np.array([1 / W_n] * 3 + [1 / W_m] * 3 + [slack_h]), W_L
+
+
+class MinimumStep:
+    """Solves the linearised minimum, in place of J dx = -g, for multiple shooting.
+
+    The tip equations, whose errors are in p, are met together with e_L as well as their weights ask; the others
+    exactly.
+    """
+
+    def __init__(
+        self, functions: RodFunctions, condensed: CondensedSolver, plane: Array | None, weights: ClosureWeights
+    ) -> None:
+        self._functions = functions
+        self._condensed = condensed
+        self._rows = int(functions.tip.size1_out(0))
+        self._into = np.eye(self._rows) if plane is None else plane_directions(plane, self._rows)[0].T
+        self._weights = weights
+
+    def solve(self, x: Array, p: Array, g: Array) -> Array:
+        """Return dx. Raises `numpy.linalg.LinAlgError` where the minimum is not determined or not finite."""
+        functions, rows = self._functions, self._rows
+        nx, n_c = functions.state_size, int(functions.section.size1_in(0))
+        N = nx - STATE_SIZE
+        constants, _, units = functions.section(p[:n_c], x[0])
+        L_0, F_0 = (float(v) for v in np.asarray(units).ravel())
+        inverse, W_L = scaled_weights(self._weights, L_0, F_0)
+        inverse = self._into**2 @ inverse[:rows]
+        system = self._condensed.tip_system(x, p, g)
+        left = p[-_GIVEN:] / np.array([F_0] * 3 + [F_0 * L_0] * 3 + [L_0])
+        right = self._into @ (system.right + left[:rows])
+        matrix = self._into @ system.matrix
+
+        y, taken = x[x.size - functions.tip_unknowns :], p[n_c:]
+        tip = x[x.size - functions.tip_unknowns - nx : x.size - functions.tip_unknowns]
+        e_L = float(functions.contact(tip, constants, y, taken, units)[1])
+        lengths = -(taken[8 + N : 8 + 2 * N] @ system.directions[STATE_SIZE:, -1])
+        slope = np.concatenate([lengths[:-1], np.zeros(functions.tip_unknowns)])
+
+        soft = inverse > 0
+        A = np.vstack([matrix[soft] / inverse[soft, None], W_L * slope])
+        b = np.append(right[soft] / inverse[soft], W_L * (e_L + lengths[-1]))
+        C, c = matrix[~soft], right[~soft]
+        n, m = A.shape[1], len(C)
+        kkt = np.block([[A.T @ A, C.T], [C, np.zeros((m, m))]])
+        z = np.linalg.solve(kkt, -np.concatenate([A.T @ b, c]))[:n]
+        known = n - functions.tip_unknowns
+        states = system.directions @ np.append(z[:known], 1.0)
+        return np.concatenate([[system.d_stretch], states.T.ravel(), z[known:]])
 
 
 class Weighted:
@@ -64,6 +116,7 @@ class Weighted:
         self._rows = int(functions.tip.size1_out(0))  # 6 without a wall
         self._weights = weights
         self.tolerance = engine.tolerance
+        self._step = MinimumStep(functions, condensed, plane, weights) if engine.linear is not None else None
 
     @property
     def problem(self) -> CompiledProblem:
@@ -72,11 +125,13 @@ class Weighted:
 
     @property
     def linear(self) -> LinearSolver | None:
-        """The linear solver of the square problem."""
-        return self._engine.linear
+        """The linearised minimum."""
+        return self._step
 
     def solve(self, p: Array, x_start: Array) -> Solution:
         """Return the minimum next to a first guess; its residual is infinite when the minimum was not found."""
+        if self._step is not None:
+            return self._gauss_newton(self._step, p, x_start)
         problem = self.problem
         L_0, F_0 = (float(v) for v in np.asarray(problem.units(x_start, p)).ravel())
         units = np.array([F_0] * 3 + [F_0 * L_0] * 3 + [L_0])
@@ -107,6 +162,38 @@ class Weighted:
             history.append((s, wanted))
             s = _accelerated(history[-_MEMORY:])
         return replace(solution, residual=float("inf"), iterations=spent)
+
+    def _gauss_newton(self, step: MinimumStep, p: Array, x_start: Array) -> Solution:
+        """Return the minimum next to a first guess."""
+        problem, rows = self.problem, self._rows
+        units = np.asarray(problem.units(x_start, p)).ravel()
+        scale = np.array([units[1]] * 3 + [units[0] * units[1]] * 3 + [units[0]])[:rows]
+        inverse = scaled_weights(self._weights, float(units[0]), float(units[1]))[0][:rows]
+        none = np.concatenate([p[:-_GIVEN], np.zeros(_GIVEN)])
+        enough = max(self.tolerance, 1e-10)
+
+        def judged(x: Array) -> tuple[Array, Array]:
+            """Return p with the errors that x leaves of the tip equations, and the residual then."""
+            left = np.asarray(problem.residual(x, none)).ravel()[-rows:]
+            given = none.copy()
+            given[-_GIVEN : given.size - _GIVEN + rows] = np.where(inverse > 0, self._flat(left), 0.0) * scale
+            return given, np.asarray(problem.residual(x, given)).ravel()
+
+        x, history = x_start, list[tuple[Array, Array]]()
+        for k in range(_STEPS):
+            given, g = judged(x)
+            if not float(np.max(np.abs(g))) < _DIVERGED:
+                return Solution(x, given, float("inf"), k, "Gauss-Newton diverged")
+            try:
+                dx = step.solve(x, given, g)
+            except np.linalg.LinAlgError:
+                return Solution(x, given, float("inf"), k, "the minimum is not determined")
+            if float(np.max(np.abs(dx))) <= enough * max(1.0, float(np.max(np.abs(x)))):
+                given, g = judged(x + dx)
+                return Solution(x + dx, given, float(np.max(np.abs(g))), k + 1, "minimum of the weighted squares")
+            history.append((x, x + dx))
+            x = _accelerated(history[-_MEMORY:])
+        return Solution(x, given, float("inf"), _STEPS, "Gauss-Newton reached its iteration limit")
 
     def _flat(self, s: Array) -> Array:
         """Return errors without what leaves the plane."""
