@@ -80,7 +80,7 @@ def run_child(folder: Path, levels: int, kill_after: float | None = None, kill_a
         time.sleep(kill_after)
     while kill_at is not None and (line := process.stdout.readline().strip()):
         lines.append(line)
-        if int(line.split()[-1]) >= kill_at:
+        if line == "end" or int(line.split()[-1]) >= kill_at:
             break
     if kill_after is not None or kill_at is not None:
         workers = children(process.pid)

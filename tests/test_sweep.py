@@ -11,7 +11,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -228,16 +228,17 @@ def test_the_hash_sees_every_number(tmp_path: Path) -> None:
 
 
 def test_a_stopped_sweep_goes_on_and_ends_in_the_same_file(tmp_path: Path, no_solving: None) -> None:
-    run_sweep(MADE_UP, tmp_path / "whole")
-    for workers in (1, 2):
+    single = replace(MADE_UP, chunk=1)  # so many chunks that they are not all given out at once
+    run_sweep(single, tmp_path / "whole")
+    for workers, answers in ((1, [False, False, True]), (2, [True])):
         folder = tmp_path / str(workers)
-        asked = iter([False, False, True, *[True] * 99])
-        summary = run_sweep(MADE_UP, folder, workers=workers, stop=lambda asked=asked: next(asked))
+        asked = iter(answers + [True] * 99)
+        summary = run_sweep(single, folder, workers=workers, stop=lambda asked=asked: next(asked))
         assert summary.stopped
         assert summary.written == ()
-        assert 0 < summary.done < MADE_UP.poses or workers == 2
+        assert summary.done < 27
         news: list[SweepProgress] = []
-        summary = run_sweep(MADE_UP, folder, workers=workers, resume=True, progress=news.append)
+        summary = run_sweep(single, folder, workers=workers, resume=True, progress=news.append)
         assert summary.done == 27
         assert summary.failed == 5
         assert summary.statuses == {"solved": 22, "diverged": 5}
@@ -257,6 +258,27 @@ def test_a_finished_sweep_is_not_done_again(tmp_path: Path, no_solving: None) ->
         tmp_path / WORKSPACE_FILE,
         tmp_path / CSV_FILE,
     )
+
+
+def test_what_a_killed_process_was_writing_is_cleared(tmp_path: Path, no_solving: None) -> None:
+    (tmp_path / f".{WORKSPACE_FILE}.12345.part").write_text("half")
+    run_sweep(MADE_UP, tmp_path)
+    assert {p.name for p in tmp_path.iterdir()} == {JOURNAL_FILE, WORKSPACE_FILE}
+
+
+class Immediate(Executor):
+    """Has done everything by the time that anybody asks."""
+
+    def submit(self, function: Any, /, *given: Any, **more: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        future.set_result(function(*given, **more))
+        return future
+
+
+def test_a_stop_that_comes_too_late_changes_nothing(tmp_path: Path, no_solving: None) -> None:
+    summary = run_sweep(MADE_UP, tmp_path, executor=Immediate(), stop=lambda: True)
+    assert not summary.stopped
+    assert summary.done == 27
 
 
 # --- workers that die, solvers that raise ---

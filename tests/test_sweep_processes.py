@@ -33,14 +33,14 @@ def written(folder: Path, tables: str) -> Path:
 
 
 def test_a_sweep_that_is_killed_loses_nothing(tmp_path: Path) -> None:
-    """In the middle, twice; `python -m benchmarks.sweep_kill` does it at twenty random moments."""
+    """As soon as something more is confirmed, twice; `python -m benchmarks.sweep_kill` does it at twenty random moments."""
     whole = sweep_kill.plan(4)
     run_sweep(whole, tmp_path / "whole")
     confirmed = 0
     for _ in range(2):
         killed = sweep_kill.run_child(tmp_path / "killed", 4, kill_at=confirmed + 1)
         assert killed.already >= confirmed
-        assert confirmed < killed.confirmed
+        assert max(1, confirmed) <= killed.confirmed
         assert not killed.orphans
         confirmed = killed.confirmed
     summary = run_sweep(whole, tmp_path / "killed", resume=True)
@@ -50,7 +50,7 @@ def test_a_sweep_that_is_killed_loses_nothing(tmp_path: Path) -> None:
 
 def test_ctrl_c_keeps_what_was_solved(tmp_path: Path) -> None:
     """Of a real sweep in a process of its own, sent to all of its processes as a terminal does."""
-    path = written(tmp_path, GRID.replace("levels = 3", "levels = 14") + QUICK)  # 2744 poses take a minute
+    path = written(tmp_path, GRID.replace("levels = 3", "levels = 20") + QUICK)  # not done in a moment
     out = tmp_path / "out"
     words = [sys.executable, "-m", "softnlp", "sweep", str(path), "--out", str(out), "--workers", "2"]
     code = (
@@ -74,9 +74,9 @@ def test_ctrl_c_keeps_what_was_solved(tmp_path: Path) -> None:
     assert process.returncode == 130, error
     match = re.fullmatch(r"(\d+) poses, 0 failed, [\d.]+ s, \d+ poses/s", told.splitlines()[-1])
     assert match
-    assert 0 < int(match[1]) < 2744
+    assert 0 < int(match[1]) < 8000
     assert error == (
-        f"softnlp: stopped after {match[1]} of 2744 poses, which are kept; "
+        f"softnlp: stopped after {match[1]} of 8000 poses, which are kept; "
         f"`softnlp sweep {path} --out {out} --resume` continues\n"
     )
     same = replace(plan_of(load_scenario(path)), chunk=8)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as json_module
 import os
+import shlex
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -140,10 +141,8 @@ def _told(asked: Scenario, folder: Path, summary: SweepSummary) -> int:
     if unsolved:
         say("ended otherwise than solved: " + ", ".join(f"{n} {status}" for status, n in unsolved.items()))
     if summary.stopped:
-        complain(
-            f"stopped after {summary.done} of {summary.poses} poses, which are kept; "
-            f"`softnlp sweep {asked.path} --out {folder} --resume` continues"
-        )
+        again = shlex.join(["softnlp", "sweep", str(asked.path), "--out", str(folder), "--resume"])
+        complain(f"stopped after {summary.done} of {summary.poses} poses, which are kept; `{again}` continues")
     else:
         say(f"results in {folder}; `softnlp workspace {folder}` draws and measures them")
     say(f"{summary.done} poses, {summary.failed} failed, {summary.seconds:.2f} s, {summary.rate:.0f} poses/s")

@@ -133,8 +133,10 @@ def run_sweep(
             stopped = _solve(plan, todo, journal, executor, workers, report, stop or _never)
             journal.commit()
             report()
-            if stopped:
+            if stopped and not journal.done.all():
                 return summary(True)
+            for left in folder.glob(f".{WORKSPACE_FILE[:-3]}.*.part"):  # of a process that was killed while writing
+                left.unlink(missing_ok=True)
         written = [] if finished else [write_workspace(result, plan, journal, about or {})]
         if (csv and not table.exists()) or (written and table.exists()):
             written.append(write_csv(table, plan, journal))
