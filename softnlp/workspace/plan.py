@@ -119,17 +119,18 @@ def cells(values: Array, chunk: int) -> NDArray[np.int64]:
     values : (poses, columns); columns are compared by the part of their whole range that a cell spans.
     """
     span = np.ptp(values, axis=0)
-    scaled = values / np.where(span > 0, span, 1.0)
+    columns = np.ascontiguousarray((values / np.where(span > 0, span, 1.0)).T[span > 0])
+    if not len(columns):
+        return np.arange(len(values), dtype=np.int64)
     done: list[NDArray[np.int64]] = []
-    waiting = [np.arange(len(values), dtype=np.int64)]
+    waiting = [(np.arange(len(values), dtype=np.int64), columns)]
     while waiting:
-        cell = waiting.pop()
+        cell, own = waiting.pop()
         if cell.size <= chunk:
-            done.append(cell)
+            done.append(cell[np.lexsort(own[::-1])])
             continue
-        widest = int(np.argmax(np.ptp(scaled[cell], axis=0)))
-        ranked = cell[np.argsort(scaled[cell, widest], kind="stable")]
         # a whole number of chunks on the left keeps every chunk but the last full
         cut = chunk * max(1, round(cell.size / chunk / 2))
-        waiting += [ranked[cut:], ranked[:cut]]
+        parted = np.argpartition(own[int(np.argmax(np.ptp(own, axis=1)))], cut)
+        waiting += [(cell[part], own[:, part]) for part in (parted[cut:], parted[:cut])]
     return np.concatenate(done)
