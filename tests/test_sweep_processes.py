@@ -33,7 +33,7 @@ def written(folder: Path, tables: str) -> Path:
 
 
 def test_a_sweep_that_is_killed_loses_nothing(tmp_path: Path) -> None:
-    """As soon as something more is confirmed, twice; `python -m benchmarks.sweep_kill` does it at twenty random moments."""
+    """As soon as something more is confirmed, twice; `python -m benchmarks.sweep_kill` does it at random moments."""
     whole = sweep_kill.plan(4)
     run_sweep(whole, tmp_path / "whole")
     confirmed = 0
