@@ -38,9 +38,17 @@ if TYPE_CHECKING:
     from softnlp.runner import run_scenario as run_scenario
     from softnlp.scenario import load_scenario as load_scenario
     from softnlp.status import Status as Status
+    from softnlp.studies.ellipsoids import compliance_ellipsoid as compliance_ellipsoid
+    from softnlp.studies.ellipsoids import manipulability as manipulability
+    from softnlp.studies.ellipsoids import stiffness_ellipsoid as stiffness_ellipsoid
     from softnlp.studies.forward import forward as forward
+    from softnlp.studies.sensitivity import sensitivities as sensitivities
+    from softnlp.studies.sensitivity import tip_compliance as tip_compliance
+    from softnlp.studies.sensitivity import tip_jacobian as tip_jacobian
     from softnlp.studies.step import Run as Run
     from softnlp.studies.step import Step as Step
+    from softnlp.studies.tolerances import error_bars as error_bars
+    from softnlp.studies.tolerances import monte_carlo as monte_carlo
     from softnlp.units import BAR as BAR
     from softnlp.units import DEGREE as DEGREE
     from softnlp.units import MILLIMETRE as MILLIMETRE
@@ -58,8 +66,11 @@ _HOMES = {
     "runner": ("run_scenario",),
     "scenario": ("load_scenario",),
     "status": ("Status",),
+    "studies.ellipsoids": ("compliance_ellipsoid", "manipulability", "stiffness_ellipsoid"),
     "studies.forward": ("forward",),
+    "studies.sensitivity": ("sensitivities", "tip_compliance", "tip_jacobian"),
     "studies.step": ("Run", "Step"),
+    "studies.tolerances": ("error_bars", "monte_carlo"),
     "units": ("BAR", "DEGREE", "MILLIMETRE", "NEWTON_MILLIMETRE"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}

@@ -21,6 +21,7 @@ LAYERS = (
     *("errors", "status", "units", "conventions", "numerics", "reading", "contact_settings"),
     *("formula", "laws", "materials", "robot", "section", "rod", "tip", "transcription"),
     *("quantities", "loadcase", "problem", "branch", "solver", "condensed", "continuation", "stability"),
+    "implicit",
     *(
         "studies",
         "studies.step",
@@ -31,7 +32,7 @@ LAYERS = (
         "studies.weighted",
     ),
     *("studies.free_shape", "studies.blocked_grid", "studies.blocked_step", "studies.blocked", "studies.multistart"),
-    *("studies.force_inversion", "studies.*"),
+    *("studies.force_inversion", "studies.derivatives", "studies.sensitivity", "studies.tolerances", "studies.*"),
     *("scenario_schema", "scenario_check", "pressures", "scenario_contact", "scenario"),
     *("runner_blocked", "runner", "results", "plots", "cli", "__main__"),
 )
