@@ -64,10 +64,10 @@ def stiffness_ellipsoid(compliance: Sensitivities, *, rotation_held: bool = Fals
     """
     rows = ("tip_position", "tip_rotation") if rotation_held else ("tip_position",)
     columns = ("tip_force", "tip_moment") if rotation_held else ("tip_force",)
-    C: Array = np.vstack([np.hstack([compliance.of(row, column) for column in columns]) for row in rows])
+    C = np.vstack([np.hstack([compliance.of(row, column) for column in columns]) for row in rows])
     if not np.isfinite(C).all():
         return _image(np.full((3, 3), np.nan), "N/m")
-    K: Array = np.linalg.inv(C)
+    K = np.linalg.inv(np.asarray(C, dtype=np.float64))
     return _image(K[:3, :3], "N/m")
 
 

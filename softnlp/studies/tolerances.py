@@ -22,8 +22,8 @@ class ErrorBars:
     """Standard deviations of outputs whose quantities scatter independently, to first order, SI.
 
     outputs, output_units : as in `Sensitivities`. quantities : those with a tolerance, one entry each. tolerance :
-    their standard deviations. total : (outputs,). contribution : (outputs, quantities) d output / d quantity times tolerance,
-    with its sign; total is the root of the sum of their squares.
+    their standard deviations. total : (outputs,). contribution : (outputs, quantities) derivative times tolerance, with
+    its sign; total is the root of the sum of their squares.
     """
 
     outputs: tuple[str, ...]
