@@ -51,7 +51,8 @@ class Aim:
         if self.target.position is not None:
             rows.append(states[:3] - (self.target.position / self.length).reshape(shape))
         if self.target.direction is not None:
-            rows.append(self.weight * (states[_AXIS] - self.target.direction.reshape(shape)))
+            axis = states[_AXIS] / np.linalg.norm(states[_AXIS], axis=0)  # a grid leaves R e3 a little off unit
+            rows.append(self.weight * (axis - self.target.direction.reshape(shape)))
         return np.concatenate(rows)
 
     def measured(self, point: TipPoint) -> Measured:
@@ -60,7 +61,9 @@ class Aim:
         if self.target.position is not None:
             rows.append(point.slope[:3])
         if self.target.direction is not None:
-            rows.append(self.weight * point.slope[_AXIS])
+            size = float(np.linalg.norm(point.state[_AXIS]))
+            axis = point.state[_AXIS] / size
+            rows.append(self.weight * (np.eye(3) - np.outer(axis, axis)) @ point.slope[_AXIS] / size)
         return Measured(point.pressure / BAR, self.misfit(point.state), np.vstack(rows) * BAR, point)
 
     def conditioned(self, point: TipPoint) -> Measured:
@@ -78,7 +81,7 @@ class Aim:
         position, direction = self.target.position, self.target.direction
         if pose is None:
             return Aimed(position, direction)
-        axis = pose.tip_rotation[:, 2]
+        axis = pose.tip_rotation[:, 2] / np.linalg.norm(pose.tip_rotation[:, 2])
         distance = None if position is None else float(np.linalg.norm(pose.tip_position - position))
         angle = None
         if direction is not None:

@@ -69,6 +69,7 @@ def inverse_problem(poses: PoseSolver, intervals: int, aim: Aim, limits: Limits,
     declared["pressure"] = replace(declared["pressure"], lower=float(lower.min()) * BAR, upper=float(upper.max()) * BAR)
     case = load_case("pose", poses.functions, declared, method_named(poses.numerics.transcription, intervals))
     L_0, axis = case.length_unit, case.outputs["tip_rotation"][:, 2]
+    axis = axis / ca.norm_2(axis)
     z = declared["pressure"].symbol / BAR
     extra: list[Any] = []
     constraints: list[Constraint] = []
