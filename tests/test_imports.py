@@ -32,9 +32,12 @@ LAYERS = (
         "studies.weighted",
     ),
     *("studies.free_shape", "studies.blocked_grid", "studies.blocked_step", "studies.blocked", "studies.multistart"),
-    *("studies.force_inversion", "studies.derivatives", "studies.sensitivity", "studies.tolerances", "studies.*"),
-    *("scenario_schema", "scenario_check", "pressures", "scenario_contact", "scenario"),
-    *("runner_blocked", "runner", "results", "plots", "cli", "__main__"),
+    *("studies.force_inversion", "studies.derivatives", "studies.sensitivity", "studies.tolerances"),
+    *("studies.tip_map", "studies.bounded", "studies.inverse_task", "studies.aiming", "studies.inverse_nlp"),
+    *("studies.inverse_solver", "studies.*"),
+    *("scenario_schema", "schema_inverse", "scenario_check", "pressures", "scenario_contact", "scenario_inverse"),
+    "scenario",
+    *("runner_blocked", "runner_inverse", "runner", "results", "plots", "cli", "__main__"),
 )
 MIXED = ("results", "plots", "cli")
 LONGEST_FILE = 400

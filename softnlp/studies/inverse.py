@@ -82,15 +82,21 @@ def inverse(
         raise InputError(f"expected 'newton' or 'nlp', got {method!r}", key="method")
     task = InverseTask(checked_targets(positions, directions), lower, upper, weight)
     solver = InverseSolver(Model(robot, material, coefficients, conventions), numerics, loads, task, method)
+    steps = follow_targets(solver, progress)
+    return Run("inverse", robot, material, coefficients, conventions, loads, steps, title, warnings)
+
+
+def follow_targets(solver: InverseSolver, progress: Callable[[int, Step], None] | None) -> tuple[Step, ...]:
+    """Solve the targets of a solver's task in order, each begun from the last."""
     steps: list[Step] = []
     near: Reached | None = None
-    for k, target in enumerate(task.targets):
+    for k, target in enumerate(solver.task.targets):
         step, reached = solver.solve(target, near)
         near = reached or near
         steps.append(step)
         if progress is not None:
             progress(k, step)
-    return Run("inverse", robot, material, coefficients, conventions, loads, tuple(steps), title, warnings)
+    return tuple(steps)
 
 
 def checked_bounds(bounds: Any, sets: int) -> tuple[Array, Array]:

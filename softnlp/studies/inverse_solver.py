@@ -119,6 +119,10 @@ class InverseSolver:
             step = replace(step, status=Status.OUT_OF_REACH, message=message)
         return step, best
 
+    def forget_table(self) -> None:
+        """Drop the table of starts, for timing what it costs."""
+        self._table = None
+
     def _candidates(self, aim: Aim, near: Reached | None) -> Iterator[Found]:
         """Yield where coarse searches end, best first; the first that meets the target at once if no choice is left.
 
@@ -300,7 +304,7 @@ class InverseSolver:
         if best.aimed.angle is not None:
             left.append(f"{best.aimed.angle / DEGREE:.6g} degrees off")
         assert best.aimed.tip_position is not None
-        tip = ", ".join(f"{x / MILLIMETRE:.2f}" for x in best.aimed.tip_position)
+        tip = ", ".join(f"{x / MILLIMETRE + 0.0:.2f}" for x in np.round(best.aimed.tip_position, 8))
         text = f"{Status.OUT_OF_REACH.advice}; the nearest tip is {' and '.join(left)}, at ({tip}) mm"
         if self.ends is not None and best.pressure.sum() > 0.999 * self.limits.largest_sum * BAR:
             text += f"; pressures end where the stretch does ({self.ends[0].value})"
