@@ -109,7 +109,7 @@ def out_of_reach(solver: InverseSolver, forward: PoseSolver, loads: Loads, lengt
         distances = np.linalg.norm(dense - target, axis=1)
         best, left = pressures[int(np.nanargmin(distances))], float(np.nanmin(distances))
         width = (levels[1] - levels[0]) / 2
-        while width > 0.002 * HIGHEST:
+        while width > 2e-5 * HIGHEST:
             around = [np.clip(best + width * np.array(move), 0, HIGHEST) for move in product((-1, 0, 1), repeat=3)]
             found = [float(np.linalg.norm(tip_at(forward, P, loads, None)[0] - target)) for P in around]
             k = int(np.nanargmin(found))

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from softnlp.studies.ellipsoids import stiffness_ellipsoid as stiffness_ellipsoid
     from softnlp.studies.forward import forward as forward
     from softnlp.studies.inverse import inverse as inverse
+    from softnlp.studies.report import sensitivity_report as sensitivity_report
     from softnlp.studies.sensitivity import sensitivities as sensitivities
     from softnlp.studies.sensitivity import tip_compliance as tip_compliance
     from softnlp.studies.sensitivity import tip_jacobian as tip_jacobian
@@ -70,6 +71,7 @@ _HOMES = {
     "studies.ellipsoids": ("compliance_ellipsoid", "manipulability", "stiffness_ellipsoid"),
     "studies.forward": ("forward",),
     "studies.inverse": ("inverse",),
+    "studies.report": ("sensitivity_report",),
     "studies.sensitivity": ("sensitivities", "tip_compliance", "tip_jacobian"),
     "studies.step": ("Run", "Step"),
     "studies.tolerances": ("error_bars", "monte_carlo"),

@@ -58,6 +58,7 @@ def _app() -> App:
     from softnlp.cli.library import materials, robots
     from softnlp.cli.plot import plot_material, plot_run, plot_section
     from softnlp.cli.run import run
+    from softnlp.cli.sensitivity import sensitivity
 
     app = App(
         name="softnlp",
@@ -70,6 +71,7 @@ def _app() -> App:
     )
     app.command(run)
     app.command(inverse)
+    app.command(sensitivity)
     app.command(robots)
     app.command(materials)
     plot = App(name="plot", help="Draw a cross-section, silicones, or the results of a run.")

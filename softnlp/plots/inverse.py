@@ -50,21 +50,23 @@ def _draw_targets(axes: Any, view: RunView, targets: TargetView) -> None:
     """Draw targets and tips [mm] and make room for them."""
     goal, tip = targets.position / MILLIMETRE, targets.tip / MILLIMETRE
     reach = [np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()]).T]
-    known = np.isfinite(tip).all(axis=1)
+    known: NDArray[np.bool_] = np.isfinite(tip).all(axis=1)
     if known.any():
         axes.plot(*tip[known].T, ".", color=INK, markersize=3.5, zorder=7, label="tips")
         reach.append(tip[known])
-    there = np.isfinite(goal).all(axis=1)
+    there: NDArray[np.bool_] = np.isfinite(goal).all(axis=1)
     if there.any():
         line = "-" if there.sum() > 1 else ""
         style: dict[str, Any] = {"markerfacecolor": "none", "markersize": 5, "linewidth": 0.7, "zorder": 6.5}
         axes.plot(*goal[there].T, marker="s", linestyle=line, color=WRONG, label="targets", **style)
         reach.append(goal[there])
-    for k in np.flatnonzero(there & known):
+    for k in range(len(goal)):
         if targets.distance[k] > 1e-3 * view.robot.length:
             axes.plot(*np.array([goal[k], tip[k]]).T, color=GREY, linewidth=0.8, linestyle=":", zorder=6.4)
     size = _ARROW * view.robot.length / MILLIMETRE
-    for k in np.flatnonzero(np.logical_and(np.isfinite(targets.direction).all(axis=1), there | known)):
+    for k in range(len(goal)):
+        if not (np.isfinite(targets.direction[k]).all() and (there[k] or known[k])):
+            continue
         start = goal[k] if there[k] else tip[k]
         end = start + size * targets.direction[k]
         axes.plot(*np.array([start, end]).T, color=WRONG, linewidth=0.9, zorder=6.5)

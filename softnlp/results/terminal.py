@@ -38,8 +38,8 @@ def table_lines(run: Run) -> Group:
     table.add_column("status", overflow="fold", min_width=6)
     blocked = run.study == BLOCKED_FORCE
     moving = blocked and _wall_moves(run)
-    numbers, headers = _KINDS.get(run.study, (_numbers, _HEADERS))
-    for header in [*["offset\n[mm]"] * moving, *headers]:
+    numbers, names = _KINDS.get(run.study, (_numbers, _HEADERS))
+    for header in [*["offset\n[mm]"] * moving, *names]:
         table.add_column(Text(header), justify="right", no_wrap=True)
 
     pressures = _alike([p / BAR for step in steps for p in step.pressure], most=3)

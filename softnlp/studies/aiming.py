@@ -131,8 +131,10 @@ def spread(limits: Limits, most: int) -> Array:
     n = limits.lower.size
     moving = limits.upper > limits.lower
     count = int(moving.sum())
-    levels = int(most ** (1 / count) + 1e-9) if count else 1
-    if levels >= 3 or count <= 1:
+    if not count:
+        return limits.lower[None, :].copy()
+    levels = int(most ** (1 / count) + 1e-9)
+    if levels >= 3 or count == 1:
         unit = np.array(list(product(np.linspace(0, 1, max(levels, 2)), repeat=count))).reshape(-1, count)
         unit = _snake(unit, max(levels, 2), count)
     else:

@@ -41,7 +41,8 @@ _FOLD_MARGIN = 1e-6  # of the last pressure with an equilibrium
 _SAME_SPOT = 1e-3  # of the cost: less is no nearer
 _JUMP = 0.3  # of the bounds: more is a jump along a path
 _SAME_PLACE = 1e-4  # [bar]
-_COMPASS = (0.25, 1e-4)  # first and last step of the search among stable poses, of the bounds
+_COMPASS = (0.25, 1e-3)  # first and last step of the search among stable poses, of the bounds
+_MOST_POSES = 150  # that it solves
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,12 +270,14 @@ class InverseSolver:
             return None
         size, last = _COMPASS
         moves = np.vstack([np.eye(span.size), -np.eye(span.size)])
-        while size > last:
+        spent = 0
+        while size > last and spent < _MOST_POSES:
             for move in moves:
                 z = self.limits.clip((here.pressure + size * move * span) / BAR)
                 if np.max(np.abs(z * BAR - here.pressure)) < 1e-6 * BAR:
                     continue
                 judged = self._at(aim, z * BAR)
+                spent += 1
                 if isinstance(judged, Reached) and judged.cost < here.cost:
                     here = judged
                     break
