@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from sybil import Document
+from sybil.parsers.markdown import PythonCodeBlockParser
 
 from softnlp import BAR, MILLIMETRE, Loads, Numerics, forward, material, robot
+from softnlp.cli import main
 from softnlp.contact_settings import ContactSettings
 from softnlp.conventions import Coefficients
 from softnlp.errors import IllPosedError, InputError
@@ -21,6 +27,7 @@ from softnlp.status import Status
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.derivatives import UNITS, LinearPoint, entries_of, rotation_vector
 from softnlp.studies.ellipsoids import compliance_ellipsoid, manipulability, stiffness_ellipsoid
+from softnlp.studies.report import named_tolerances
 from softnlp.studies.sensitivity import TIP, Sensitivities, sensitivities, tip_compliance, tip_jacobian
 from softnlp.studies.tolerances import error_bars, monte_carlo
 
@@ -381,3 +388,107 @@ def test_only_fixed_quantities_of_square_problems_are_differentiated() -> None:
     chosen = compile_problem(list(point.problem.fixed), cases, free=["pressure"], objective=cases[0].symbols[0] ** 2)
     with pytest.raises(IllPosedError, match="is not differentiated"):
         ImplicitDerivatives(chosen, ["robot.length"])
+
+
+ROOT = Path(__file__).parents[1]
+LOADED = ROOT / "scenarios" / "D25L60_loaded_tip.toml"
+
+
+def test_the_command_writes_what_it_says(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["sensitivity", str(LOADED), "--step", "3", "--tolerance", "length_mm=0.2", "C01_MPa=3%"]
+    assert main([*asked, "--samples", "20", "--out", str(tmp_path)]) == 0
+    shown = capsys.readouterr().out
+    for heading in ("tip by pressure", "compliance", "ellipsoids of the tip", "error bars"):
+        assert heading in shown
+    document = json.loads((tmp_path / "sensitivity.json").read_text())
+    names = [q["name"] for q in document["quantities"]]
+    outputs = [o["name"] for o in document["outputs"]]
+    assert np.shape(document["matrix"]) == (len(outputs), len(names))
+    assert document["step"] == 3
+    assert document["error_bars"]["tolerance"] == pytest.approx([2e-4, 0.03 * 15580], rel=1e-6)
+    assert document["monte_carlo"]["solved"] == 20
+    assert (tmp_path / "sensitivity.png").stat().st_size > 10_000
+    again = sensitivities(D25, SILICONE, [p * BAR for p in document["pressure_bar"]], loads=_loads(document))
+    J = [document["matrix"][outputs.index("tip_position.x")][names.index(f"pressure.{k}")] for k in (1, 2, 3)]
+    assert again.of("tip_position.x", "pressure")[0] == pytest.approx(J, rel=1e-6)
+
+
+def _loads(document: dict[str, list[dict[str, object]]]) -> Loads:
+    value = {q["name"]: q["value"] for q in document["quantities"]}
+    kinds = [tuple(value[f"{name}.{axis}"] for axis in "xyz") for name in ("tip_force", "tip_moment", "gravity")]
+    return Loads(*kinds)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--step", "99"], "--step: expected a step from 1 to"),
+        (["--tolerance", "lenght_mm=1"], "unknown name 'lenght_mm'; did you mean 'length_mm'?"),
+        (["--tolerance", "length_mm"], "expected NAME=VALUE"),
+        (["--tolerance", "length_mm=x"], "length_mm: expected a number, got 'x'"),
+        (["--tolerance", "length_mm=-1"], "expected a number that is not negative"),
+        (["--tolerance", "force_N=1%"], "force_N: expected a number and no percentage"),
+        (["--samples", "1"], "--samples: expected 0, or at least 2"),
+    ],
+)
+def test_a_wrong_request_is_one_line(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sensitivity", str(LOADED), *arguments]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert message in told
+
+
+def test_only_a_forward_scenario_has_a_pose(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sensitivity", str(ROOT / "scenarios" / "inverse" / "point.toml")]) == 2
+    assert "expected study 'forward', got 'inverse'" in capsys.readouterr().err
+
+
+def test_tolerances_are_named_as_in_a_scenario() -> None:
+    found = named_tolerances(
+        ["chamber_angle_deg=2", "pressure_bar=10%", "bending=0.1", "outer_diameter_mm=1%", "moment_Nmm=3"],
+        D25, SILICONE, Coefficients(), PRESSURE,
+    )  # fmt: skip
+    assert found == pytest.approx(
+        {
+            "robot.chamber_angle": np.radians(2),
+            **{f"pressure.{k + 1}": 0.1 * P for k, P in enumerate(PRESSURE)},
+            "stiffening.bending": 0.1,
+            "robot.outer_diameter": 0.25e-3,
+            "tip_moment": 3e-3,
+        }
+    )
+
+
+def _documents() -> Iterator[tuple[str, Document]]:
+    for name in ("inverse", "sensitivity"):
+        yield name, Document.parse(str(ROOT / "docs" / f"{name}.md"), PythonCodeBlockParser())
+
+
+@pytest.mark.parametrize("name", ["inverse", "sensitivity"])
+def test_the_examples_of_the_documents_run(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """In order: the later ones use names of the first."""
+    document = dict(_documents())[name]
+    count = 0
+    for example in document.examples():
+        example.evaluate()
+        count += 1
+    assert count == {"inverse": 1, "sensitivity": 4}[name]
+    assert "nan" not in capsys.readouterr().out
+
+
+def test_every_output_and_quantity_is_documented() -> None:
+    text = (ROOT / "docs" / "sensitivity.md").read_text()
+    for name in UNITS:
+        assert f"`{name}`" in text
+    for name in QUANTITIES:
+        stem = name.partition(".")[0]
+        assert f"`{name}`" in text or (stem in ("robot", "material") and f"`{stem}." in text)
+
+
+def test_every_key_of_a_target_is_documented() -> None:
+    from softnlp.results.targets import TARGET_FIELDS
+    from softnlp.schema_inverse import BoundsTable, TargetTable
+
+    text = (ROOT / "docs" / "inverse.md").read_text()
+    for key in (*TargetTable.model_fields, *BoundsTable.model_fields, *(field.name for field in TARGET_FIELDS)):
+        assert f"`{key}`" in text

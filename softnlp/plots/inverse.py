@@ -50,11 +50,11 @@ def _draw_targets(axes: Any, view: RunView, targets: TargetView) -> None:
     """Draw targets and tips [mm] and make room for them."""
     goal, tip = targets.position / MILLIMETRE, targets.tip / MILLIMETRE
     reach = [np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()]).T]
-    known: NDArray[np.bool_] = np.isfinite(tip).all(axis=1)
+    known = np.asarray(np.isfinite(tip).all(axis=1))
     if known.any():
         axes.plot(*tip[known].T, ".", color=INK, markersize=3.5, zorder=7, label="tips")
         reach.append(tip[known])
-    there: NDArray[np.bool_] = np.isfinite(goal).all(axis=1)
+    there = np.asarray(np.isfinite(goal).all(axis=1))
     if there.any():
         line = "-" if there.sum() > 1 else ""
         style: dict[str, Any] = {"markerfacecolor": "none", "markersize": 5, "linewidth": 0.7, "zorder": 6.5}

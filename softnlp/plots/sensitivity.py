@@ -48,7 +48,7 @@ def _tip_panel(figure: Figure, report: SensitivityReport) -> None:
 
     pose = report.pose
     assert pose is not None
-    axes: Any = figure.add_axes((0.0, 0.06, 0.5, 0.8), projection="3d", computed_zorder=False)
+    axes: Any = figure.add_axes((0.0, 0.0, 0.52, 0.8), projection="3d", computed_zorder=False)
     axes.patch.set_visible(False)
     azimuth = side_azimuth(pose.tip_position[:2], 0.02 * report.robot.length)
     axes.view_init(elev=ELEVATION, azim=azimuth)
@@ -73,7 +73,7 @@ def _tip_panel(figure: Figure, report: SensitivityReport) -> None:
     notes.append((f"stiffness, the inverse of compliance: {stiff} N/mm", GREY))
     frame(axes, np.vstack(reach))
     for k, (text, ink) in enumerate(notes):
-        figure.text(0.018, 0.092 - 0.034 * k, text, size=SMALL, color=ink)
+        figure.text(0.018, 0.865 - 0.034 * k, text, size=SMALL, color=ink)
 
 
 def _draw_ellipsoid(axes: Any, ellipsoid: Ellipsoid, centre: Array, size: float, ink: str, label: str) -> Array:

@@ -129,11 +129,12 @@ def nearest(
     second : curvature to begin with. measured_curvature : measure it where the residuals stay large.
     """
     here, radius, spent = start, _FIRST_RADIUS, 0
-    for k in range(_STEPS):
+    slow = False
+    for _ in range(_STEPS):
         size = float(np.linalg.norm(here.r))
         if size <= MET:
             break
-        if measured_curvature and k >= 2 and size > 1e-4:
+        if measured_curvature and slow and size > 1e-4:
             second = curvature(measure, here, here.r, limits)
             spent += here.z.size
         g = here.J.T @ here.r
@@ -146,6 +147,8 @@ def nearest(
         there = measure(limits.clip(here.z + d), here)
         spent += 1
         gained = -np.inf if there is None else here.cost - there.cost
+        # Where the target can be met, Gauss and Newton's steps soon leave little; where not, they need the curvature.
+        slow = length < 0.9 * radius and gained < 0.75 * here.cost
         if there is not None and gained > 1e-4 * predicted:
             here = there
             if gained > 0.75 * predicted and length > 0.9 * radius:

@@ -187,7 +187,7 @@ class InverseSolver:
     def _finished(self, aim: Aim, found: Found) -> Reached | Step:
         """Make a coarse answer exact on the grid of its pose and judge it; a step where there is no stable pose."""
         pressure = found.point.z * BAR
-        exact = 0.1 * self.poses.numerics.accuracy
+        exact = 0.3 * self.poses.numerics.accuracy
         if self._intervals is not None and isinstance(self._coarse, GridMap):
             refined = self._refined(aim, found, self._intervals, self._coarse.solved(found.point.memo))
             pressure = pressure if refined is None else refined
@@ -203,7 +203,7 @@ class InverseSolver:
             found_already = isinstance(self._coarse, ArcMap) and judged.cost <= aim_cost(found) + exact
             if settled or (found_already and self._method == "newton"):
                 break
-            if self._intervals == solved.intervals and judged.cost <= exact:
+            if judged.cost <= exact and (self._intervals == solved.intervals or not self._redundant(aim)):
                 break
             self._intervals = solved.intervals
             refined = self._refined(aim, found, solved.intervals, solved)
