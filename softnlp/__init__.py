@@ -43,11 +43,21 @@ if TYPE_CHECKING:
     from softnlp.studies.blocked_force import blocked_force as blocked_force
     from softnlp.studies.blocked_force import constrained_pose as constrained_pose
     from softnlp.studies.blocked_force import force_against_offset as force_against_offset
+    from softnlp.studies.ellipsoids import compliance_ellipsoid as compliance_ellipsoid
+    from softnlp.studies.ellipsoids import manipulability as manipulability
+    from softnlp.studies.ellipsoids import stiffness_ellipsoid as stiffness_ellipsoid
     from softnlp.studies.force_inversion import pressure_for_force as pressure_for_force
     from softnlp.studies.forward import forward as forward
-    from softnlp.studies.sensitivity import weight_sensitivity as weight_sensitivity
+    from softnlp.studies.inverse import inverse as inverse
+    from softnlp.studies.report import sensitivity_report as sensitivity_report
+    from softnlp.studies.sensitivity import sensitivities as sensitivities
+    from softnlp.studies.sensitivity import tip_compliance as tip_compliance
+    from softnlp.studies.sensitivity import tip_jacobian as tip_jacobian
     from softnlp.studies.step import Run as Run
     from softnlp.studies.step import Step as Step
+    from softnlp.studies.tolerances import error_bars as error_bars
+    from softnlp.studies.tolerances import monte_carlo as monte_carlo
+    from softnlp.studies.weight_sensitivity import weight_sensitivity as weight_sensitivity
     from softnlp.units import BAR as BAR
     from softnlp.units import DEGREE as DEGREE
     from softnlp.units import MILLIMETRE as MILLIMETRE
@@ -67,10 +77,15 @@ _HOMES = {
     "scenario": ("load_scenario",),
     "status": ("Status",),
     "studies.blocked_force": ("blocked_force", "constrained_pose", "force_against_offset"),
+    "studies.ellipsoids": ("compliance_ellipsoid", "manipulability", "stiffness_ellipsoid"),
     "studies.force_inversion": ("pressure_for_force",),
     "studies.forward": ("forward",),
-    "studies.sensitivity": ("weight_sensitivity",),
+    "studies.inverse": ("inverse",),
+    "studies.report": ("sensitivity_report",),
+    "studies.sensitivity": ("sensitivities", "tip_compliance", "tip_jacobian"),
+    "studies.weight_sensitivity": ("weight_sensitivity",),
     "studies.step": ("Run", "Step"),
+    "studies.tolerances": ("error_bars", "monte_carlo"),
     "units": ("BAR", "DEGREE", "MILLIMETRE", "NEWTON_MILLIMETRE"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}

@@ -54,7 +54,8 @@ class CondensedSolver:
         inside = np.eye(rows) if plane is None else plane_directions(plane, rows)[0]
         self._into = inside.T
         self._base = inside[:6, : inside.shape[1] - functions.tip_unknowns]
-        self._sweep = _sweep_function(functions, method, self._base)
+        self._sweeps: dict[int, ca.Function] = {}
+        self._functions, self._method = functions, method
 
     def tip_system(self, x: Array, p: Array, g: Array | None = None) -> TipSystem:
         """Return the last equations for the residual g, or for none.
@@ -63,7 +64,7 @@ class CondensedSolver:
         """
         rows, known = len(self._into[0]), self._base.shape[1]
         given = np.zeros(x.size) if g is None else g
-        directions, tip, turned = (np.asarray(part) for part in self._sweep(x, p, given))
+        directions, tip, turned = (np.asarray(part) for part in self._sweep(1)(x, p, given))
         if not np.all(np.isfinite(tip)):
             raise np.linalg.LinAlgError("the linearised tip equations are not finite")
         matrix = np.delete(tip, known, axis=1)
@@ -77,6 +78,26 @@ class CondensedSolver:
         known = self._base.shape[1]
         states = system.directions @ np.append(found[:known], 1.0)
         return np.concatenate([[system.d_stretch], states.T.ravel(), found[known:]])
+
+    def solve_many(self, x: Array, p: Array, G: Array) -> Array:
+        """Return the columns dx for as many right sides G (n, r) in one sweep. Raises as `solve`."""
+        r, rows, known = G.shape[1], len(self._into[0]), self._base.shape[1]
+        directions, tip, turned = (np.asarray(part) for part in self._sweep(r)(x, p, G))
+        if not np.all(np.isfinite(tip)):
+            raise np.linalg.LinAlgError("the linearised tip equations are not finite")
+        matrix = np.delete(tip, np.s_[known : known + r], axis=1)
+        right = tip[:, known : known + r] + G[-rows:]
+        found = np.linalg.solve(self._into @ matrix, -(self._into @ right))
+        nx, nodes = self._shape
+        every = directions.reshape(nx, nodes, known + r)
+        states = every[:, :, :known] @ found[:known] + every[:, :, known:]
+        return np.concatenate([turned, states.transpose(1, 0, 2).reshape(nx * nodes, r), found[known:]])
+
+    def _sweep(self, right_sides: int) -> ca.Function:
+        """Return the sweep for so many right sides, built at first use."""
+        if right_sides not in self._sweeps:
+            self._sweeps[right_sides] = _sweep_function(self._functions, self._method, self._base, right_sides)
+        return self._sweeps[right_sides]
 
     def tip_moves(self, x: Array, p: Array) -> Array:
         """Return how the tip's state moves when the tip equations are off by given errors, (nx, 6 + n_y)."""
@@ -102,9 +123,14 @@ def plane_directions(normal: Array, size: int) -> tuple[Array, Array]:
     return inside, outside
 
 
-@lru_cache(maxsize=8)
-def _pieces(functions: RodFunctions, tableau: Tableau, columns: int) -> tuple[ca.Function, ca.Function, ca.Function]:
-    """Return one linearised step, the linearised tip and section, for `columns` directions; shared by every grid."""
+@lru_cache(maxsize=16)
+def _pieces(
+    functions: RodFunctions, tableau: Tableau, columns: int, right_sides: int
+) -> tuple[ca.Function, ca.Function, ca.Function]:
+    """Return one linearised step, the linearised tip and section; shared by every grid.
+
+    columns : directions, of which the last `right_sides` carry gaps and a change of the constants.
+    """
     nx, ny = functions.state_size, functions.tip_unknowns
     nc, na = functions.field.size1_in(1), functions.tip.size1_in(5)
     step = rk_step(functions.field, tableau)
@@ -112,10 +138,18 @@ def _pieces(functions: RodFunctions, tableau: Tableau, columns: int) -> tuple[ca
     def sym(name: str, *shape: int) -> ca.SX:
         return ca.SX.sym(name, *shape)
 
-    V, state, gap, c, dc, h = sym("V", nx, columns), sym("x", nx), sym("gap", nx), sym("c", nc), sym("dc", nc), sym("h")
-    moves = ca.vertcat(V, ca.horzcat(ca.SX(nc, columns - 1), dc))
+    r = right_sides
+    V, state, gap, c, dc, h = (
+        sym("V", nx, columns),
+        sym("x", nx),
+        sym("gap", nx, r),
+        sym("c", nc),
+        sym("dc", nc, r),
+        sym("h"),
+    )
+    moves = ca.vertcat(V, ca.horzcat(ca.SX(nc, columns - r), dc))
     arrived = ca.jtimes(step(state, c, h), ca.vertcat(state, c), moves)
-    arrived[:, -1] += gap
+    arrived[:, columns - r :] += gap
     advance = ca.Function("advance", [V, state, gap, c, dc, h], [arrived], {"cse": True})
 
     y, a, units = sym("y", ny), sym("a", na), sym("units", 2)
@@ -134,23 +168,29 @@ def _pieces(functions: RodFunctions, tableau: Tableau, columns: int) -> tuple[ca
     return advance, tip, section
 
 
-def _sweep_function(functions: RodFunctions, method: MultipleShooting, base_directions: Array) -> ca.Function:
-    """Return (x, p, g) -> directions (nx, (d + 1) (K + 1)), linearised tip (rows, d + 1 + n_y), d(stretch)."""
-    K, nx, ny = method.intervals, functions.state_size, functions.tip_unknowns
-    columns = base_directions.shape[1] + 1
-    advance, tip, section = _pieces(functions, method.tableau, columns)
+def _sweep_function(
+    functions: RodFunctions, method: MultipleShooting, base_directions: Array, right_sides: int
+) -> ca.Function:
+    """Return (x, p, g) -> directions (nx, (d + r) (K + 1)), linearised tip (rows, d + r + n_y), d(stretch) (1, r).
+
+    r : right sides, the columns of g.
+    """
+    K, nx, ny, r = method.intervals, functions.state_size, functions.tip_unknowns, right_sides
+    columns = base_directions.shape[1] + r
+    advance, tip, section = _pieces(functions, method.tableau, columns, r)
     n_p, na = section.size1_in(0), functions.tip.size1_in(5)
     x, p = ca.MX.sym("x", 1 + nx * (K + 1) + ny), ca.MX.sym("p", n_p + na)
-    g = ca.MX.sym("g", x.numel())
+    g = ca.MX.sym("g", x.numel(), r)
     c_now, c_slope, balance_slope, scales_now = section(p[:n_p], x[0])
-    d_stretch = -g[0] / balance_slope
-    d_constants = c_slope * d_stretch
+    d_stretch = -g[0, :] / balance_slope
+    d_constants = c_slope @ d_stretch
     nodes = ca.reshape(x[1 : 1 + nx * (K + 1)], nx, K + 1)
-    base = g[1 : 1 + nx - 6]
-    gaps = ca.reshape(g[1 + nx - 6 : g.numel() - 6 - ny], nx, K)
-    free = ca.DM.zeros(nx, columns - 1)
+    base = g[1 : 1 + nx - 6, :]
+    last_gap = x.numel() - 6 - ny
+    gaps = ca.horzcat(*(g[k : k + nx, :] for k in range(1 + nx - 6, last_gap, nx)))
+    free = ca.DM.zeros(nx, columns - r)
     free[_FORCE, :] = ca.DM(base_directions)
-    held = ca.vertcat(-base[:12], ca.DM.zeros(6), -base[12:])
+    held = ca.vertcat(-base[:12, :], ca.DM.zeros(6, r), -base[12:, :])
     start = ca.horzcat(ca.MX(free), held)
     steps = advance.mapaccum(K)
     every = steps(start, nodes[:, :K], gaps, ca.repmat(c_now, 1, K), ca.repmat(d_constants, 1, K), ca.DM.ones(1, K) / K)

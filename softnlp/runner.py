@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from softnlp.runner_blocked import run_blocked
+from softnlp.runner_inverse import run_inverse
 from softnlp.scenario import Scenario
 from softnlp.studies.forward import forward
 from softnlp.studies.step import Run, Step
@@ -61,4 +62,5 @@ def _forward(scenario: Scenario, progress: Progress | None, branches: int) -> Ru
 STUDIES: Mapping[str, Callable[[Scenario, Progress | None, int], Run]] = {
     "forward": _forward,
     "blocked-force": run_blocked,
+    "inverse": run_inverse,
 }

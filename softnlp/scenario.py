@@ -23,6 +23,7 @@ from softnlp.robot import DIMENSIONS, ROBOTS, Robot, Violation, check, violation
 from softnlp.rod import Loads
 from softnlp.scenario_check import first_of, parse
 from softnlp.scenario_contact import contact_settings, contact_task
+from softnlp.scenario_inverse import inverse_task
 from softnlp.scenario_schema import RobotTable, ScenarioFile
 from softnlp.scenario_workspace import workspace_task
 from softnlp.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
@@ -275,8 +276,13 @@ def _workspace_task(given: Read) -> Task:
     return workspace_task(given.file, given.robot, given.material, given.steps.pressures)
 
 
+def _inverse_task(given: Read) -> Task:
+    return inverse_task(given.file.target, given.file.bounds, given.robot)
+
+
 TASKS: Mapping[str, tuple[str, Callable[[Read], Task]]] = {
     "blocked-force": ("contact", _contact_task),
     "workspace": ("workspace", _workspace_task),
+    "inverse": ("target", _inverse_task),
 }
 """For each study with tables of its own: the table that its errors are about, and what reads them."""

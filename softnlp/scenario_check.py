@@ -11,18 +11,20 @@ from pydantic_core import ErrorDetails
 from softnlp.errors import InputError, nearest
 from softnlp.reading import choices, did_you_mean, one_line, shown
 from softnlp.scenario_schema import BlockedForceFile, ForwardFile, ScenarioFile
+from softnlp.schema_inverse import InverseFile
 from softnlp.schema_workspace import WorkspaceFile
 
 SCHEMAS: Mapping[str, type[ScenarioFile]] = {
     "forward": ForwardFile,
     "blocked-force": BlockedForceFile,
+    "inverse": InverseFile,
     "workspace": WorkspaceFile,
 }
 """The studies that this version runs, and the file of each."""
 
 STUDIES = ("forward", "blocked-force", "workspace", "inverse", "identify", "design")
 
-_OTHER_TABLES = ("target", "bounds")  # of studies in STUDIES that are not in SCHEMAS
+_OTHER_TABLES: tuple[str, ...] = ()  # of studies in STUDIES that are not in SCHEMAS
 _TABLES = {name for schema in SCHEMAS.values() for name in schema.model_fields} - {"title", "study"} | {*_OTHER_TABLES}
 
 

@@ -54,9 +54,11 @@ def _app() -> App:
     from cyclopts import App, Parameter
 
     from softnlp import __version__
+    from softnlp.cli.inverse import inverse
     from softnlp.cli.library import materials, robots
     from softnlp.cli.plot import plot_material, plot_run, plot_section
     from softnlp.cli.run import run
+    from softnlp.cli.sensitivity import sensitivity
     from softnlp.cli.sweep import sweep
     from softnlp.cli.workspace import workspace
 
@@ -72,6 +74,8 @@ def _app() -> App:
     app.command(run)
     app.command(workspace)
     app.command(sweep)
+    app.command(inverse)
+    app.command(sensitivity)
     app.command(robots)
     app.command(materials)
     plot = App(name="plot", help="Draw a cross-section, silicones, or the results of a run.")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from softnlp.plots.abscissa import abscissa
 from softnlp.plots.blocked import blocked_figure
 from softnlp.plots.body import body_panel
+from softnlp.plots.inverse import inverse_figure
 from softnlp.plots.series import finish_panels, new_panels, series
 from softnlp.plots.style import GREY, INK, SMALL, WRONG, colour, new_figure
 from softnlp.results import RunView
@@ -27,6 +28,8 @@ def run_figure(view: RunView, measured: Sequence[tuple[float, float]] = ()) -> F
     """
     if view.contact is not None:
         return blocked_figure(view, view.contact, measured)
+    if view.targets is not None:
+        return inverse_figure(view, view.targets)
     total, solved = len(view.status), len(view.solved)
     parts = [view.robot.name, view.material, view.conventions, f"{solved} of {total} steps solved"]
     figure = new_figure(10.0, 5.4, view.title or view.robot.name, "  ·  ".join(parts))

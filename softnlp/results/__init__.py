@@ -9,12 +9,13 @@ from softnlp.results.document import json_text, to_json
 from softnlp.results.files import write_whole
 from softnlp.results.folder import load_run, save
 from softnlp.results.terminal import table_lines
-from softnlp.results.view import Body, ContactView, RunView, view_of_dataset, view_of_run
+from softnlp.results.view import Body, ContactView, RunView, TargetView, view_of_dataset, view_of_run
 
 __all__ = [
     "Body",
     "ContactView",
     "RunView",
+    "TargetView",
     "json_text",
     "load_run",
     "netcdf_bytes",

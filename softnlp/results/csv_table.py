@@ -14,6 +14,7 @@ import numpy as np
 from softnlp.results.fields import BLOCKED_FORCE, Field, closure_of, document_fields, left_by_weights, solved_pose
 from softnlp.results.files import write_whole
 from softnlp.results.inputs import pressure_bar, tidy
+from softnlp.results.targets import INVERSE, TARGET_FIELDS, TargetField, target_values
 from softnlp.robot import Robot
 from softnlp.studies.step import Run, Step
 
@@ -35,7 +36,9 @@ def table_text(run: Run) -> str:
     weighted = {line.equation: line.unit for step in run.steps for line in left_by_weights(step)}
     header = ["step"] + ["t_s"] * timed
     header += [f"p{k + 1}_bar" for k in range(run.robot.chamber_sets)]
-    header += ["status", *(name for f in document_fields(run) for name in _columns(f, run.robot))]
+    targets = TARGET_FIELDS if run.study == INVERSE else ()
+    header += ["status", *(name for t in targets for name in _columns(t, run.robot))]
+    header += [*(name for f in document_fields(run) for name in _columns(f, run.robot))]
     header += ["closure"] * (run.study == BLOCKED_FORCE)
     header += ["_".join(["weighted_residual", *name.split(), unit.replace(" ", "")]) for name, unit in weighted.items()]
     header += ["residual", "message", "warnings"]
@@ -47,7 +50,7 @@ def table_text(run: Run) -> str:
     return text.getvalue()
 
 
-def _columns(field: Field, robot: Robot) -> list[str]:
+def _columns(field: Field | TargetField, robot: Robot) -> list[str]:
     """Return the column names of a field: the index goes before the unit suffix, tip_x_mm for instance."""
     if not field.dims:
         return [field.name]
@@ -69,6 +72,8 @@ def _row(number: int, step: Step, run: Run, timed: bool, weighted: list[str]) ->
         yield "" if step.time is None else tidy(step.time)
     yield from pressure_bar(step.pressure)
     yield step.status.value
+    for target, value in zip(TARGET_FIELDS, target_values(run, step).values(), strict=False):
+        yield from ([""] * len(_columns(target, run.robot)) if value is None else map(_cell, np.ravel(value).tolist()))
     for field in document_fields(run):
         value = None if pose is None else field.of(step, pose)
         if value is None:

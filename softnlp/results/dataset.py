@@ -29,6 +29,7 @@ from softnlp.results.inputs import (
     robot_table,
     versions,
 )
+from softnlp.results.targets import INVERSE, TARGET_FIELDS, target_values
 from softnlp.solver import EquationResidual
 from softnlp.studies.step import Run, Step
 
@@ -81,6 +82,8 @@ def to_dataset(run: Run) -> xr.Dataset:
     for field in dataset_fields(run):
         variables[field.name] = _variable(field, steps, sizes)
     variables |= _certificate(steps)
+    if run.study == INVERSE:
+        variables |= _targets(run)
     if run.study == BLOCKED_FORCE:
         closures = _text([closure_of(run, step) or "" for step in steps])
         variables["closure"] = (("step",), closures, _attributes("1", "which equations close the blocked shape"))
@@ -128,6 +131,17 @@ def _variable(field: Field, steps: Sequence[Step], sizes: dict[str, int]) -> Var
             value = np.asarray(value, dtype=float)
             array[k, ...][tuple(slice(n) for n in value.shape)] = value
     return dims, array, _attributes(field.unit, field.meaning)
+
+
+def _targets(run: Run) -> dict[str, Variable]:
+    """Return the target of each step and how near it is; NaN where the target has none of a kind."""
+    values = [target_values(run, step) for step in run.steps]
+    made: dict[str, Variable] = {}
+    for field in TARGET_FIELDS:
+        nothing = np.full((3,) * len(field.dims), np.nan)
+        rows = [nothing if row[field.name] is None else row[field.name] for row in values]
+        made[field.name] = (("step", *field.dims), np.array(rows, float), _attributes(field.unit, field.meaning))
+    return made
 
 
 def _points(step: Step) -> int:

@@ -20,6 +20,7 @@ from softnlp.results.inputs import (
     robot_table,
     tidy,
 )
+from softnlp.results.targets import target_values
 from softnlp.solver import EquationResidual
 from softnlp.studies.step import Run, Step
 
@@ -60,6 +61,7 @@ def _step(run: Run, step: Step) -> dict[str, Any]:
         table["t_s"] = tidy(step.time)
     table["status"] = step.status.value
     table["message"] = step.message
+    table |= {name: _plain(value) for name, value in target_values(run, step).items()}
     for field in document_fields(run):
         table[field.name] = None if pose is None else _plain(field.of(step, pose))
     if run.study == BLOCKED_FORCE:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
 from softnlp.results.fields import BLOCKED_FORCE, solved_pose
+from softnlp.results.targets import INVERSE
 from softnlp.studies.step import Run, Step
 from softnlp.units import BAR, DEGREE, MILLIMETRE
 
@@ -38,8 +39,8 @@ def table_lines(run: Run) -> Group:
     table.add_column("status", overflow="fold", min_width=6)
     blocked = run.study == BLOCKED_FORCE
     moving = blocked and _wall_moves(run)
-    numbers = _blocked_numbers if blocked else _numbers
-    titles = [*(_BLOCKED_HEADERS if blocked else _HEADERS)]
+    numbers, names = _KINDS.get(run.study, (_numbers, _HEADERS))
+    titles = list(names)
     if moving:  # the offset tells what the gap does
         titles[:2] = ["offset\n[mm]", titles[0]]
     for header in titles:
@@ -63,7 +64,7 @@ def table_lines(run: Run) -> Group:
 
 
 _TIP = ("bending\n[deg]", "tip x\n[mm]", "y\n[mm]", "z\n[mm]")
-_HEADERS = (*_TIP, "stretch", "stable", "resid.", "error", "time\n[s]")
+_HEADERS: tuple[str, ...] = (*_TIP, "stretch", "stable", "resid.", "error", "time\n[s]")
 _BLOCKED_HEADERS = ("force\n[N]", "gap\n[mm]", *_TIP, "resid.")
 
 
@@ -95,6 +96,27 @@ def _blocked_numbers(step: Step) -> list[str]:
         gap = _millimetres(step.contact.gap) if step.contact.normal.any() else NONE
         wall = [f"{step.contact.force:.4f}", gap]
     return [*wall, *plain[:4], plain[6]]
+
+
+_INVERSE_HEADERS = ("left\n[mm]", "off\n[deg]", *_TIP, "stable", "resid.", "time\n[s]")
+
+
+def _inverse_numbers(step: Step) -> list[str]:
+    """Return what follows the status of a target; what is left of it and the nearest tip are known out of reach too."""
+    plain, aimed = _numbers(step), step.aimed
+    left, off = NONE, NONE
+    if aimed is not None:
+        left = NONE if aimed.distance is None else f"{aimed.distance / MILLIMETRE:.4f}"
+        off = NONE if aimed.angle is None else f"{aimed.angle / DEGREE:.4f}"
+        if aimed.tip_position is not None:
+            plain[1:4] = [_millimetres(v) for v in aimed.tip_position]
+    return [left, off, *plain[:4], plain[5], plain[6], plain[8]]
+
+
+_KINDS: Mapping[str, tuple[Callable[[Step], list[str]], tuple[str, ...]]] = {
+    BLOCKED_FORCE: (_blocked_numbers, _BLOCKED_HEADERS),
+    INVERSE: (_inverse_numbers, _INVERSE_HEADERS),
+}
 
 
 def _wall_moves(run: Run) -> bool:

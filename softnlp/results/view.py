@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from softnlp.results.dataset import STABLE_FLAGS
 from softnlp.results.fields import BLOCKED_FORCE, solved_pose
 from softnlp.results.inputs import loads_of_table, robot_of_table
+from softnlp.results.targets import INVERSE
 from softnlp.robot import Robot
 from softnlp.rod import Loads
 from softnlp.status import Status
@@ -61,12 +62,27 @@ class ContactView:
 
 
 @dataclass(frozen=True, eq=False)
+class TargetView:
+    """The targets of inverse kinematics, S steps; NaN where there is none of a kind, or no pose was found.
+
+    position, direction : (S, 3) of the target [m], unit. distance, angle : (S,) what is left [m], [rad].
+    tip : (S, 3) the tip found, also where that is the nearest reachable one only [m].
+    """
+
+    position: Array
+    direction: Array
+    distance: Array
+    angle: Array
+    tip: Array
+
+
+@dataclass(frozen=True, eq=False)
 class RunView:
     """A run as figures see it; S steps, NaN and None where a step has no solution.
 
     material : its name and law. pressure : (S, sets) [Pa]. time : (S,) [s] or None.
     stable : (S,), False where unsolved. stretch : (S,). bending_angle : (S,) [rad]. backbone_length : (S,) [m].
-    bodies : S entries. contact : of a blocked force, else None.
+    bodies : S entries. contact : of a blocked force, else None. targets : of inverse kinematics, else None.
     """
 
     title: str
@@ -84,6 +100,7 @@ class RunView:
     backbone_length: Array
     bodies: tuple[Body | None, ...]
     contact: ContactView | None = None
+    targets: TargetView | None = None
 
     @property
     def solved(self) -> tuple[int, ...]:
@@ -115,6 +132,24 @@ def view_of_run(run: Run) -> RunView:
         backbone_length=series("backbone_length"),
         bodies=tuple(None if p is None else Body(p.shape.position, p.shape.rotation, p.radii) for p in poses),
         contact=_contact_of_run(run) if run.study == BLOCKED_FORCE else None,
+        targets=_targets_of_run(run) if run.study == INVERSE else None,
+    )
+
+
+def _targets_of_run(run: Run) -> TargetView:
+    """Return the targets of a run."""
+
+    def series(name: str, size: tuple[int, ...] = ()) -> Array:
+        nothing = np.full(size, np.nan)
+        values = [None if step.aimed is None else getattr(step.aimed, name) for step in run.steps]
+        return np.array([nothing if value is None else value for value in values], dtype=float)
+
+    return TargetView(
+        series("position", (3,)),
+        series("direction", (3,)),
+        series("distance"),
+        series("angle"),
+        series("tip_position", (3,)),
     )
 
 
@@ -172,6 +207,18 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
         backbone_length=values["backbone_length_mm"] * MILLIMETRE,
         bodies=tuple(_body(values, k) if status[k].has_solution else None for k in steps),
         contact=_contact_of_values(values) if str(attributes["study"]) == BLOCKED_FORCE else None,
+        targets=_targets_of_values(values) if str(attributes["study"]) == INVERSE else None,
+    )
+
+
+def _targets_of_values(values: Mapping[str, Any]) -> TargetView:
+    """Return the targets of a dataset."""
+    return TargetView(
+        values["target_mm"] * MILLIMETRE,
+        values["target_direction"],
+        values["distance_mm"] * MILLIMETRE,
+        values["direction_error_deg"] * DEGREE,
+        values["nearest_mm"] * MILLIMETRE,
     )
 
 

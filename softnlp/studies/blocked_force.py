@@ -21,9 +21,9 @@ from softnlp.studies.blocked import BlockedSolver
 from softnlp.studies.blocked_grid import Blocked
 from softnlp.studies.forward import checked_loads, pressure_table
 from softnlp.studies.multistart import other_equilibria
-from softnlp.studies.sensitivity import given_weights, sensitivities
 from softnlp.studies.step import Run, Step
 from softnlp.studies.wall import Wall, checked_contact, standing_wall
+from softnlp.studies.weight_sensitivity import given_weights, sensitivities
 
 Array = NDArray[np.float64]
 

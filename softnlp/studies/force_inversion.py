@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from softnlp.contact_settings import ContactSettings
 from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.errors import InputError
-from softnlp.loadcase import load_case
+from softnlp.loadcase import LoadCase, load_case
 from softnlp.materials import Material
 from softnlp.numerics import Numerics
 from softnlp.problem import CompiledProblem, Constraint, compile_problem
-from softnlp.quantities import Model, quantity
+from softnlp.quantities import Model, Quantity, quantity
 from softnlp.robot import LOWERABLE_RULES, Robot, check
 from softnlp.rod import Loads
 from softnlp.solver import Engine
@@ -126,6 +126,18 @@ def _bracketed(
     return P, step, solved
 
 
+def joint_cases(solver: BlockedSolver, given: Mapping[str, Quantity], intervals: int) -> tuple[LoadCase, LoadCase]:
+    """Return the free and the blocked shape of the same quantities; the blocked one takes the free one's lengths.
+
+    given : every name of `solver.functions.declared()`; its "contact.free_lengths" is not used.
+    """
+    method = method_named(solver.numerics.transcription, intervals)
+    free = load_case("free", solver.poses.functions, given, method)
+    lengths = replace(given["contact.free_lengths"], symbol=free.outputs["chamber_lengths"])
+    order = {name: lengths if name == "contact.free_lengths" else q for name, q in given.items()}
+    return free, load_case("blocked", solver.functions, order, method)
+
+
 def joint_problem(solver: BlockedSolver, intervals: int, *, free_pressure: bool) -> CompiledProblem:
     """Return the problem of the free and the blocked shape with shared pressure, geometry and material.
 
@@ -133,18 +145,14 @@ def joint_problem(solver: BlockedSolver, intervals: int, *, free_pressure: bool)
     force is found for a pressure. With `free_pressure` the pressure is "pressure scale" (free) times "pressure", and
     the wall's force has to be "target force" [N].
     """
-    method = method_named(solver.numerics.transcription, intervals)
     declared = solver.functions.declared()
-    order = tuple(declared)
-    free_lengths = declared.pop("contact.free_lengths")
-    shared = dict(declared)
     scale = quantity("pressure scale", "1", 1.0, lower=0.0)
+    shared = dict(declared)
     if free_pressure:
         pressure = declared["pressure"]
         shared["pressure"] = replace(pressure, symbol=scale.symbol * pressure.symbol)
-    free = load_case("free", solver.poses.functions, shared, method)
-    shared["contact.free_lengths"] = replace(free_lengths, symbol=free.outputs["chamber_lengths"])
-    blocked = load_case("blocked", solver.functions, {name: shared[name] for name in order}, method)
+    free, blocked = joint_cases(solver, shared, intervals)
+    del declared["contact.free_lengths"]
     if not free_pressure:
         return compile_problem(list(declared.values()), [free, blocked])
     target = quantity("target force", "N", 0.0)

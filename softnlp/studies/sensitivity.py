@@ -1,93 +1,310 @@
-"""How the force of the `weighted` closure answers to its weights, which the paper chooses for each robot."""
+"""Sensitivities: exact derivatives of what a robot does by what it is made of and given, through the solved problem."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softnlp.contact_settings import ContactSettings
 from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
-from softnlp.errors import InputError
+from softnlp.errors import InputError, nearest
 from softnlp.materials import Material
 from softnlp.numerics import Numerics
 from softnlp.quantities import Model
 from softnlp.robot import LOWERABLE_RULES, Robot, check
 from softnlp.rod import Loads
+from softnlp.status import Status
 from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.blocked_grid import Blocked
+from softnlp.studies.derivatives import (
+    UNITS,
+    LinearPoint,
+    PoseDerivatives,
+    blocked_point,
+    checked_names,
+    entries_of,
+    is_straight,
+    labels,
+    quantities_of,
+)
 from softnlp.studies.forward import checked_loads, pressure_table
-from softnlp.studies.step import Step, WeightSensitivity
+from softnlp.studies.statics import PoseSolver
+from softnlp.studies.step import Step
 from softnlp.studies.wall import checked_contact, standing_wall
 
-UNITS: Mapping[str, str] = {"force": "1/N", "moment": "1/(N m)", "length": "1/m", "position": "1/m"}
-FACTOR = 1.1
+Array = NDArray[np.float64]
+
+TIP = ("tip_position", "tip_rotation")
+WRENCH = ("tip_force", "tip_moment")
 
 
-def given_weights(contact: ContactSettings) -> dict[str, float]:
-    """Return the weights that are given, by name.
+@dataclass(frozen=True, eq=False)
+class Sensitivities:
+    """Derivatives of outputs by quantities at one solved step, SI, world frame.
 
-    Raises
-    ------
-    InputError
-        When the closure is not `weighted`, or no weight is given.
+    matrix : (outputs, quantities). outputs, quantities : a name for each row and column, "tip_position.x",
+    "robot.length", with units beside. values, nominal : of the outputs and of the quantities. step : the pose; where
+    it has no solution every number here is NaN. point : for solving again nearby; None where no equation was
+    differentiated. warnings : of the step, and why a row has no derivative.
     """
-    if contact.closure != "weighted":
-        raise InputError(f"expected closure = 'weighted', got {contact.closure!r}", key="closure")
-    given = {name: value for name in UNITS if (value := getattr(contact.weights, name)) is not None}
-    if not given:
-        raise InputError("expected at least one weight", key="weights")
-    return given
+
+    step: Step
+    outputs: tuple[str, ...]
+    output_units: tuple[str, ...]
+    quantities: tuple[str, ...]
+    quantity_units: tuple[str, ...]
+    values: Array
+    nominal: Array
+    matrix: Array
+    point: LinearPoint | None
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def solved(self) -> bool:
+        """Whether there are derivatives."""
+        return bool(np.isfinite(self.matrix).any())
+
+    def of(self, output: str, quantity: str) -> Array:
+        """Return the rows of one output and the columns of one quantity: ("tip_position", "pressure") is (3, sets).
+
+        A single entry, "tip_position.x", is a row of its own. Raises `InputError` for a name that is not there.
+        """
+        rows, columns = _where(self.outputs, output, "output"), _where(self.quantities, quantity, "quantity")
+        block: Array = self.matrix[np.ix_(rows, columns)]
+        return block
+
+    @property
+    def relative(self) -> Array:
+        """Per cent of an output for a per cent of a quantity, (outputs, quantities); NaN where an output is 0."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share: Array = self.matrix * self.nominal / self.values[:, None]
+        return np.where(np.isfinite(share), share, np.nan)
 
 
-def sensitivities(solver: BlockedSolver, found: Blocked, factor: float = FACTOR) -> tuple[WeightSensitivity, ...]:
-    """Return how the force of a solution of `weighted` changes with each weight that is given.
-
-    Central differences over weights that are `factor` larger and smaller; nan where one of the two has no force.
-    """
-    contact, situation = solver.contact, found.situation
-    made = []
-    for name, value in given_weights(contact).items():
-        forces = []
-        for f in (factor, 1 / factor):
-            weights = replace(contact.weights, **{name: value * f})
-            other = solver.with_contact(replace(contact, weights=weights))
-            step = other.solve(situation.pressure, situation.loads, situation.wall, found)[0]
-            forces.append(step.contact.force if step.contact is not None else 0.0)
-        known = min(forces) > 0
-        slope = float(np.log(forces[0] / forces[1]) / (2 * np.log(factor))) if known else float("nan")
-        made.append(WeightSensitivity(name, value, UNITS[name], slope))
-    return tuple(made)
+def _where(names: Sequence[str], wanted: str, key: str) -> list[int]:
+    """Return where a name is, or the entries of the vector that it names."""
+    found = entries_of(names, wanted)
+    if not found:
+        raise InputError(f"no such {key} here{nearest(wanted, names)}", key=key)
+    return found
 
 
-def weight_sensitivity(
+def sensitivities(
     robot: Robot,
     material: Material,
     pressure: Any,
-    contact: ContactSettings,
     *,
+    outputs: Sequence[str] = TIP,
+    by: Sequence[str] = ("pressure",),
     loads: Loads = Loads(),
+    contact: ContactSettings | None = None,
     coefficients: Coefficients = Coefficients(),
     conventions: Conventions = REPRODUCTION,
     numerics: Numerics = Numerics(),
-    factor: float = FACTOR,
-) -> tuple[Step, tuple[WeightSensitivity, ...]]:
-    """Return the step of `weighted` at a pressure (sets,) [Pa] and how its force changes with each weight given.
+) -> Sensitivities:
+    """Solve one pose, or one blocked force, and differentiate outputs by quantities.
 
-    By central differences over weights `factor` times larger and smaller; empty where the step has no force.
+    Parameters
+    ----------
+    robot, material, loads, coefficients, conventions, numerics
+        As `softnlp.forward`.
+    pressure
+        (sets,) gauge [Pa].
+    outputs
+        Any of tip_position, tip_rotation (rotation vector, world frame), bending_angle, backbone_length, elongation,
+        stretch, chamber_lengths and, with `contact`, blocked_force.
+    by
+        Any of pressure, tip_force, tip_moment, gravity, robot.DIMENSION, material.CONSTANT, material.density,
+        stiffening.elongation, stiffening.bending, corrections.area, corrections.inertia, corrections.bore_fraction and,
+        with `contact`, contact.wall_point, contact.tip_cap, contact.chamber_reaction; see `softnlp.quantities`.
+    contact
+        A wall: the outputs are those of the blocked shape, and its free chamber lengths move along.
+
+    Returns
+    -------
+    Sensitivities
+        Without numbers where the step has no solution; `step` says why.
 
     Raises
     ------
     InputError
-        When the closure is not `weighted`, or no weight is given; for a pressure or loads of the wrong shape.
+        For unknown names, blocked_force without a wall, closure "weighted", pressures or loads out of range.
+    RobotError
+        For a robot that is geometrically impossible.
+
     """
     check(robot, allow=LOWERABLE_RULES)
-    contact, P, loads = checked_contact(contact), pressure_table(pressure, robot.chamber_sets), checked_loads(loads)
-    given_weights(contact)
+    P = pressure_table(pressure, robot.chamber_sets)
     if len(P) != 1:
         raise InputError(f"expected one pressure a set, got {len(P)} steps", key="pressure")
-    solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
-    step, found = solver.solve(P[0], loads, standing_wall(solver.poses, contact, P, loads))
-    return step, () if found is None else sensitivities(solver, found, factor)
+    loads = checked_loads(loads)
+    model = Model(robot, material, coefficients, conventions)
+    if contact is None:
+        poses = PoseSolver(model, numerics)
+        return pose_sensitivities(PoseDerivatives(poses), P[0], loads, outputs, by)
+    return _blocked_sensitivities(model, numerics, P[0], loads, contact, outputs, by)
+
+
+def pose_sensitivities(
+    derivatives: PoseDerivatives, pressure: Array, loads: Loads, outputs: Sequence[str], by: Sequence[str]
+) -> Sensitivities:
+    """Return the sensitivities of one pose; `derivatives` keeps what is compiled for the next one.
+
+    Raises
+    ------
+    InputError
+        For unknown names.
+    """
+    known = quantities_of(derivatives.poses)
+    rows = checked_names(outputs, [name for name in UNITS if name != "blocked_force"], "outputs")
+    columns = checked_names(by, list(known), "by")
+    step, solved = derivatives.poses.solve(pressure, loads)
+    if solved is None:
+        return _empty(derivatives.poses, step, rows, columns, step.message)
+    try:
+        return _assembled(step, derivatives.at(solved, columns), rows, columns)
+    except np.linalg.LinAlgError:
+        return _empty(derivatives.poses, step, rows, columns, _SINGULAR)
+
+
+_SINGULAR = "the equations are singular here, at a fold or a branch point: there are no derivatives"
+
+
+def _blocked_sensitivities(
+    model: Model,
+    numerics: Numerics,
+    pressure: Array,
+    loads: Loads,
+    contact: ContactSettings,
+    outputs: Sequence[str],
+    by: Sequence[str],
+) -> Sensitivities:
+    """Return the sensitivities of one blocked force."""
+    contact = checked_contact(contact)
+    if contact.closure == "weighted":
+        raise InputError(
+            "expected 'free', 'compliant' or 'rigid': a blocked force of closure 'weighted' is a compromise that no "
+            "equation fixes",
+            key="closure",
+        )
+    solver = BlockedSolver(model, numerics, contact)
+    rows = checked_names(outputs, list(UNITS), "outputs")
+    columns = checked_names(by, list(quantities_of(solver)), "by")
+    wall = standing_wall(solver.poses, contact, pressure[None, :], loads)
+    step, found = solver.solve(pressure, loads, wall)
+    if found is None and step.status is Status.SOLVED:
+        touching = "the tip only touches the wall: pressed further it has a force, moved away it has none"
+        return _empty(solver, step, rows, columns, touching)
+    if found is None and not step.status.has_solution:
+        return _empty(solver, step, rows, columns, step.message)
+    try:
+        if found is not None:
+            point = blocked_point(solver, found, columns)
+            return _assembled(step, point, rows, columns) if point else _empty(solver, step, rows, columns, _SINGULAR)
+        return _away_from_wall(solver, step, loads, rows, columns)
+    except np.linalg.LinAlgError:
+        return _empty(solver, step, rows, columns, _SINGULAR)
+
+
+def _away_from_wall(
+    solver: BlockedSolver, step: Step, loads: Loads, rows: tuple[str, ...], columns: tuple[str, ...]
+) -> Sensitivities:
+    """Return the sensitivities of a free shape that does not reach the wall: nothing changes its force of 0."""
+    free = pose_sensitivities(
+        PoseDerivatives(solver.poses),
+        step.pressure,
+        loads,
+        [name for name in rows if name != "blocked_force"] or TIP,
+        [name for name in columns if not name.startswith("contact.")] or ("pressure",),
+    )
+    empty = _empty(solver, step, rows, columns, "")
+    matrix, values, nominal = np.zeros_like(empty.matrix), np.zeros_like(empty.values), empty.nominal.copy()
+    for k, name in enumerate(empty.outputs):
+        if name in free.outputs:
+            values[k] = free.values[free.outputs.index(name)]
+            for j, quantity in enumerate(empty.quantities):
+                if quantity in free.quantities:
+                    matrix[k, j] = free.matrix[free.outputs.index(name), free.quantities.index(quantity)]
+    for j, quantity in enumerate(empty.quantities):
+        if quantity in free.quantities:
+            nominal[j] = free.nominal[free.quantities.index(quantity)]
+    return Sensitivities(
+        step,
+        empty.outputs,
+        empty.output_units,
+        empty.quantities,
+        empty.quantity_units,
+        values,
+        nominal,
+        matrix,
+        None,
+        free.warnings,
+    )
+
+
+def _named(
+    solver: PoseSolver | BlockedSolver, rows: tuple[str, ...], columns: tuple[str, ...]
+) -> tuple[list[str], list[str], list[str], list[str]]:
+    """Return names and units of all rows and columns."""
+    known = quantities_of(solver)
+    sizes = {"tip_position": 3, "tip_rotation": 3, "chamber_lengths": solver.model.robot.chambers}
+    out = [(label, UNITS[name]) for name in rows for label in labels(name, sizes.get(name, 1))]
+    of = [(label, known[name].unit) for name in columns for label in labels(name, known[name].size)]
+    return [n for n, _ in out], [u for _, u in out], [n for n, _ in of], [u for _, u in of]
+
+
+def _empty(
+    solver: PoseSolver | BlockedSolver, step: Step, rows: tuple[str, ...], columns: tuple[str, ...], why: str
+) -> Sensitivities:
+    """Return sensitivities without numbers."""
+    out, out_units, of, of_units = _named(solver, rows, columns)
+    nothing, known = np.full(len(out), np.nan), quantities_of(solver)
+    nominal = np.concatenate([known[name].nominal for name in columns])
+    return Sensitivities(
+        step, tuple(out), tuple(out_units), tuple(of), tuple(of_units), nothing, nominal,
+        np.full((len(out), len(of)), np.nan), None, (why,) if why else (),
+    )  # fmt: skip
+
+
+def _assembled(step: Step, point: LinearPoint, rows: tuple[str, ...], columns: tuple[str, ...]) -> Sensitivities:
+    """Stack the derivatives of a solved point."""
+    values = {name: point.value(name) for name in rows}
+    blocks = {name: point.derivative(name) for name in rows}
+    warnings = list(step.warnings)
+    if "bending_angle" in rows and is_straight(point):
+        blocks["bending_angle"] = np.full_like(blocks["bending_angle"], np.nan)
+        warnings.append("the robot is straight: its bending angle has a kink there, so it has no derivative")
+    units = {q.name: q.unit for q in point.quantities}
+    sizes = {q.name: q.size for q in point.quantities}
+    return Sensitivities(
+        step=step,
+        outputs=tuple(label for name in rows for label in labels(name, values[name].size)),
+        output_units=tuple(UNITS[name] for name in rows for _ in range(values[name].size)),
+        quantities=tuple(label for name in columns for label in labels(name, sizes[name])),
+        quantity_units=tuple(units[name] for name in columns for _ in range(sizes[name])),
+        values=np.concatenate([values[name] for name in rows]),
+        nominal=point.theta,
+        matrix=np.vstack([blocks[name] for name in rows]),
+        point=point,
+        warnings=tuple(warnings),
+    )
+
+
+def tip_jacobian(robot: Robot, material: Material, pressure: Any, **settings: Any) -> Sensitivities:
+    """Return how the tip moves with each pressure: matrix (6, sets), position [m/Pa] above rotation vector [rad/Pa].
+
+    settings : those of `sensitivities`. Raises as it.
+    """
+    return sensitivities(robot, material, pressure, outputs=TIP, by=("pressure",), **settings)
+
+
+def tip_compliance(robot: Robot, material: Material, pressure: Any, **settings: Any) -> Sensitivities:
+    """Return how the tip gives way to a wrench: matrix (6, 6), position and rotation by force [N] and moment [N m].
+
+    settings : those of `sensitivities`. Raises as it. The matrix is symmetric where no tip moment acts. A dead moment M
+    has no potential: it leaves the inverse, the stiffness, an antisymmetric part in the rotations.
+    """
+    return sensitivities(robot, material, pressure, outputs=TIP, by=WRENCH, **settings)

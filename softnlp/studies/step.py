@@ -108,12 +108,29 @@ class Contact:
 
 
 @dataclass(frozen=True, eq=False)
+class Aimed:
+    """A target of inverse kinematics and how near the tip comes to it at the step's pressure; SI, world frame.
+
+    position, direction : (3,) of the target, or None where it has none. distance, angle : what is left of them [m],
+    [rad], or None. tip_position, tip_direction : (3,) where the tip is then, also where that is the nearest reachable
+    point only; None without any pose.
+    """
+
+    position: Array | None
+    direction: Array | None
+    distance: float | None = None
+    angle: float | None = None
+    tip_position: Array | None = None
+    tip_direction: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Step:
     """One step of a run: its input, how it ended, and the pose when it was solved (else None).
 
     pressure : (sets,) [Pa]. residual : largest scaled equation error, or None when nothing was evaluated.
     discretisation_error : estimated tip position error over L_0. solve_time : [s].
-    contact : of a blocked force, whose `pose` is the blocked shape; else None.
+    contact : of a blocked force, whose `pose` is the blocked shape. aimed : of inverse kinematics. Else None.
     """
 
     pressure: Array
@@ -129,6 +146,7 @@ class Step:
     solve_time: float = 0.0
     warnings: tuple[str, ...] = ()
     contact: Contact | None = None
+    aimed: Aimed | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,102 @@
+"""`softnlp sensitivity`: what a step of a forward scenario is sensitive to, as tables and a figure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
+from softnlp.errors import InputError
+
+
+def sensitivity(
+    scenario: Path,
+    /,
+    *,
+    step: int | None = None,
+    tolerance: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
+    samples: int = 200,
+    out: Path | None = None,
+    json: bool = False,
+) -> int:
+    """Differentiate the tip and shape of one step of a forward scenario, and draw what follows from it.
+
+    Prints the tip's Jacobian by pressure, its compliance, manipulability and stiffness, and with tolerances the error
+    bars they leave, checked by sampling; writes sensitivity.json and sensitivity.png. The exit status is 0 when the
+    step solved, 3 when it did not, 2 for bad input.
+
+    Parameters
+    ----------
+    scenario
+        TOML file of study "forward".
+    step
+        Of its pressures, from 1; the last by default.
+    tolerance
+        Standard deviations, NAME=VALUE, in the unit of the name, or VALUE% of what the scenario has: a dimension or a
+        constant by its key in a scenario (length_mm=0.2, C10_MPa=3%), density_kg_m3, elongation, bending, area,
+        inertia, bore_fraction, pressure_bar (each set), tip force (force_N) and moment (moment_Nmm, each component).
+    samples
+        Draws of the check; 0 leaves it out.
+    out
+        Folder for the results; by default results/NAME, where NAME is that of the scenario file.
+    json
+        Print one JSON document and nothing else; no files are written unless --out is given.
+    """
+    from softnlp.results.sensitivity import document_text, sensitivity_document, table_rows
+    from softnlp.scenario import load_scenario
+    from softnlp.studies.report import named_tolerances, sensitivity_report
+
+    asked = load_scenario(scenario)
+    if asked.study != "forward":
+        raise InputError(f"expected study 'forward', got {asked.study!r}", source=str(scenario), key="study")
+    count = len(asked.pressures)
+    chosen = count if step is None else step
+    if not 1 <= chosen <= count:
+        raise InputError(f"expected a step from 1 to {count}, got {chosen}", key="--step")
+    if samples < 0 or samples == 1:
+        raise InputError(f"expected 0, or at least 2 samples, got {samples}", key="--samples")
+    pressure = asked.pressures[chosen - 1]
+    model = (asked.robot, asked.material, asked.coefficients)
+    tolerances = named_tolerances(tolerance, *model, pressure)
+    with progress(samples if tolerances else 0, asked.title) as (advance, _):
+        report = sensitivity_report(
+            asked.robot,
+            asked.material,
+            pressure,
+            tolerances,
+            loads=asked.loads,
+            coefficients=asked.coefficients,
+            conventions=asked.conventions,
+            numerics=asked.numerics,
+            samples=samples,
+            progress=advance,
+        )
+    document = sensitivity_document(report, asked.title, chosen)
+    folder = out if out is not None or json else Path("results") / scenario.stem
+    if folder is not None:
+        import io
+
+        from softnlp.plots.sensitivity import sensitivity_figure
+        from softnlp.results.files import make_folder, write_whole
+
+        png = io.BytesIO()
+        sensitivity_figure(report, f"{asked.title}, step {chosen}").savefig(png, format="png")
+        kept = make_folder(folder)
+        write_whole(kept / "sensitivity.json", document_text(document).encode())
+        write_whole(kept / "sensitivity.png", png.getvalue())
+    if json:
+        say(document_text(document).rstrip("\n"))
+    elif report.solved:
+        for heading, header, rows in table_rows(report):
+            say(f"\n{heading}")
+            say_rows(header, rows)
+    for warning in report.sensitivities.warnings:
+        complain(f"warning: {warning}")
+    if not report.solved:
+        complain(f"step {chosen}: {report.sensitivities.step.status.value}: {report.sensitivities.step.message}")
+        return SOME_UNSOLVED
+    if folder is not None and not json:
+        say(f"\nresults in {folder}")
+    return SOLVED

@@ -1,0 +1,32 @@
+"""From a scenario of `inverse` to a run: a step a target."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from softnlp.quantities import Model
+from softnlp.scenario import Scenario
+from softnlp.studies.inverse import follow_targets
+from softnlp.studies.inverse_solver import InverseSolver
+from softnlp.studies.inverse_task import InverseTask
+from softnlp.studies.step import Run, Step
+
+Progress = Callable[[int, Step], None]
+
+
+def run_inverse(scenario: Scenario, progress: Progress | None, branches: int = 0) -> Run:
+    """Run inverse kinematics; `branches` means nothing here."""
+    task = scenario.task
+    assert isinstance(task, InverseTask)
+    model = Model(scenario.robot, scenario.material, scenario.coefficients, scenario.conventions)
+    solver = InverseSolver(model, scenario.numerics, scenario.loads, task, "newton")
+    return Run(
+        study=scenario.study,
+        robot=scenario.robot,
+        material=scenario.material,
+        coefficients=scenario.coefficients,
+        conventions=scenario.conventions,
+        loads=scenario.loads,
+        steps=follow_targets(solver, progress),
+        title=scenario.title,
+    )

@@ -1,0 +1,202 @@
+"""Least squares and least norm within linear limits, for a few unknowns: trust regions around an active-set step.
+
+Knows no rod. A *measured* map gives residuals r (m,) and their exact Jacobian J (m, n) at z (n,); what J leaves out of
+the second derivatives is measured by differences of J where residuals or multipliers stay large.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+MET = 1e-11  # residual below which nothing is left to gain
+_NOISE = 1e-11  # what round-off leaves in a residual
+_STEPS = 60
+_FIRST_RADIUS, _LARGEST_RADIUS, _LEAST_RADIUS = 0.3, 2.0, 1e-9
+_DIFFERENCE = 1e-4
+_AT_BOUND = 1e-11
+_ENOUGH = 1e-8  # a step shorter than this has arrived
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """lower <= z <= upper and sum(z) <= largest_sum."""
+
+    lower: Array
+    upper: Array
+    largest_sum: float
+
+    def rows(self, z: Array, radius: float) -> tuple[Array, Array]:
+        """Return A, b with A d <= b for steps d from z that stay within the limits and a box of this radius."""
+        n = z.size
+        A = np.vstack([np.eye(n), -np.eye(n), np.ones((1, n))])
+        ahead, behind = np.minimum(self.upper - z, radius), np.minimum(z - self.lower, radius)
+        return A, np.maximum(np.concatenate([ahead, behind, [self.largest_sum - z.sum()]]), 0.0)
+
+    def clip(self, z: Array) -> Array:
+        """Return z within the limits to the last bit, and on a bound where round-off leaves it beside one."""
+        inside = np.where(z < self.lower + _AT_BOUND, self.lower, np.where(z > self.upper - _AT_BOUND, self.upper, z))
+        excess = float(inside.sum()) - self.largest_sum
+        if excess > 0:
+            room = inside - self.lower
+            inside = np.maximum(self.lower, inside - room * min(1.0, excess * (1 + 1e-12) / room.sum()))
+        return inside
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Residuals and Jacobian at z; `memo` is what the map needs to go on from here."""
+
+    z: Array
+    r: Array
+    J: Array
+    memo: Any
+
+    @property
+    def cost(self) -> float:
+        """Half the sum of squares."""
+        return float(self.r @ self.r) / 2
+
+
+Map = Callable[[Array, Measured], Measured | None]
+"""From z and a measured point nearby to the point at z; None where there is none."""
+
+
+def quadratic_step(H: Array, g: Array, A: Array, b: Array, E: Array | None = None, start: Array | None = None) -> Array:
+    """Return d that minimises d H d / 2 + g d with A d <= b and E d = E start, from a feasible start (0 by default).
+
+    H : positive definite. The primal active-set method; b is not negative.
+    """
+    n = g.size
+    d = np.zeros(n) if start is None else start.copy()
+    fixed = np.zeros((0, n)) if E is None else E
+    active: list[int] = []
+    for _ in range(20 * (n + 1)):
+        C = np.vstack([fixed, A[active]])
+        K = np.block([[H, C.T], [C, np.zeros((len(C), len(C)))]])
+        solved = np.linalg.lstsq(K, np.concatenate([-(H @ d + g), np.zeros(len(C))]), rcond=None)[0]
+        p, multipliers = solved[:n], solved[n + len(fixed) :]
+        if np.max(np.abs(p)) <= 1e-13 * (1 + np.max(np.abs(d))):
+            if not active or np.min(multipliers) >= -1e-12 * (1 + np.max(np.abs(g))):
+                break
+            del active[int(np.argmin(multipliers))]
+            continue
+        slope, room = A @ p, np.maximum(b - A @ d, 0.0)
+        blocking = [k for k in range(len(b)) if k not in active and slope[k] > 1e-14]
+        length, hit = 1.0, None
+        for k in blocking:
+            if room[k] / slope[k] < length:
+                length, hit = float(room[k] / slope[k]), k
+        d = d + length * p
+        if hit is not None:
+            active.append(hit)
+    return d
+
+
+def curvature(measure: Map, here: Measured, weights: Array, limits: Limits) -> Array | None:
+    """Return the sum of weights times second derivatives of r, by differences of J; None where the map ends."""
+    n = here.z.size
+    S = np.zeros((n, n))
+    for j in range(n):
+        h = _DIFFERENCE if here.z[j] + _DIFFERENCE <= limits.upper[j] else -_DIFFERENCE
+        there = measure(here.z + h * np.eye(n)[j], here)
+        if there is None:
+            return None
+        S[:, j] = (there.J - here.J).T @ weights / h
+    symmetric: Array = (S + S.T) / 2
+    return symmetric
+
+
+def _definite(H: Array) -> Array:
+    """Return H with its negative curvatures turned, and none of them 0."""
+    sizes, axes = np.linalg.eigh(H)
+    least = 1e-10 * max(float(np.max(np.abs(sizes))), 1e-12)
+    made: Array = (axes * np.maximum(np.abs(sizes), least)) @ axes.T
+    return made
+
+
+def nearest(
+    measure: Map, start: Measured, limits: Limits, second: Array | None = None, *, measured_curvature: bool = True
+) -> tuple[Measured, Array | None, int]:
+    """Return the point of least sum of squares near a start, the curvature of its residuals, and the points measured.
+
+    second : curvature to begin with. measured_curvature : measure it where the residuals stay large.
+    """
+    here, radius, spent = start, _FIRST_RADIUS, 0
+    slow = False
+    for _ in range(_STEPS):
+        size = float(np.linalg.norm(here.r))
+        if size <= MET:
+            break
+        if measured_curvature and slow and size > 1e-4:
+            second = curvature(measure, here, here.r, limits)
+            spent += here.z.size
+        g = here.J.T @ here.r
+        H = _definite(here.J.T @ here.J + (0 if second is None else second))
+        d = quadratic_step(H, g, *limits.rows(here.z, radius))
+        predicted = -float(g @ d + d @ H @ d / 2)
+        length = float(np.max(np.abs(d)))
+        if predicted <= 0.01 * _NOISE * size or length < 1e-12:
+            break
+        there = measure(limits.clip(here.z + d), here)
+        spent += 1
+        gained = -np.inf if there is None else here.cost - there.cost
+        # Where the target can be met, Gauss and Newton's steps soon leave little; where not, they need the curvature.
+        slow = length < 0.9 * radius and gained < 0.75 * here.cost
+        if there is not None and gained > 1e-4 * predicted:
+            here = there
+            if gained > 0.75 * predicted and length > 0.9 * radius:
+                radius = min(2 * radius, _LARGEST_RADIUS)
+        if gained < 0.25 * predicted:
+            radius = length / 4
+        if radius < _LEAST_RADIUS:
+            break
+    return here, second, spent
+
+
+def least_norm(
+    measure: Map, start: Measured, limits: Limits, second: Array | None = None, *, measured_curvature: bool = True
+) -> tuple[Measured, Array | None, int]:
+    """Return the point of least |z| that keeps r = 0, near a start that has r = 0; otherwise as `nearest`.
+
+    J must have full row rank. second : of the residuals weighed by their multipliers.
+    """
+    here, radius, spent = start, _FIRST_RADIUS, 0
+    n = here.z.size
+    multipliers: Array = np.zeros(here.r.size)
+    for _ in range(_STEPS):
+        if measured_curvature and np.any(multipliers):
+            second = curvature(measure, here, multipliers, limits)
+            spent += n
+        A, b = limits.rows(here.z, radius)
+        back = quadratic_step(_definite(here.J.T @ here.J), here.J.T @ here.r, A, b)
+        H = _definite(np.eye(n) + (0 if second is None else second))
+        d = quadratic_step(H, here.z, A, b, here.J, back)
+        # Limits that hold d take their share of the gradient, so only free directions tell the multipliers.
+        free = (A @ d < b - 1e-12)[: 2 * n].reshape(2, n).all(axis=0)
+        gradient = here.z + H @ d
+        multipliers = np.asarray(np.linalg.lstsq(here.J[:, free].T, -gradient[free], rcond=None)[0], dtype=float)
+        length = float(np.max(np.abs(d)))
+        if length < _ENOUGH:
+            break
+        there = measure(limits.clip(here.z + d), here)
+        spent += 1
+        weight = 2 * float(np.max(np.abs(multipliers), initial=0.0)) + 1.0
+
+        def merit(point: Measured, weight: float = weight) -> float:
+            return float(point.z @ point.z) / 2 + weight * float(np.sum(np.abs(point.r)))
+
+        if there is not None and merit(there) < merit(here) + 1e-14:
+            here = there
+            radius = min(1.5 * radius, _LARGEST_RADIUS) if length > 0.9 * radius else radius
+        else:
+            radius = length / 4
+        if radius < _LEAST_RADIUS:
+            break
+    return here, second, spent

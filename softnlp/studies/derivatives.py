@@ -1,0 +1,242 @@
+"""A solved pose or blocked pose with the derivatives of its outputs by quantities: what `sensitivity` is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.condensed import CondensedSolver
+from softnlp.errors import InputError, nearest
+from softnlp.implicit import ImplicitDerivatives
+from softnlp.problem import CompiledProblem, compile_problem
+from softnlp.quantities import Quantity
+from softnlp.solver import Engine, Solution
+from softnlp.studies.blocked import BlockedSolver
+from softnlp.studies.blocked_grid import Blocked
+from softnlp.studies.force_inversion import joint_cases
+from softnlp.studies.pose_grid import Solved
+from softnlp.studies.statics import PoseSolver
+
+Array = NDArray[np.float64]
+
+UNITS: Mapping[str, str] = {
+    "tip_position": "m",
+    "tip_rotation": "rad",
+    "bending_angle": "rad",
+    "backbone_length": "m",
+    "elongation": "m",
+    "stretch": "1",
+    "chamber_lengths": "m",
+    "blocked_force": "N",
+}
+"""Every output that has derivatives, and its unit. `tip_rotation` is a rotation vector in the world frame,
+`elongation` the backbone's length less the robot's; `blocked_force` needs a wall."""
+
+_CONTACT = ("contact.wall_point", "contact.tip_cap", "contact.chamber_reaction")
+_AXES = ("x", "y", "z")
+_BY_AXIS = ("tip_position", "tip_rotation", "tip_force", "tip_moment", "gravity", "contact.wall_point")
+
+
+def rotation_vector(R: Array) -> Array:
+    """Return the rotation vector (3,) of a rotation matrix [rad]; its norm is at most pi."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(R).as_rotvec(), dtype=float)
+
+
+def labels(name: str, size: int) -> list[str]:
+    """Return a name for each entry: "tip_position.x", "pressure.1" (counted from 1), "bending_angle"."""
+    if name in _BY_AXIS:
+        return [f"{name}.{axis}" for axis in _AXES]
+    several = size > 1 or name in ("pressure", "chamber_lengths")
+    return [f"{name}.{k + 1}" for k in range(size)] if several else [name]
+
+
+def entries_of(names: Sequence[str], wanted: str) -> list[int]:
+    """Return where a name is among `labels`, or all entries of the vector that it names."""
+    parts = [name.rpartition(".") for name in names]
+    return [
+        k
+        for k, (stem, _, last) in enumerate(parts)
+        if names[k] == wanted or (stem == wanted and (last in _AXES or last.isdigit()))
+    ]
+
+
+def quantities_of(solver: PoseSolver | BlockedSolver) -> dict[str, Quantity]:
+    """Return what outputs can be differentiated by, by name: the model's quantities, and the wall's where there is."""
+    if isinstance(solver, PoseSolver):
+        return dict(solver.quantities)
+    declared = solver.functions.declared()
+    return {k: q for k, q in declared.items() if not k.startswith("contact.") or k in _CONTACT}
+
+
+def checked_names(names: Sequence[str], known: Sequence[str], key: str) -> tuple[str, ...]:
+    """Return names without repetition, or raise `InputError` for one that is not known, or for none."""
+    if isinstance(names, str):
+        names = (names,)
+    for name in names:
+        if name not in known:
+            raise InputError(f"unknown name {name!r}{nearest(str(name), known)}", key=key)
+    if not names:
+        raise InputError(f"expected at least one of {', '.join(known)}", key=key)
+    return tuple(dict.fromkeys(names))
+
+
+@dataclass(frozen=True, eq=False)
+class LinearPoint:
+    """A solution and how everything in it moves with chosen quantities.
+
+    prefix : of the outputs' names in the problem. moves : d x / d theta. The entries of theta are `quantities`, one
+    behind the other, SI.
+    """
+
+    engine: Engine
+    solution: Solution
+    derivatives: ImplicitDerivatives
+    moves: Array
+    prefix: str
+
+    @property
+    def problem(self) -> CompiledProblem:
+        """The compiled problem."""
+        return self.engine.problem
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The quantities by which was differentiated."""
+        return self.derivatives.quantities
+
+    @property
+    def theta(self) -> Array:
+        """The value of every entry of the quantities, SI."""
+        values: Array = self.solution.p[self.derivatives.columns]
+        return values
+
+    def value(self, output: str) -> Array:
+        """Return an output, flat, SI; the rotation as the rotation vector of the tip's orientation."""
+        raw = self._raw(self.solution)
+        if output == "tip_rotation":
+            return rotation_vector(raw["tip_rotation"].reshape(3, 3, order="F"))
+        return self._plain(output, raw, self.solution)
+
+    def derivative(self, output: str) -> Array:
+        """Return d output / d theta (size, k); of the rotation, the rotation vector in the world frame."""
+        raw = self.derivatives.outputs(self.solution.x, self.solution.p, self.moves)
+        if output == "tip_rotation":
+            R = self._raw(self.solution)["tip_rotation"].reshape(3, 3, order="F")
+            return spin(raw[f"{self.prefix}tip_rotation"], R)
+        if output == "blocked_force":
+            return raw[f"{self.prefix}tip_forces"][:1]
+        if output != "elongation":
+            return raw[f"{self.prefix}{output}"]
+        by_length = np.concatenate([np.full(q.size, 1.0 if q.name == "robot.length" else 0.0) for q in self.quantities])
+        change: Array = raw[f"{self.prefix}backbone_length"] - by_length
+        return change
+
+    def solved_at(self, theta: Array) -> Solution:
+        """Solve again with other values of the quantities, from the first-order prediction."""
+        p = self.solution.p.copy()
+        p[self.derivatives.columns] = theta
+        return self.engine.solve(p, self.solution.x + self.moves @ (theta - self.theta))
+
+    def change(self, output: str, other: Solution) -> Array:
+        """Return how an output differs at another solution; of the rotation, the rotation vector from here to there."""
+        here, there = self._raw(self.solution), self._raw(other)
+        if output == "tip_rotation":
+            R_0, R_1 = (raw["tip_rotation"].reshape(3, 3, order="F") for raw in (here, there))
+            return rotation_vector(R_1 @ R_0.T)
+        difference: Array = self._plain(output, there, other) - self._plain(output, here, self.solution)
+        return difference
+
+    def _raw(self, solution: Solution) -> dict[str, Array]:
+        values = self.problem.outputs(x=solution.x, p=solution.p)
+        return {
+            name.removeprefix(self.prefix): np.asarray(value).ravel(order="F")
+            for name, value in values.items()
+            if name.startswith(self.prefix)
+        }
+
+    def _plain(self, output: str, raw: Mapping[str, Array], solution: Solution) -> Array:
+        """Return an output that is a vector or a number."""
+        if output == "blocked_force":
+            return raw["tip_forces"][:1]
+        if output != "elongation":
+            return raw[output]
+        start = 0
+        for q in self.problem.fixed:
+            if q.name == "robot.length":
+                break
+            start += q.size
+        length: Array = raw["backbone_length"] - solution.p[start]
+        return length
+
+
+def spin(dR: Array, R: Array) -> Array:
+    """Return the rotation vectors (3, k), world frame, of changes (9, k) of a matrix given column by column."""
+    W = np.einsum("ijk,lj->ilk", dR.reshape(3, 3, -1, order="F"), R)
+    omega: Array = np.array([W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]]) / 2
+    return omega
+
+
+class PoseDerivatives:
+    """Derivatives of the poses that a solver finds; what is compiled is kept for each grid and choice of quantities."""
+
+    def __init__(self, poses: PoseSolver) -> None:
+        self.poses = poses
+        self._compiled: dict[tuple[int, tuple[str, ...]], ImplicitDerivatives] = {}
+
+    def on_grid(self, intervals: int, names: tuple[str, ...]) -> ImplicitDerivatives:
+        """Return the derivatives by quantities on a grid, compiled at first use."""
+        key = (intervals, names)
+        if key not in self._compiled:
+            grid = self.poses.grid(intervals)
+            linear = grid.engine.linear
+            self._compiled[key] = ImplicitDerivatives(
+                grid.problem, names, linear if isinstance(linear, CondensedSolver) else None
+            )
+        return self._compiled[key]
+
+    def at(self, solved: Solved, names: Sequence[str]) -> LinearPoint:
+        """Return a solved pose with its derivatives by the named quantities.
+
+        Raises `numpy.linalg.LinAlgError` at a fold or a branch point.
+        """
+        derivatives = self.on_grid(solved.intervals, tuple(dict.fromkeys(names)))
+        moves = derivatives.states(solved.solution.x, solved.solution.p)
+        return LinearPoint(solved.grid.engine, solved.solution, derivatives, moves, "")
+
+
+def blocked_point(solver: BlockedSolver, found: Blocked, names: Sequence[str]) -> LinearPoint | None:
+    """Return a blocked pose with its derivatives, the free shape's chamber lengths moving along; None if not found.
+
+    Free and blocked shape are one problem here, solved once more together. Raises as `PoseDerivatives.at`.
+    """
+    intervals = found.grid.intervals
+    declared = solver.functions.declared()
+    cases = joint_cases(solver, declared, intervals)
+    given = [q for name, q in declared.items() if name != "contact.free_lengths"]
+    problem = compile_problem(given, cases)
+    values = solver.values(found.situation, found.pressed, np.zeros(0))
+    del values["contact.free_lengths"]
+    grid = solver.poses.grid(intervals)
+    values_free = solver.poses.values(found.situation.pressure, found.situation.loads)
+    near = found.free
+    arc = solver.poses.arc_guess(grid, near.column, near.stretch)
+    guess = arc if near.solved is None else solver.poses.transfer(near.solved, grid)
+    free = grid.engine.solve(grid.problem.pack(values_free), guess)
+    engine = Engine(problem)
+    start = np.concatenate([free.x, found.solution.x])
+    solution = engine.solve(problem.pack(values), start)
+    # The blocked shape took its free lengths from the closed form or from another grid: nearly the same ones.
+    if not solution.holds(solver.numerics.tolerance) or float(np.max(np.abs(solution.x - start))) > 1e-2:
+        return None
+    derivatives = ImplicitDerivatives(problem, tuple(dict.fromkeys(names)))
+    return LinearPoint(engine, solution, derivatives, derivatives.states(solution.x, solution.p), "blocked_")
+
+
+def is_straight(point: LinearPoint) -> bool:
+    """Whether a pose is straight, so that its bending angle has a kink there and no derivative."""
+    return float(point.value("bending_angle")[0]) < 1e-9

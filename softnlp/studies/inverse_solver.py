@@ -1,0 +1,352 @@
+"""Solving one target after another: where to start, a coarse search, the grid that the pose needs, and the verdict.
+
+A search runs in the pressures z [bar] with the exact Jacobian of the tip. It begins at the last target's pressure and
+at places of a table of tips over the bounds: closed-form arcs where no load acts, else poses on a coarse grid. What it
+finds is made exact on the grid that `PoseSolver` chooses for that pose, and judged by the pose that `PoseSolver` finds
+at the pressure, started as for a single forward step: residual, stability, discretisation.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.branch import stretch_on_branch
+from softnlp.numerics import Numerics
+from softnlp.quantities import Model
+from softnlp.rod import Loads
+from softnlp.status import Status
+from softnlp.studies.aiming import Aim, Table, aim_of, spread, tabulated
+from softnlp.studies.bounded import Limits, Map, Measured, least_norm, nearest
+from softnlp.studies.derivatives import PoseDerivatives
+from softnlp.studies.inverse_nlp import InverseProblem, inverse_problem, pressure_of
+from softnlp.studies.inverse_task import InverseTask, Target
+from softnlp.studies.pose_grid import Solved
+from softnlp.studies.statics import PoseSolver
+from softnlp.studies.step import Aimed, Step
+from softnlp.studies.tip_map import ArcMap, GridMap, TipMap, TipPoint
+from softnlp.units import BAR, DEGREE, MILLIMETRE
+
+Array = NDArray[np.float64]
+
+_ARCS, _POSES = 729, 64  # entries of the table of tips
+_STARTS = 4
+_COARSE_MET = 1e-7  # misfit of a coarse search that needs no better one [L_0]
+_ROUNDS = 4
+_FOLD_MARGIN = 1e-6  # of the last pressure with an equilibrium
+_SAME_SPOT = 1e-3  # of the cost: less is no nearer
+_JUMP = 0.3  # of the bounds: more is a jump along a path
+_SAME_PLACE = 1e-4  # [bar]
+_COMPASS = (0.25, 1e-3)  # first and last step of the search among stable poses, of the bounds
+_MOST_POSES = 150  # that it solves
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Where a coarse search ended: the point, the curvature of its residuals, whether the target is met there."""
+
+    point: Measured
+    second: Array | None
+    met: bool
+    start: int
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """A judged answer: pressure (sets,) [Pa], its pose, the weighed misfit [L_0]."""
+
+    pressure: Array
+    step: Step
+    solved: Solved
+    aimed: Aimed
+    cost: float
+
+
+class InverseSolver:
+    """Solves targets of one task for one model under the same loads; what is compiled or tabulated is kept."""
+
+    def __init__(
+        self, model: Model, numerics: Numerics, loads: Loads, task: InverseTask, method: Literal["newton", "nlp"]
+    ) -> None:
+        self.poses = PoseSolver(model, numerics)
+        self.loads = loads
+        self.task = task
+        self.limits, self.ends = self._limits()
+        self._derivatives = PoseDerivatives(self.poses)
+        self._method = method
+        self._maps: dict[int, GridMap] = {}
+        self._nlps: dict[tuple[int, bool, bool, bool], InverseProblem] = {}
+        self._table: Table | None = None
+        self._intervals: int | None = None
+        loaded = bool(np.any([loads.tip_force, loads.tip_moment, loads.gravity]))
+        self._coarse: TipMap = ArcMap(self.poses)
+        if loaded:
+            self._coarse = self._map(numerics.intervals or self._coarse_intervals())
+
+    def solve(self, target: Target, near: Reached | None) -> tuple[Step, Reached | None]:
+        """Find the pressure for one target, from the last one where there is one. Never raises for a hard target."""
+        began = time.perf_counter()
+        aim = aim_of(self.task, target, float(self.poses.model.robot.length))
+        if self.ends is not None and float(self.limits.lower.sum()) > self.limits.largest_sum:
+            lost = Step(self.task.lower, self.ends[0], self.ends[1], aimed=aim.aimed(None))
+            return replace(lost, solve_time=time.perf_counter() - began), None
+        best: Reached | None = None
+        rejected: Step | None = None
+        chosen = None
+        for found in self._candidates(aim, near):
+            judged = self._finished(aim, found)
+            if isinstance(judged, Step):
+                rejected = judged
+                continue
+            if best is None or judged.cost < best.cost * (1 - _SAME_SPOT):
+                best, chosen = judged, found
+            if self._meets(aim, best) or judged.cost <= aim_cost(found) * (1 + _SAME_SPOT):
+                break
+        if rejected is not None and (best is None or not self._meets(aim, best)):
+            searched = self._searched(aim, best)
+            if searched is not None and (best is None or searched.cost < best.cost * (1 - _SAME_SPOT)):
+                best, chosen = searched, None
+        if best is None:
+            step = rejected or Step(self.task.lower, Status.DIVERGED, Status.DIVERGED.advice)
+            return replace(step, aimed=aim.aimed(None), solve_time=time.perf_counter() - began), None
+        warnings = [*best.step.warnings, *self._jumped(best, chosen, near)]
+        step = replace(best.step, aimed=best.aimed, warnings=tuple(warnings), solve_time=time.perf_counter() - began)
+        if not self._meets(aim, best):
+            message = self._out_of_reach(aim, best, rejected)
+            step = replace(step, status=Status.OUT_OF_REACH, message=message)
+        return step, best
+
+    def forget_table(self) -> None:
+        """Drop the table of starts, for timing what it costs."""
+        self._table = None
+
+    def _candidates(self, aim: Aim, near: Reached | None) -> Iterator[Found]:
+        """Yield where coarse searches end, best first; the first that meets the target at once if no choice is left.
+
+        With more sets than the target needs, every start is searched and the smallest pressures come first.
+        """
+        redundant = self._redundant(aim)
+        ends: list[Found] = []
+        for k, start in enumerate(self._starts(aim, near)):
+            found = self._search(aim, start, k)
+            if found.met and not redundant:
+                yield found
+            ends.append(found)
+        apart: list[Found] = []  # of those that end in one place the first stands for all
+        for found in ends:
+            if all(np.max(np.abs(found.point.z - other.point.z)) > _SAME_PLACE for other in apart):
+                apart.append(found)
+        apart.sort(key=lambda f: (not f.met, float(f.point.z @ f.point.z) if f.met else aim_cost(f)))
+        yield from (found for found in apart if redundant or not found.met)
+
+    def _starts(self, aim: Aim, near: Reached | None) -> Iterator[TipPoint]:
+        """Yield tips of the coarse map: at the last pressure, then of the table."""
+        if near is not None:
+            point = self._coarse.of(near.solved) if isinstance(self._coarse, GridMap) else None
+            point = point or self._coarse.at(near.pressure, None)
+            if point is not None:
+                yield point
+        if self._table is None:
+            loaded = isinstance(self._coarse, GridMap)
+            self._table = tabulated(self._coarse, spread(self.limits, _POSES if loaded else _ARCS) * BAR)
+        for k in self._table.starts(aim, self.limits, _STARTS):
+            point = self._table.points[k]
+            assert point is not None
+            yield point
+
+    def _search(self, aim: Aim, start: TipPoint, k: int) -> Found:
+        """Search on the coarse map from a tip."""
+        point, second, _ = nearest(self._measure(aim, self._coarse), aim.measured(start), self.limits)
+        met = float(np.linalg.norm(point.r)) <= _COARSE_MET
+        if met and self._redundant(aim):
+            begin = aim.conditioned(point.memo)
+            least, second, _ = least_norm(self._measure(aim, self._coarse, met=True), begin, self.limits)
+            if float(np.linalg.norm(least.r)) <= _COARSE_MET:
+                point = aim.measured(least.memo)
+        return Found(point, second, met, k)
+
+    def _redundant(self, aim: Aim) -> bool:
+        """Whether there are more pressures to choose than the target has conditions."""
+        return int(np.sum(self.limits.upper > self.limits.lower)) > aim.conditions
+
+    def _measure(self, aim: Aim, tips: TipMap, *, met: bool = False) -> Map:
+        """Return the misfit by pressure on a map."""
+
+        def measure(z: Array, near: Measured) -> Measured | None:
+            point = tips.at(z * BAR, near.memo)
+            if point is None:
+                return None
+            return aim.conditioned(point) if met else aim.measured(point)
+
+        return measure
+
+    def _finished(self, aim: Aim, found: Found) -> Reached | Step:
+        """Make a coarse answer exact on the grid of its pose and judge it; a step where there is no stable pose."""
+        pressure = found.point.z * BAR
+        exact = 0.3 * self.poses.numerics.accuracy
+        if self._intervals is not None and isinstance(self._coarse, GridMap):
+            refined = self._refined(aim, found, self._intervals, self._coarse.solved(found.point.memo))
+            pressure = pressure if refined is None else refined
+        best: Reached | Step | None = None
+        for _ in range(_ROUNDS):
+            step, solved = self.poses.solve(pressure, self.loads)
+            judged = self._judged(aim, pressure, step, solved)
+            if isinstance(judged, Step) or solved is None:
+                return best or judged
+            settled = isinstance(best, Reached) and judged.cost >= best.cost * (1 - 1e-9)
+            if not isinstance(best, Reached) or judged.cost < best.cost:
+                best = judged
+            found_already = isinstance(self._coarse, ArcMap) and judged.cost <= aim_cost(found) + exact
+            if settled or (found_already and self._method == "newton"):
+                break
+            if judged.cost <= exact and (self._intervals == solved.intervals or not self._redundant(aim)):
+                break
+            self._intervals = solved.intervals
+            refined = self._refined(aim, found, solved.intervals, solved)
+            if refined is None or float(np.max(np.abs(refined - pressure))) < 1e-9 * BAR:
+                break
+            pressure = refined
+        assert best is not None
+        return best
+
+    def _refined(self, aim: Aim, found: Found, intervals: int, solved: Solved) -> Array | None:
+        """Return the pressure found again on a grid, from a pose nearby; None where Newton is lost."""
+        tips = self._map(intervals)
+        point = tips.of(solved)
+        if point is None:
+            return None
+        met = found.met and self._redundant(aim)
+        if self._method == "nlp":
+            return self._by_nlp(aim, tips.intervals, point, meets=met)
+        start = aim.conditioned(point) if met else aim.measured(point)
+        search = least_norm if met else nearest
+        end, _, _ = search(
+            self._measure(aim, tips, met=met), start, self.limits, found.second, measured_curvature=False
+        )
+        return end.z * BAR
+
+    def _by_nlp(self, aim: Aim, intervals: int, point: TipPoint, *, meets: bool) -> Array | None:
+        """Return the pressure that IPOPT finds from a tip."""
+        kind = (intervals, aim.target.position is not None, aim.target.direction is not None, meets)
+        if kind not in self._nlps:
+            self._nlps[kind] = inverse_problem(self.poses, intervals, aim, self.limits, meets=meets)
+        solution = self._nlps[kind].solve(self.poses, self.loads, aim, point.pressure, point.x)
+        if not solution.holds(self.poses.numerics.tolerance):
+            return None
+        return pressure_of(self._nlps[kind], solution, self.limits)
+
+    def _judged(self, aim: Aim, pressure: Array, step: Step, solved: Solved | None) -> Reached | Step:
+        """Return a stable pose as an answer, else the step that says why there is none."""
+        if step.pose is None or solved is None:
+            return step
+        if not step.pose.stable:
+            message = "the target is met by an equilibrium that is not stable only: the real robot buckles away from it"
+            return Step(pressure, Status.OUT_OF_REACH, message, residual=step.residual)
+        aimed = aim.aimed(step.pose)
+        return Reached(pressure, step, solved, aimed, aim.cost(aimed))
+
+    def _meets(self, aim: Aim, reached: Reached) -> bool:
+        """Whether a pose is within the accuracy asked for: of L_0, and as many radians."""
+        accuracy = self.poses.numerics.accuracy
+        distance, angle = reached.aimed.distance, reached.aimed.angle
+        return (distance is None or distance <= accuracy * aim.length) and (angle is None or angle <= accuracy)
+
+    def _searched(self, aim: Aim, best: Reached | None) -> Reached | None:
+        """Search among stable poses without derivatives: where they end there is no slope to follow."""
+        span = (self.limits.upper - self.limits.lower) * BAR
+        here = best
+        if here is None:
+            assert self._table is not None
+            for k in self._table.starts(aim, self.limits, len(self._table.pressures)):
+                judged = self._at(aim, self._table.pressures[k])
+                if isinstance(judged, Reached):
+                    here = judged
+                    break
+        if here is None:
+            return None
+        size, last = _COMPASS
+        moves = np.vstack([np.eye(span.size), -np.eye(span.size)])
+        spent = 0
+        while size > last and spent < _MOST_POSES:
+            for move in moves:
+                z = self.limits.clip((here.pressure + size * move * span) / BAR)
+                if np.max(np.abs(z * BAR - here.pressure)) < 1e-6 * BAR:
+                    continue
+                judged = self._at(aim, z * BAR)
+                spent += 1
+                if isinstance(judged, Reached) and judged.cost < here.cost:
+                    here = judged
+                    break
+            else:
+                size /= 2
+        return here
+
+    def _at(self, aim: Aim, pressure: Array) -> Reached | Step:
+        step, solved = self.poses.solve(pressure, self.loads)
+        return self._judged(aim, pressure, step, solved)
+
+    def _jumped(self, best: Reached, chosen: Found | None, near: Reached | None) -> list[str]:
+        """Return a warning where the answer does not continue the one before."""
+        if near is None or (chosen is not None and chosen.start == 0):
+            return []
+        span = np.maximum(self.task.upper - self.task.lower, 1e-9)
+        if float(np.max(np.abs(best.pressure - near.pressure) / span)) <= _JUMP:
+            return []
+        old, new = (", ".join(f"{p / BAR:.3g}" for p in r.pressure) for r in (near, best))
+        return [f"the pressures jump from ({old}) to ({new}) bar: followed from the target before, none is as near"]
+
+    def _out_of_reach(self, aim: Aim, best: Reached, rejected: Step | None) -> str:
+        """Say how near the tip comes."""
+        left = []
+        if best.aimed.distance is not None:
+            left.append(f"{best.aimed.distance / MILLIMETRE:.6g} mm away")
+        if best.aimed.angle is not None:
+            left.append(f"{best.aimed.angle / DEGREE:.6g} degrees off")
+        assert best.aimed.tip_position is not None
+        tip = ", ".join(f"{x / MILLIMETRE + 0.0:.2f}" for x in np.round(best.aimed.tip_position, 8))
+        text = f"{Status.OUT_OF_REACH.advice}; the nearest tip is {' and '.join(left)}, at ({tip}) mm"
+        if self.ends is not None and best.pressure.sum() > 0.999 * self.limits.largest_sum * BAR:
+            text += f"; pressures end where the stretch does ({self.ends[0].value})"
+        return text if rejected is None else f"{text}; nearer equilibria are not stable or not found"
+
+    def _map(self, intervals: int) -> GridMap:
+        if intervals not in self._maps:
+            self._maps[intervals] = GridMap(self._derivatives, intervals, self.loads)
+        return self._maps[intervals]
+
+    def _limits(self) -> tuple[Limits, tuple[Status, str] | None]:
+        """Return the bounds and the largest sum of pressures that has an equilibrium, with what ends it.
+
+        The stretch balance holds the pressures by their sum alone; the stiffnesses may tell sets apart, so the
+        least sum of the bounds' corners is taken.
+        """
+        lower, upper = self.task.lower, self.task.upper
+        largest, ends = float(np.sum(upper)), None
+        corners = [upper, *(np.where(np.arange(upper.size) == k, upper.sum(), 0.0) for k in range(upper.size))]
+        for corner in corners:
+            branch = stretch_on_branch(self.poses.branch, self.poses.column({"pressure": corner}), corner)
+            if not branch.status.has_solution and branch.fraction * corner.sum() < largest:
+                largest = (1 - _FOLD_MARGIN) * branch.fraction * float(corner.sum())
+                ends = (branch.status, branch.message)
+        return Limits(lower / BAR, upper / BAR, largest / BAR), ends
+
+    def _coarse_intervals(self) -> int:
+        """Return a grid that holds the most curled unloaded arc within the bounds."""
+        top = self.limits.largest_sum
+        most = 0
+        for k in range(self.task.upper.size):
+            z = self.limits.clip(np.where(np.arange(self.task.upper.size) == k, min(self.limits.upper[k], top), 0.0))
+            column = self.poses.column({"pressure": z * BAR})
+            branch = stretch_on_branch(self.poses.branch, column, z * BAR)
+            most = max(most, self.poses.first_intervals(column, branch.stretch))
+        return most
+
+
+def aim_cost(found: Found) -> float:
+    """Return the weighed misfit of a coarse answer [L_0]."""
+    return float(np.linalg.norm(found.point.r))

@@ -1,0 +1,155 @@
+"""Everything that sensitivities say of one pose: Jacobian, compliance, ellipsoids, error bars."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.errors import InputError, nearest
+from softnlp.materials import Material
+from softnlp.numerics import Numerics
+from softnlp.quantities import Model, quantities
+from softnlp.robot import DIMENSIONS, Robot
+from softnlp.rod import Loads
+from softnlp.studies.ellipsoids import (
+    Ellipsoid,
+    Manipulability,
+    compliance_ellipsoid,
+    manipulability,
+    stiffness_ellipsoid,
+)
+from softnlp.studies.sensitivity import Sensitivities, sensitivities
+from softnlp.studies.step import Pose
+from softnlp.studies.tolerances import ErrorBars, Sampled, error_bars, monte_carlo
+from softnlp.units import BAR, NEWTON_MILLIMETRE
+
+Array = NDArray[np.float64]
+
+OUTPUTS = ("tip_position", "tip_rotation", "bending_angle", "elongation", "stretch", "chamber_lengths")
+
+
+@dataclass(frozen=True, eq=False)
+class SensitivityReport:
+    """Sensitivities of one pose by every quantity, and what follows from them; NaN where the pose did not solve.
+
+    bars, sampled : with tolerances, else None.
+    """
+
+    robot: Robot
+    material: Material
+    sensitivities: Sensitivities
+    manipulability: Manipulability
+    compliance: Ellipsoid
+    stiffness: Ellipsoid
+    bars: ErrorBars | None
+    sampled: Sampled | None
+
+    @property
+    def solved(self) -> bool:
+        """Whether the pose was solved and has derivatives."""
+        return self.sensitivities.solved
+
+    @property
+    def pose(self) -> Pose | None:
+        """The pose."""
+        return self.sensitivities.step.pose
+
+
+def sensitivity_report(
+    robot: Robot,
+    material: Material,
+    pressure: Any,
+    tolerances: Mapping[str, float] | None = None,
+    *,
+    loads: Loads = Loads(),
+    coefficients: Coefficients = Coefficients(),
+    conventions: Conventions = REPRODUCTION,
+    numerics: Numerics = Numerics(),
+    samples: int = 200,
+    progress: Callable[[int], None] | None = None,
+) -> SensitivityReport:
+    """Solve one pose and differentiate it by every quantity of the model.
+
+    tolerances : standard deviations by name, SI, as `softnlp.studies.tolerances.error_bars` takes them. samples : of
+    the check by Monte Carlo, 0 for none. The rest as `sensitivities`, and raises as it.
+    """
+    every = list(quantities(Model(robot, material, coefficients, conventions)))
+    found = sensitivities(
+        robot,
+        material,
+        pressure,
+        outputs=OUTPUTS,
+        by=every,
+        loads=loads,
+        coefficients=coefficients,
+        conventions=conventions,
+        numerics=numerics,
+    )
+    bars = sampled = None
+    if tolerances:
+        bars = error_bars(found, tolerances)
+        if samples and found.point is not None:
+            sampled = monte_carlo(found, tolerances, samples, progress=progress)
+    return SensitivityReport(
+        robot,
+        material,
+        found,
+        manipulability(found),
+        compliance_ellipsoid(found),
+        stiffness_ellipsoid(found),
+        bars,
+        sampled,
+    )
+
+
+def named_tolerances(
+    given: Sequence[str], robot: Robot, material: Material, coefficients: Coefficients, pressure: Array
+) -> dict[str, float]:
+    """Return tolerances, SI, by the quantity's name, from "NAME=VALUE" or "NAME=VALUE%" with the keys of a scenario.
+
+    Raises
+    ------
+    InputError
+        For a name that is not known, a value that is not a number, or a percentage of what is 0.
+    """
+    declared = quantities(Model(robot, material, coefficients))
+    keys: dict[str, tuple[str, float]] = {
+        d.file_key: (f"robot.{d.field}", d.scale) for d in DIMENSIONS if d.scale is not None
+    }
+    keys |= {c.file_key: (f"material.{c.name}", c.scale) for c in material.law.constants}
+    keys |= {name.partition(".")[2]: (name, 1.0) for name in declared if name.startswith(("stiff", "corr"))}
+    keys |= {
+        "density_kg_m3": ("material.density", 1.0),
+        "pressure_bar": ("pressure", BAR),
+        "force_N": ("tip_force", 1.0),
+        "moment_Nmm": ("tip_moment", NEWTON_MILLIMETRE),
+    }
+    found: dict[str, float] = {}
+    for text in given:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        if not equals:
+            raise InputError(f"expected NAME=VALUE, got {text!r}", key="--tolerance")
+        if key not in keys:
+            raise InputError(f"unknown name {key!r}{nearest(key, keys)}", key="--tolerance")
+        name, scale = keys[key]
+        try:
+            number = float(value.removesuffix("%"))
+        except ValueError:
+            raise InputError(f"{key}: expected a number, got {value!r}", key="--tolerance") from None
+        if not (np.isfinite(number) and number >= 0):
+            raise InputError(f"{key}: expected a number that is not negative, got {value}", key="--tolerance")
+        if not value.endswith("%"):
+            found[name] = number * scale
+        elif name == "pressure":
+            for k, P in enumerate(pressure):
+                found[f"pressure.{k + 1}"] = number / 100 * float(P)
+        elif declared[name].size == 1 and float(declared[name].nominal[0]) != 0:
+            found[name] = number / 100 * abs(float(declared[name].nominal[0]))
+        else:
+            raise InputError(f"{key}: expected a number and no percentage of what may be 0", key="--tolerance")
+    return found
