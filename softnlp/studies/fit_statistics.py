@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 CLOSE = 0.99  # two constants whose estimates are correlated more than this are hardly told apart
 POORLY_CONDITIONED = 1e4  # of the Jacobian with columns of length one
 _LEAST_UNUSED = 0.1
+_NOTHING = 1e-6  # of the largest size: such as the angle of a straight shape
 SINGULAR = 1e10  # beyond it a combination of constants is open altogether
 
 
@@ -45,8 +46,8 @@ class Misfit:
 
 
 def misfit(errors: Array, sizes: Array) -> Misfit:
-    """Return the misfit of errors, each compared with a size; those of size 0 count for the rmse alone."""
-    compared = np.abs(sizes) > 0
+    """Return the misfit of errors, each compared with a size; where that is next to nothing, for the rmse alone."""
+    compared = np.abs(sizes) > _NOTHING * np.max(np.abs(sizes))
     percent = 100 * np.mean(np.abs(errors[compared]) / np.abs(sizes[compared])) if np.any(compared) else np.nan
     return Misfit(errors.size, float(np.sqrt(np.mean(errors**2))), float(percent))
 
@@ -67,7 +68,7 @@ def uncertainty(names: Sequence[str], J: Array, residuals: Array, held: Sequence
     lengths = np.linalg.norm(J[:, free], axis=0)
     U, s, Vt = np.linalg.svd(J[:, free] / np.where(lengths > 0, lengths, 1.0), full_matrices=False)
     condition = float(s[0] / s[-1]) if s[-1] > 0 and m >= free.size else np.inf
-    freed = [names[k] for k in free]
+    freed = [names[int(k)] for k in free]
     if not condition < SINGULAR:
         weak = _weak_directions(Vt, s)
         opened = np.flatnonzero(np.max(np.abs(weak), axis=0) > 1e-3)
@@ -111,7 +112,7 @@ def _close_pairs(names: Sequence[str], correlation: Array) -> list[str]:
 def _undetermined(names: Sequence[str], direction: Array, how: str = "do not determine") -> str:
     """Say which constants have most part in a direction that the data leave open."""
     order = np.argsort(-np.abs(direction))[:2]
-    chosen = [names[k] for k in order if abs(direction[k]) > 1e-3]
+    chosen = [names[int(k)] for k in order if abs(direction[k]) > 1e-3]
     if len(chosen) < 2:
         return f"the data {how} {chosen[0]}: fix it, or add measurements that depend on it"
     return f"the data {how} {chosen[0]} and {chosen[1]} apart: fix one of them, or add measurements of another kind"

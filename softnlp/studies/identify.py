@@ -1,0 +1,359 @@
+"""Identification: constants of the model from measurements of one or several robots, as one least-squares problem.
+
+Every number measured gives a residual (model - measured) / sigma; the constants are shared by all. The poses are the
+solutions of the model's equations at the trial constants, and their derivatives are exact, so this is Gauss-Newton in
+a trust region (scipy's `least_squares`) on the constants alone; `softnlp.studies.identify_nlp` solves the same problem
+with all poses as unknowns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.contact_settings import ContactSettings
+from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.errors import InputError, MaterialError
+from softnlp.materials import Material
+from softnlp.numerics import Numerics
+from softnlp.quantities import Model
+from softnlp.rod import Loads
+from softnlp.status import Status
+from softnlp.studies.fit_statistics import Misfit, Uncertainty, misfit, uncertainty
+from softnlp.studies.forward import checked_loads
+from softnlp.studies.free_constants import FreeConstants, free_constants
+from softnlp.studies.measurements import (
+    COLUMNS,
+    OBSERVABLES,
+    POSE_COLUMNS,
+    Data,
+    Measurements,
+    checked_measurements,
+    column_slice,
+)
+from softnlp.studies.predicted_force import BlockedForces
+from softnlp.studies.predicted_pose import ArcPoses, Failure, FreePoses, LoadedPoses, Prediction
+from softnlp.studies.trial import TrialBlocked, TrialPoses
+from softnlp.studies.wall import checked_contact
+
+Array = NDArray[np.float64]
+
+_MOST_EVALUATIONS = 200
+_MOVED = 1e-4  # relative; constants that move more are followed once more from zero pressure
+_AT_BOUND = 1e-6  # of the distance between start and bound, or of the constant's scale
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """What an identification found. SI units.
+
+    status : solved, or why the model could not be compared with the measurements; `message` says where. free : names,
+    start and bounds. constants : (n,) found, nan where nothing was. at_bound : names of those at a bound.
+    uncertainty : of the constants. material, coefficients : with the constants found.
+    data : the measurements; before, after : (rows, 6) each, the model at the start and at the end, in the order of
+    `COLUMNS`, nan where nothing was measured. evaluations : how often all poses were solved.
+    """
+
+    status: Status
+    message: str
+    free: FreeConstants
+    constants: Array
+    at_bound: tuple[str, ...]
+    uncertainty: Uncertainty
+    material: Material
+    coefficients: Coefficients
+    data: tuple[Data, ...]
+    before: tuple[Array, ...]
+    after: tuple[Array, ...]
+    evaluations: int
+    warnings: tuple[str, ...]
+
+    def errors(self, after: bool = True) -> dict[str, Misfit]:
+        """Return the misfit by observable over all robots [m, rad, N].
+
+        A tip position's error is a distance, compared with the robot's length; others are compared with the number
+        measured.
+        """
+        return observable_misfits(self.data, self.after if after else self.before)
+
+
+def observable_misfits(data: Sequence[Data], predicted: Sequence[Array]) -> dict[str, Misfit]:
+    """Return the misfit of predictions by observable, see `Identified.errors`."""
+    found = {}
+    for observable in OBSERVABLES:
+        errors, sizes = [], []
+        for d, values in zip(data, predicted, strict=True):
+            difference = (values - d.values)[:, column_slice(observable)]
+            rows = np.any(np.isfinite(d.of(observable)), axis=1)
+            errors.append(np.sqrt(np.nansum(difference[rows] ** 2, axis=1)))
+            length = np.full(int(np.sum(rows)), float(d.robot.length))
+            sizes.append(length if observable == "tip_position" else d.of(observable)[rows, 0])
+        if sum(e.size for e in errors):
+            found[observable] = misfit(np.concatenate(errors), np.concatenate(sizes))
+    return found
+
+
+def identify(
+    measurements: Measurements | Sequence[Measurements],
+    material: Material,
+    free: Sequence[str],
+    *,
+    coefficients: Coefficients = Coefficients(),
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    contact: ContactSettings = ContactSettings(),
+    loads: Loads = Loads(),
+    conventions: Conventions = REPRODUCTION,
+    numerics: Numerics = Numerics(),
+    progress: Callable[[int, float], None] | None = None,
+) -> Identified:
+    """Find the constants that bring the model nearest to the measurements.
+
+    Parameters
+    ----------
+    measurements
+        Of one robot or of several that share the constants.
+    material, coefficients
+        Where the constants start, and the values of those that are not free.
+    free
+        Of "k_e", "k_b", "k_a", "k_i", "phi", "k_c" and the names of the material's constants, such as "C10".
+    bounds
+        (lower, upper) by name, SI, in place of the default ones.
+    contact, loads, conventions, numerics
+        As `softnlp.blocked_force`; the same in every measurement.
+    progress
+        Called with the number of evaluations and the root mean square of the residuals.
+
+    Raises
+    ------
+    InputError
+        For measurements, names or bounds that are not right, fewer numbers than constants, or a constant that no
+        measurement depends on.
+
+    """
+    given = (measurements,) if isinstance(measurements, Measurements) else tuple(measurements)
+    if not given:
+        raise InputError("expected measurements of at least one robot", key="measurements")
+    data = tuple(checked_measurements(m) for m in given)
+    chosen = free_constants(free, material, coefficients, bounds)
+    count = sum(int(np.sum(d.measured)) for d in data)
+    if count < len(free):
+        raise InputError(f"{count} numbers measured cannot determine {len(free)} constants", key="free")
+    loads, contact = checked_loads(loads), checked_contact(contact)
+    if contact.closure == "weighted" and any(np.any(d.measured[:, -1]) for d in data):
+        raise InputError("expected a closure that has a definite force; 'weighted' depends on weights", key="closure")
+    models = [
+        _Predicted(d, Model(d.robot, material, coefficients, conventions), chosen, contact, loads, numerics)
+        for d in data
+    ]
+    return _Fit(data, models, chosen, material, coefficients, progress).solve()
+
+
+class _Predicted:
+    """Everything measured of one robot, as the model predicts it."""
+
+    def __init__(
+        self,
+        data: Data,
+        model: Model,
+        free: FreeConstants,
+        contact: ContactSettings,
+        loads: Loads,
+        numerics: Numerics,
+    ) -> None:
+        self._data = data
+        poses = TrialPoses(model, numerics)
+        unloaded = not np.any([loads.tip_force, loads.tip_moment, loads.gravity])
+        self._poses: FreePoses = (
+            ArcPoses(poses, data.pressure, free.quantities)
+            if unloaded
+            else LoadedPoses(poses, data.pressure, loads, free.quantities)
+        )
+        self._rows = np.flatnonzero(data.measured[:, -1])
+        self._forces: BlockedForces | None = None
+        if self._rows.size:
+            accurate = TrialPoses(model, numerics, unloaded_accuracy=numerics.accuracy)
+            solver = TrialBlocked(model, numerics, contact, poses=accurate)
+            self._forces = BlockedForces(solver, data.pressure[self._rows], loads, free.quantities)
+
+    def evaluate(self, constants: Mapping[str, float], anew: bool) -> Prediction:
+        """Return the values in the order of `COLUMNS`, and their derivatives."""
+        poses = self._poses.evaluate(constants, anew)
+        k, n = len(POSE_COLUMNS), poses.slopes.shape[-1]
+        rows = len(self._data.pressure)
+        values, slopes = np.full((rows, len(COLUMNS)), np.nan), np.full((rows, len(COLUMNS), n), np.nan)
+        values[:, :k], slopes[:, :k] = poses.values[:, :k], poses.slopes[:, :k]
+        failures = poses.failures
+        if self._forces is not None and not failures:
+            r = self._rows
+            forces = self._forces.evaluate(constants, poses.values[r, k:], poses.slopes[r, k:], anew)
+            values[r, k:], slopes[r, k:] = forces.values, forces.slopes
+            failures = tuple(Failure(int(r[f.row]), f.status, f.message) for f in forces.failures)
+        return Prediction(values, slopes, failures)
+
+
+class _Fit:
+    """The least-squares problem of an identification."""
+
+    def __init__(
+        self,
+        data: tuple[Data, ...],
+        models: Sequence[_Predicted],
+        free: FreeConstants,
+        material: Material,
+        coefficients: Coefficients,
+        progress: Callable[[int, float], None] | None,
+    ) -> None:
+        self.data = data
+        self.models = models
+        self.free = free
+        self.material = material
+        self.coefficients = coefficients
+        self.progress = progress
+        self.evaluations = 0
+        self.measured = [d.measured for d in data]
+        self._last: tuple[Array, list[Prediction]] | None = None
+
+    def solve(self) -> Identified:
+        """Minimise from the start; then follow every pose again from zero pressure, to be sure of its branch."""
+        first = self.predictions(self.free.start, anew=True)
+        if (lost := self._lost(first)) is not None:
+            return self._unsolved(*lost, first)
+        self._require_dependence(first)
+        x = self._minimise(self.free.start)
+        last = self.predictions(x, anew=True)
+        if (lost := self._lost(last)) is not None:
+            return self._unsolved(*lost, first)
+        again = self._minimise(x)  # on the grids that suit the poses there
+        last = self.predictions(
+            again, anew=bool(np.any(np.abs(again - x) > _MOVED * np.maximum(np.abs(x), self.free.scale)))
+        )
+        if (lost := self._lost(last)) is not None:
+            return self._unsolved(*lost, first)
+        return self._found(again, first, last)
+
+    def predictions(self, x: Array, anew: bool = False) -> list[Prediction]:
+        """Return what the model says of every robot; the last result is kept."""
+        if not anew and self._last is not None and np.array_equal(self._last[0], x):
+            return self._last[1]
+        values = self.free.values(x)
+        found = [model.evaluate(values, anew) for model in self.models]
+        self.evaluations += 1
+        self._last = (x.copy(), found)
+        if self.progress is not None:
+            r = self.residuals(found)
+            self.progress(self.evaluations, float(np.sqrt(np.mean(r**2))))
+        return found
+
+    def residuals(self, found: Sequence[Prediction]) -> Array:
+        """Return the weighted residuals of all numbers measured; nan where a pose was not found."""
+        parts = []
+        for d, prediction, mask in zip(self.data, found, self.measured, strict=True):
+            parts.append(((prediction.values - d.values) / d.sigma * d.root_weight[:, None])[mask])
+        return np.concatenate(parts)
+
+    def jacobian(self, found: Sequence[Prediction]) -> Array:
+        """Return the derivative of the weighted residuals by the constants."""
+        parts = []
+        for d, prediction, mask in zip(self.data, found, self.measured, strict=True):
+            parts.append((prediction.slopes / d.sigma[:, :, None] * d.root_weight[:, None, None])[mask])
+        return np.concatenate(parts)
+
+    def _minimise(self, start: Array) -> Array:
+        from scipy.optimize import least_squares
+
+        free = self.free
+        scale = free.scale
+        done = least_squares(
+            lambda z: self.residuals(self.predictions(z * scale)),
+            start / scale,
+            jac=lambda z: self.jacobian(self.predictions(z * scale)) * scale,
+            bounds=(free.lower / scale, free.upper / scale),
+            x_scale="jac",
+            ftol=1e-14,
+            xtol=1e-12,
+            gtol=1e-14,
+            max_nfev=_MOST_EVALUATIONS,
+        )
+        return np.asarray(done.x) * scale
+
+    def _lost(self, found: Sequence[Prediction]) -> tuple[Status, str] | None:
+        """Return the status of the first measurement that the model has no pose for."""
+        for d, prediction in zip(self.data, found, strict=True):
+            for failure in prediction.failures:
+                where = f"{d.label}, measurement {failure.row + 1}"
+                return failure.status, f"{where}: {failure.message}"
+        return None
+
+    def _require_dependence(self, found: Sequence[Prediction]) -> None:
+        """Refuse a constant that no measurement depends on."""
+        J = np.abs(self.jacobian(found)) * self.free.scale
+        for k, name in enumerate(self.free.names):
+            if not np.max(J[:, k]) > 0:
+                raise InputError(f"no measurement depends on {name!r}; fix it", key="free")
+
+    def _held(self, x: Array) -> list[bool]:
+        """Whether each constant is at a bound."""
+        free = self.free
+        near = _AT_BOUND * np.maximum(free.scale, np.abs(x))
+        return [bool(v) for v in (x - free.lower < near) | (free.upper - x < near)]
+
+    def _found(self, x: Array, first: Sequence[Prediction], last: Sequence[Prediction]) -> Identified:
+        held = self._held(x)
+        at_bound = tuple(name for name, h in zip(self.free.names, held, strict=True) if h)
+        known = uncertainty(self.free.names, self.jacobian(last), self.residuals(last), held)
+        warnings = list(known.warnings)
+        for k, name in enumerate(self.free.names):
+            if held[k]:
+                warnings.append(
+                    f"{name} ended at its bound {x[k]:.4g}; it was held there for the other standard errors"
+                )
+        status, message = Status.SOLVED, "the sum of squares is at a minimum"
+        material, coefficients = self.material, self.coefficients
+        try:
+            material, coefficients = self.free.applied(x, material, coefficients)
+        except MaterialError as error:
+            status, message = Status.UNSTABLE_MATERIAL, f"the constants found are no material: {error.message}"
+        return self._result(status, message, x, at_bound, known, material, coefficients, first, last, warnings)
+
+    def _unsolved(self, status: Status, message: str, first: Sequence[Prediction]) -> Identified:
+        n = len(self.free.names)
+        nothing = Uncertainty(np.full(n, np.nan), np.full((n, n), np.nan), np.nan, ())
+        nowhere = [Prediction(np.full_like(p.values, np.nan), p.slopes, ()) for p in first]
+        x = np.full(n, np.nan)
+        return self._result(status, message, x, (), nothing, self.material, self.coefficients, first, nowhere, [])
+
+    def _result(
+        self,
+        status: Status,
+        message: str,
+        x: Array,
+        at_bound: tuple[str, ...],
+        known: Uncertainty,
+        material: Material,
+        coefficients: Coefficients,
+        first: Sequence[Prediction],
+        last: Sequence[Prediction],
+        warnings: Sequence[str],
+    ) -> Identified:
+        before, after = (
+            tuple(np.where(m, p.values, np.nan) for p, m in zip(every, self.measured, strict=True))
+            for every in (first, last)
+        )
+        return Identified(
+            status=status,
+            message=message,
+            free=self.free,
+            constants=x,
+            at_bound=at_bound,
+            uncertainty=known,
+            material=material,
+            coefficients=coefficients,
+            data=self.data,
+            before=before,
+            after=after,
+            evaluations=self.evaluations,
+            warnings=tuple(warnings),
+        )
