@@ -43,7 +43,9 @@ Array = NDArray[np.float64]
 
 _MOST_EVALUATIONS = 200
 _MOVED = 1e-4  # relative; constants that move more are followed once more from zero pressure
-_AT_BOUND = 1e-6  # of the distance between start and bound, or of the constant's scale
+_TIGHT = 1e-13
+_NEARLY = 1e-2  # of a constant or its scale: a rough search that ends nearer to a bound is about to reach it
+_AT_BOUND = 1e-6  # of a constant or its scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,22 +264,53 @@ class _Fit:
         return np.concatenate(parts)
 
     def _minimise(self, start: Array) -> Array:
+        """Return the constants at the minimum within the bounds.
+
+        An interior method comes near a bound ever more slowly. So the first search is a rough one; what has then all
+        but reached a bound that the sum of squares pushes it against is held there while the others are found.
+        """
+        free = self.free
+        every = np.ones(start.size, bool)
+        x = self._search(start, every, 1e-7)
+        near = _NEARLY * np.maximum(free.scale, np.abs(x))
+        low, high = x - free.lower < near, free.upper - x < near
+        bound = np.where(low, free.lower, np.where(high, free.upper, x))
+        moving = ~(low | high)
+        if np.all(moving) or not np.any(moving):
+            return self._search(bound, every, _TIGHT)
+        held = self._search(bound, moving, _TIGHT)
+        found = self.predictions(held)
+        if self._lost(found) is None:
+            slope = self.jacobian(found).T @ self.residuals(found)
+            if np.all(slope[low] >= 0) and np.all(slope[high] <= 0):
+                return held
+        return self._search(x, every, _TIGHT)
+
+    def _search(self, start: Array, moving: NDArray[np.bool_], tolerance: float) -> Array:
+        """Return the minimum over the constants that move."""
         from scipy.optimize import least_squares
 
-        free = self.free
-        scale = free.scale
+        scale = self.free.scale
+
+        def at(z: Array) -> list[Prediction]:
+            x = start.copy()
+            x[moving] = z * scale[moving]
+            return self.predictions(x)
+
         done = least_squares(
-            lambda z: self.residuals(self.predictions(z * scale)),
-            start / scale,
-            jac=lambda z: self.jacobian(self.predictions(z * scale)) * scale,
-            bounds=(free.lower / scale, free.upper / scale),
+            lambda z: self.residuals(at(z)),
+            start[moving] / scale[moving],
+            jac=lambda z: (self.jacobian(at(z)) * scale)[:, moving],
+            bounds=(self.free.lower[moving] / scale[moving], self.free.upper[moving] / scale[moving]),
             x_scale="jac",
-            ftol=1e-14,
-            xtol=1e-12,
-            gtol=1e-14,
+            ftol=tolerance,
+            xtol=tolerance,
+            gtol=_TIGHT,
             max_nfev=_MOST_EVALUATIONS,
         )
-        return np.asarray(done.x) * scale
+        x = start.copy()
+        x[moving] = done.x * scale[moving]
+        return x
 
     def _lost(self, found: Sequence[Prediction]) -> tuple[Status, str] | None:
         """Return the status of the first measurement that the model has no pose for."""
