@@ -39,8 +39,11 @@ if TYPE_CHECKING:
     from softnlp.scenario import load_scenario as load_scenario
     from softnlp.status import Status as Status
     from softnlp.studies.forward import forward as forward
+    from softnlp.studies.identify import identify as identify
+    from softnlp.studies.measurements import Measurements as Measurements
     from softnlp.studies.step import Run as Run
     from softnlp.studies.step import Step as Step
+    from softnlp.studies.tensile import fit_tensile as fit_tensile
     from softnlp.units import BAR as BAR
     from softnlp.units import DEGREE as DEGREE
     from softnlp.units import MILLIMETRE as MILLIMETRE
@@ -59,7 +62,10 @@ _HOMES = {
     "scenario": ("load_scenario",),
     "status": ("Status",),
     "studies.forward": ("forward",),
+    "studies.identify": ("identify",),
+    "studies.measurements": ("Measurements",),
     "studies.step": ("Run", "Step"),
+    "studies.tensile": ("fit_tensile",),
     "units": ("BAR", "DEGREE", "MILLIMETRE", "NEWTON_MILLIMETRE"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}

@@ -11,10 +11,12 @@ from pydantic_core import ErrorDetails
 from softnlp.errors import InputError, nearest
 from softnlp.reading import choices, did_you_mean, one_line, shown
 from softnlp.scenario_schema import BlockedForceFile, ForwardFile, ScenarioFile
+from softnlp.schema_identify import IdentifyFile
 
 SCHEMAS: Mapping[str, type[ScenarioFile]] = {
     "forward": ForwardFile,
     "blocked-force": BlockedForceFile,
+    "identify": IdentifyFile,
 }
 """The studies that this version runs, and the file of each."""
 
@@ -152,6 +154,8 @@ def _keys(schema: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
 def _model(schema: type[BaseModel], loc: tuple[int | str, ...]) -> type[BaseModel]:
     """Return the table at a place of the file."""
     for part in loc:
+        if part not in schema.model_fields:
+            continue  # a name that a person gave, as in [robots.NAME]
         annotation = schema.model_fields[str(part)].annotation
         candidates = (annotation, *get_args(annotation))
         schema = next(a for a in candidates if isinstance(a, type) and issubclass(a, BaseModel))

@@ -30,9 +30,26 @@ LAYERS = (
         "studies.wall",
         "studies.weighted",
     ),
+    *(
+        "studies.fit_statistics",
+        "studies.tensile",
+        "studies.measurements",
+        "studies.free_constants",
+        "studies.implicit",
+    ),
     *("studies.free_shape", "studies.blocked_grid", "studies.blocked_step", "studies.blocked", "studies.multistart"),
+    *("studies.trial", "studies.predicted_pose", "studies.predicted_force", "studies.identify_task"),
     *("studies.force_inversion", "studies.*"),
-    *("scenario_schema", "scenario_check", "pressures", "scenario_contact", "scenario"),
+    *(
+        "scenario_schema",
+        "schema_identify",
+        "scenario_check",
+        "pressures",
+        "columns",
+        "scenario_identify",
+        "scenario_contact",
+        "scenario",
+    ),
     *("runner_blocked", "runner", "results", "plots", "cli", "__main__"),
 )
 MIXED = ("results", "plots", "cli")

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from softnlp.scenario import Scenario
     from softnlp.studies.step import Run, Step
 
-_COMMANDS: Mapping[str, str] = {}
+_COMMANDS: Mapping[str, str] = {
+    "identify": "identify",
+}
 """Studies whose result is no list of steps: which module of this package has the `run_study` that runs a scenario."""
 
 _TABLE_WIDTH = 100
