@@ -146,38 +146,31 @@ def identify(
     loads, contact = checked_loads(loads), checked_contact(contact)
     if contact.closure == "weighted" and any(np.any(d.measured[:, -1]) for d in data):
         raise InputError("expected a closure that has a definite force; 'weighted' depends on weights", key="closure")
-    models = [
-        _Predicted(d, Model(d.robot, material, coefficients, conventions), chosen, contact, loads, numerics)
-        for d in data
-    ]
+    kinds: dict[tuple[int, int], TrialBlocked] = {}
+    models = []
+    for d in data:
+        kind = (d.robot.chamber_sets, d.robot.chambers_per_set)
+        if kind not in kinds:
+            model = Model(d.robot, material, coefficients, conventions)
+            kinds[kind] = TrialBlocked(TrialPoses(model, numerics), contact)
+        models.append(_Predicted(d, kinds[kind].of(d.robot), chosen, loads))
     return _Fit(data, models, chosen, material, coefficients, progress).solve()
 
 
 class _Predicted:
     """Everything measured of one robot, as the model predicts it."""
 
-    def __init__(
-        self,
-        data: Data,
-        model: Model,
-        free: FreeConstants,
-        contact: ContactSettings,
-        loads: Loads,
-        numerics: Numerics,
-    ) -> None:
+    def __init__(self, data: Data, solver: TrialBlocked, free: FreeConstants, loads: Loads) -> None:
         self._data = data
-        poses = TrialPoses(model, numerics)
         unloaded = not np.any([loads.tip_force, loads.tip_moment, loads.gravity])
         self._poses: FreePoses = (
-            ArcPoses(poses, data.pressure, free.quantities)
+            ArcPoses(solver.poses, data.pressure, free.quantities)
             if unloaded
-            else LoadedPoses(poses, data.pressure, loads, free.quantities)
+            else LoadedPoses(solver.poses, data.pressure, loads, free.quantities)
         )
         self._rows = np.flatnonzero(data.measured[:, -1])
         self._forces: BlockedForces | None = None
         if self._rows.size:
-            accurate = TrialPoses(model, numerics, unloaded_accuracy=numerics.accuracy)
-            solver = TrialBlocked(model, numerics, contact, poses=accurate)
             self._forces = BlockedForces(solver, data.pressure[self._rows], loads, free.quantities)
 
     def evaluate(self, constants: Mapping[str, float], anew: bool) -> Prediction:

@@ -37,7 +37,6 @@ class BlockedForces:
         self._wall: Wall | None = None
         self._known: dict[int, Blocked] = {}
         self._failures: tuple[Failure, ...] = ()
-        self._derivatives: dict[int, SolutionDerivatives] = {}
 
     def evaluate(self, constants: Mapping[str, float], lengths: Array, slopes: Array, anew: bool = False) -> Prediction:
         """Return the forces (rows, 1) [N] and their derivatives.
@@ -94,8 +93,7 @@ class BlockedForces:
     def _force(self, solver: TrialBlocked, found: Blocked, slopes: Array) -> tuple[Array, Array]:
         """Return the force of a blocked shape and its derivatives."""
         grid, p = found.grid, found.solution.p
-        if grid.intervals not in self._derivatives:
-            self._derivatives[grid.intervals] = _force_derivatives(grid, len(self._names))
+        derivatives = solver.derivatives.get(grid.intervals, lambda: _force_derivatives(grid, len(self._names)))
         at, start = {}, 0
         for q in grid.problem.fixed:
             at[q.name] = start
@@ -103,7 +101,7 @@ class BlockedForces:
         dp = unit_directions(p.size, [at.get(name) for name in self._names])
         first = at["contact.free_lengths"]
         dp[first : first + slopes.shape[0]] = slopes
-        return self._derivatives[grid.intervals](found.solution.x, p, dp)
+        return derivatives(found.solution.x, p, dp)
 
 
 def _force_derivatives(grid: BlockedGrid, directions: int) -> SolutionDerivatives:

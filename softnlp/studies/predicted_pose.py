@@ -140,7 +140,6 @@ class LoadedPoses:
         self._loads = loads
         self._positions = positions(solver, names)
         self._known: dict[int, Solved] = {}
-        self._derivatives: dict[int, SolutionDerivatives] = {}
 
     def evaluate(self, constants: Mapping[str, float], anew: bool = False) -> Prediction:
         """See `FreePoses`."""
@@ -187,9 +186,10 @@ class LoadedPoses:
     def _observed(self, found: Solved) -> tuple[Array, Array]:
         """Return the observables of a pose and their derivatives."""
         x, p = found.solution.x, found.solution.p
-        if found.intervals not in self._derivatives:
-            self._derivatives[found.intervals] = _pose_derivatives(found.grid, len(self._positions))
-        values, slopes = self._derivatives[found.intervals](x, p, unit_directions(p.size, self._positions))
+        derivatives = self._solver.derivatives.get(
+            found.intervals, lambda: _pose_derivatives(found.grid, len(self._positions))
+        )
+        values, slopes = derivatives(x, p, unit_directions(p.size, self._positions))
         if values[3] < _STRAIGHT:
             slopes[3] = 0.0
         return values, slopes
