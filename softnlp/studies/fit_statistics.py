@@ -57,7 +57,7 @@ def uncertainty(names: Sequence[str], J: Array, residuals: Array, held: Sequence
 
     J : (m, n) derivative of the weighted residuals (m,) by the constants. held : constants that are not estimated, such
     as those at a bound. The covariance is s^2 (J^T J)^-1, which takes the weighted errors as independent and of one
-    size; a standard error is that of the HC2 estimate (MacKinnon and White 1985) where this is larger, so that it holds
+    size; a standard error is that of the HC3 estimate (MacKinnon and White 1985) where this is larger, so that it holds
     also where errors grow with the value.
     """
     m, n = J.shape
@@ -83,7 +83,7 @@ def uncertainty(names: Sequence[str], J: Array, residuals: Array, held: Sequence
     if m > free.size:
         spread = np.sqrt(float(residuals @ residuals) / (m - free.size))
         unused = np.maximum(1 - np.sum(U**2, axis=1), _LEAST_UNUSED)  # of a value, by the fit: 1 - leverage
-        each = np.sqrt(np.sum(((Vt.T / s) @ (U.T * residuals / np.sqrt(unused))) ** 2, axis=1))
+        each = np.sqrt(np.sum(((Vt.T / s) @ (U.T * residuals / unused)) ** 2, axis=1))
         errors[free] = np.maximum(spread * sizes, each) / lengths
     else:
         warnings.append(f"{m} values determine {free.size} constants without any to spare: no standard errors")

@@ -25,7 +25,8 @@ OBSERVABLES: Mapping[str, tuple[str, ...]] = {
     "elongation": ("elongation",),
     "blocked_force": ("blocked_force",),
 }
-RELATIVE_NOISE = 0.01  # of the root mean square of an observable, where nothing is said of its noise
+RELATIVE_NOISE = 0.01  # of what is measured, where nothing is said of its noise
+_FLOOR = 0.1  # of an observable's root mean square: smaller numbers count as if they were this large
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +36,9 @@ class Measurements:
     robot : whose it is. pressure : (rows, sets) [Pa]. tip_position : (rows, 3) [m]. bending_angle : (rows,) integral of
     the curvature over the backbone [rad]. elongation : (rows,) backbone length - L_0 [m]. blocked_force : (rows,) [N];
     the tip is free in the other observables of the same row.
-    sigma : standard deviation of an observable by name, a number or (rows,); by default 1 % of its root mean square
-    over this robot's rows. weight : (rows,) of the squared misfit, 1 by default. label : of the robot in results.
+    sigma : standard deviation of an observable by name, a number or (rows,); by default 1 % of each number, where
+    those below a tenth of the observable's root mean square over this robot's rows count as that tenth does.
+    weight : (rows,) of the squared misfit, 1 by default. label : of the robot in results.
     """
 
     robot: Robot
@@ -116,23 +118,18 @@ def _sigmas(data: Data, given: Mapping[str, Any]) -> Array:
         values = data.of(observable)
         if not np.any(np.isfinite(values)):
             continue
-        column = np.full(len(values), RELATIVE_NOISE * _size(values))
+        squares = np.nansum(values**2, axis=1)
+        where = np.any(np.isfinite(values), axis=1)
+        column = RELATIVE_NOISE * np.sqrt(squares + _FLOOR**2 * np.mean(squares[where]))
         if observable in given:
             stated = np.asarray(given[observable], float)
             if stated.shape not in ((), (len(values),)):
                 raise InputError(f"expected a number or {len(values)} of them", key=f"sigma.{observable}")
             column = np.where(np.isnan(stated), column, stated)
-        where = np.any(np.isfinite(values), axis=1)
         if not np.all(column[where] > 0) or not np.all(np.isfinite(column[where])):
             raise InputError("expected standard deviations above 0", key=f"sigma.{observable}")
         sigma[:, column_slice(observable)] = column[:, None]
     return sigma
-
-
-def _size(values: Array) -> float:
-    """Return the root mean square of what was measured of an observable, of a position the length of it."""
-    squares = np.nansum(values**2, axis=1)[np.any(np.isfinite(values), axis=1)]
-    return float(np.sqrt(np.mean(squares)))
 
 
 def _numbers(value: Any, shape: tuple[int, ...], key: str) -> Array:
