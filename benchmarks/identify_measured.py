@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.identify_data import ANGLES, CURVE, FORCES, HIGHEST
-from softnlp.conventions import COEFFICIENT_SETS, REPRODUCTION, Conventions
+from softnlp.conventions import COEFFICIENT_SETS, REPRODUCTION, Coefficients, Conventions
 from softnlp.materials import material
 from softnlp.robot import robot
 from softnlp.rod import Loads
@@ -78,13 +78,13 @@ POSITIVE = {"C10": (0.0, 1e5), "C01": (0.0, 1e5)}  # [Pa]: so that the law stays
 
 
 def found(variant: Variant, measurements: Sequence[Measurements]) -> Identified:
-    """Identify one variant, from `calibrated`."""
+    """Identify one variant, from `calibrated`, or from `reproduction` where phi stays 0."""
     bounds = {name: limits for name, limits in POSITIVE.items() if name in variant.free}
     return identify(
         measurements,
         SILICONE,
         variant.free,
-        coefficients=CALIBRATED,
+        coefficients=CALIBRATED if "phi" in variant.free else Coefficients(),
         bounds=bounds,
         conventions=variant.conventions,
         loads=variant.loads,

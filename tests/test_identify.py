@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+sys.path.insert(0, str(Path(__file__).parents[1]))  # benchmarks/ is not installed
+
+from benchmarks.identify_data import TABLES
+from benchmarks.identify_data import main as write_shipped_files
 from softnlp import (
     BAR,
     Coefficients,
@@ -50,9 +56,9 @@ POSES = BAR * np.array(
 LOADED = Loads(tip_force=(0.0, 0.01, 0.0), gravity=(0.0, 0.0, 9.81))
 
 
-def seen(r: Robot, P: Any, coefficients: Coefficients, silicone: Material = SILICONE, **options: Any) -> Measurements:
-    """Return the poses that the model gives, as if they had been measured."""
-    poses = [step.pose for step in forward(r, silicone, P, coefficients=coefficients, **options).steps]
+def forward_poses(r: Robot, P: Any, coefficients: Coefficients, **options: Any) -> Measurements:
+    """Return the poses that forward solves give, as if they had been measured."""
+    poses = [step.pose for step in forward(r, SILICONE, P, coefficients=coefficients, **options).steps]
     assert all(pose is not None for pose in poses)
     return Measurements(
         r,
@@ -61,6 +67,18 @@ def seen(r: Robot, P: Any, coefficients: Coefficients, silicone: Material = SILI
         bending_angle=[pose.bending_angle for pose in poses if pose],
         elongation=[pose.backbone_length - r.length for pose in poses if pose],
     )
+
+
+@cache
+def closed_form() -> TrialPoses:
+    return TrialPoses(Model(robot("D25L60"), SILICONE, TRUE), Numerics())
+
+
+def seen(r: Robot, P: Any, bending: float = 2.0) -> Measurements:
+    """Return the unloaded poses of the true constants in closed form, which a test below holds against the rod."""
+    poses = closed_form().of(r).at({"stiffening.bending": bending})
+    values = ArcPoses(poses, np.asarray(P), ()).evaluate({"stiffening.bending": bending}).values
+    return Measurements(r, P, tip_position=values[:, :3], bending_angle=values[:, 3], elongation=values[:, 4])
 
 
 def started(free: Sequence[str]) -> Coefficients:
@@ -82,7 +100,7 @@ def test_constants_come_back_from_poses_of_two_robots(free: tuple[str, ...]) -> 
     start = replace(
         SILICONE, constants={**SILICONE.constants, **{n: 1.2 * SILICONE.constants[n] for n in free if n[0] == "C"}}
     )
-    data = [seen(robot(name), POSES, TRUE) for name in ("D25L60", "D15L40")]
+    data = [seen(robot(name), POSES) for name in ("D25L60", "D15L40")]
     found = identify(data, start, free, coefficients=started(free))
     assert found.status is Status.SOLVED
     assert found.constants == pytest.approx(true_values(found), rel=1e-6)
@@ -93,7 +111,7 @@ def test_constants_come_back_from_poses_of_two_robots(free: tuple[str, ...]) -> 
 
 def test_constants_come_back_from_loaded_poses() -> None:
     numerics = Numerics(intervals=10)
-    data = seen(robot("D15L60"), POSES[1:6:2], TRUE, loads=LOADED, numerics=numerics)
+    data = forward_poses(robot("D15L60"), POSES[1:6:2], TRUE, loads=LOADED, numerics=numerics)
     found = identify(
         data,
         SILICONE,
@@ -110,16 +128,15 @@ def test_constants_come_back_from_forces_and_angles() -> None:
     r = robot("D25L60")
     contact = ContactSettings(tip_cap=0.005)
     forces = [s.contact.force for s in blocked_force(r, SILICONE, P, contact, coefficients=TRUE).steps if s.contact]
-    data = replace(seen(r, P, TRUE), blocked_force=forces, tip_position=None, elongation=None)
+    data = replace(seen(r, P), blocked_force=forces, tip_position=None, elongation=None)
     found = identify(data, SILICONE, ["k_b", "k_c"], coefficients=started(["k_b", "k_c"]), contact=contact)
     assert found.constants == pytest.approx(true_values(found), rel=1e-6)
 
 
 def test_the_closed_form_is_the_solution_of_the_rod() -> None:
     r = robot("D20L60")
-    data = seen(r, POSES, TRUE)
-    poses = TrialPoses(Model(r, SILICONE, TRUE), Numerics())
-    values = ArcPoses(poses, POSES, ()).evaluate({}).values
+    data = forward_poses(r, POSES, TRUE)
+    values = ArcPoses(closed_form().of(r), POSES, ()).evaluate({}).values
     assert values[:, :3] == pytest.approx(np.array(data.tip_position), abs=1e-8 * r.length)
     assert values[:, 3] == pytest.approx(np.array(data.bending_angle), abs=2e-8)
     assert values[:, 4] == pytest.approx(np.array(data.elongation), abs=1e-8 * r.length)
@@ -166,7 +183,7 @@ def test_one_nlp_of_all_poses_gives_the_same_constants() -> None:
     """On the same grid of a loaded robot both solve the same equations; the data have errors of some percent."""
     P = BAR * np.array([[0.9, 0, 0], [0.8, 0.8, 0]])
     numerics = Numerics(intervals=4)
-    data = seen(robot("D25L60"), P, TRUE, loads=LOADED, numerics=numerics)
+    data = forward_poses(robot("D25L60"), P, TRUE, loads=LOADED, numerics=numerics)
     angle, length = np.array(data.bending_angle) * [1.02, 0.99], np.array(data.elongation) * [1.01, 0.99]
     wrong = replace(data, bending_angle=angle, elongation=length, tip_position=None)
     options: dict[str, Any] = {"coefficients": started(["k_b", "k_e"]), "loads": LOADED}
@@ -182,7 +199,7 @@ def test_one_nlp_of_all_poses_gives_the_same_constants() -> None:
 def test_two_sigma_intervals_hold_the_constants(grows: bool) -> None:
     """Of the linearised problem with the default sigmas; benchmarks/identify.py draws with the whole one."""
     r, names = robot("D25L60"), NAMES[:3]
-    found = ArcPoses(TrialPoses(Model(r, SILICONE, TRUE), Numerics()), POSES, names).evaluate({})
+    found = ArcPoses(closed_form().of(r), POSES, names).evaluate({})
     exact, J = found.values[:, 3:5], found.slopes[:, 3:5]
     data = checked_measurements(Measurements(r, POSES, bending_angle=exact[:, 0], elongation=exact[:, 1]))
     sigma = data.sigma[:, 3:5]
@@ -200,14 +217,14 @@ def test_two_sigma_intervals_hold_the_constants(grows: bool) -> None:
 
 def test_constants_that_the_data_cannot_tell_apart_are_named() -> None:
     """k_i and k_b both stiffen the bending; one pressure shows their sum alone."""
-    data = seen(robot("D25L60"), POSES[1:2], TRUE)
+    data = seen(robot("D25L60"), POSES[1:2])
     found = identify(replace(data, elongation=None), SILICONE, ["k_b", "k_i"], coefficients=started(["k_b"]))
     assert any("k_b" in w and "k_i" in w for w in found.warnings)
     assert np.isinf(found.uncertainty.standard_errors).all()
 
 
 def test_a_constant_at_its_bound_is_named_and_the_others_are_at_their_best() -> None:
-    data = seen(robot("D25L60"), POSES, replace(TRUE, bending=0.0))
+    data = seen(robot("D25L60"), POSES, bending=0.0)
     off = replace(data, bending_angle=np.array(data.bending_angle) * 1.1, tip_position=None)
     found = identify(off, SILICONE, ["k_b", "k_e"], coefficients=started(["k_b", "k_e"]))
     assert found.at_bound == ("k_b",)
@@ -297,10 +314,7 @@ def test_a_shipped_identification_runs(name: str, tmp_path: Path) -> None:
 
 
 def test_every_shipped_file_is_as_its_script_writes_it(tmp_path: Path) -> None:
-    from benchmarks.identify_data import TABLES
-    from benchmarks.identify_data import main as write
-
-    write(tmp_path)
+    write_shipped_files(tmp_path)
     for make in TABLES:
         name = f"{make.__name__}.csv"
         assert (tmp_path / name).read_text() == (ROOT / "scenarios" / "files" / name).read_text()
