@@ -1,15 +1,17 @@
 """What the published angles and forces (Ecoflex 00-50, Mooney-Rivlin) say of the constants; the tables of identify.md.
 
-    python -m benchmarks.identify_measured
+    python -m benchmarks.identify_measured [alone] [shared] [together]
 
 Angles at 1.5 bar, one and two sets, of four robots: constants of each robot, then shared ones, with and without phi and
 with terms that the default conventions leave out. Then forces along the curve of eight robots and the angles together,
-from the set `calibrated`. Minutes on one core, most of them for the forces.
+from the set `calibrated`; with the published elongations too where that is said. "own pressure" reads Eq. (12) with the
+pressure of each chamber, as printed. Minutes on one core, most of them for the forces and for hanging robots.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,33 +23,47 @@ from softnlp.robot import robot
 from softnlp.rod import Loads
 from softnlp.studies.identify import Identified, identify
 from softnlp.studies.measurements import Measurements
-from softnlp.units import BAR, DEGREE, STANDARD_GRAVITY
+from softnlp.units import BAR, DEGREE, MILLIMETRE, STANDARD_GRAVITY
 
 SILICONE = material("Ecoflex 00-50")
 CALIBRATED = COEFFICIENT_SETS["calibrated"]
 OWN_PRESSURE = replace(REPRODUCTION, name="own pressure in Eq. (12)", mean_pressure=False)
 HANGING = Loads(gravity=(0.0, 0.0, STANDARD_GRAVITY))
+ELONGATION: Mapping[str, tuple[float, float]] = {"L60": (35.03, 42.31), "L40": (22.70, 25.11)}  # [mm] at 1.5 bar
 ANGLE_SIGMA, FORCE_SIGMA = 30 * DEGREE, 0.09  # what `calibrated` leaves of each
 
 
-def angles(name: str) -> Measurements:
-    """Return the two measured angles of a robot, with equal weight."""
-    P = BAR * HIGHEST * np.array([[1, 0, 0], [1, 1, 0]])
-    measured = np.array(ANGLES[name]) * DEGREE
-    return Measurements(robot(name), P, bending_angle=measured, sigma={"bending_angle": ANGLE_SIGMA})
+def measurements(name: str, *, forces: bool, elongation: bool) -> Measurements:
+    """Return what was measured of a robot: its angles, if any, and if asked forces along the curve and elongation.
 
-
-def both(name: str) -> Measurements:
-    """Return the forces of a robot along the curve and its angles, where there are any."""
-    has_angles = name in ANGLES
-    P = BAR * np.array([[p, 0, 0] for p in CURVE] + ([[HIGHEST, HIGHEST, 0]] if has_angles else []))
-    force = np.full(len(P), np.nan)
-    force[: len(CURVE)] = FORCES[name] * np.array(CURVE) / HIGHEST
-    angle = np.full(len(P), np.nan)
-    if has_angles:
-        angle[len(CURVE) - 1 :] = np.array(ANGLES[name]) * DEGREE
-    sigma = {"blocked_force": FORCE_SIGMA * force, "bending_angle": ANGLE_SIGMA}
-    return Measurements(robot(name), P, bending_angle=angle, blocked_force=force, sigma=sigma)
+    The elongation with three sets is published as the range over the robots of one length; each gets its middle, with
+    half of its width as standard deviation.
+    """
+    rows: list[tuple[list[float], float, float, float]] = []  # pressures, angle, force, elongation
+    one, two = ANGLES.get(name, (np.nan, np.nan))
+    if forces:
+        rows += [([p, 0, 0], one if p == HIGHEST else np.nan, FORCES[name] * p / HIGHEST, np.nan) for p in CURVE]
+    elif name in ANGLES:
+        rows.append(([HIGHEST, 0, 0], one, np.nan, np.nan))
+    if name in ANGLES:
+        rows.append(([HIGHEST, HIGHEST, 0], two, np.nan, np.nan))
+    low, high = ELONGATION[name[-3:]]
+    if elongation:
+        rows.append(([HIGHEST] * 3, np.nan, np.nan, (low + high) / 2))
+    P, angle, force, length = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
+    sigma = {
+        "bending_angle": ANGLE_SIGMA,
+        "blocked_force": FORCE_SIGMA * force,
+        "elongation": (high - low) / 2 * MILLIMETRE,
+    }
+    return Measurements(
+        robot(name),
+        P * BAR,
+        bending_angle=angle * DEGREE,
+        blocked_force=force,
+        elongation=length * MILLIMETRE,
+        sigma=sigma,
+    )
 
 
 @dataclass(frozen=True)
@@ -58,30 +74,35 @@ class Variant:
     free: tuple[str, ...]
     conventions: Conventions = REPRODUCTION
     loads: Loads = Loads()
+    elongation: bool = False
 
 
+STIFFENING, ALL = ("k_e", "k_b", "phi"), ("k_e", "k_b", "phi", "k_c")
 SHARED = (
     Variant("k_e, k_b", ("k_e", "k_b")),
-    Variant("with phi", ("k_e", "k_b", "phi")),
-    Variant("with phi, own pressure in Eq. (12)", ("k_e", "k_b", "phi"), OWN_PRESSURE),
-    Variant("with phi, hanging", ("k_e", "k_b", "phi"), loads=HANGING),
-    Variant("with phi, own pressure, hanging", ("k_e", "k_b", "phi"), OWN_PRESSURE, HANGING),
-    Variant("with phi, C10, C01", ("k_e", "k_b", "phi", "C10", "C01")),
+    Variant("with phi", STIFFENING),
+    Variant("with phi, own pressure", STIFFENING, OWN_PRESSURE),
+    Variant("with phi, hanging", STIFFENING, loads=HANGING),
+    Variant("with phi, own pressure, hanging", STIFFENING, OWN_PRESSURE, HANGING),
+    Variant("with phi, elongations", STIFFENING, elongation=True),
+    Variant("with phi, elongations, own pressure", STIFFENING, OWN_PRESSURE, elongation=True),
+    Variant("with phi, elongations, own pressure, hanging", STIFFENING, OWN_PRESSURE, HANGING, True),
 )
 TOGETHER = (
-    Variant("k_e, k_b, phi, k_c", ("k_e", "k_b", "phi", "k_c")),
-    Variant("the same, own pressure in Eq. (12)", ("k_e", "k_b", "phi", "k_c"), OWN_PRESSURE),
-    Variant("with C10, C01", ("k_e", "k_b", "phi", "k_c", "C10", "C01")),
-    Variant("with C10, C01, own pressure", ("k_e", "k_b", "phi", "k_c", "C10", "C01"), OWN_PRESSURE),
+    Variant("k_e, k_b, phi, k_c", ALL),
+    Variant("own pressure", ALL, OWN_PRESSURE),
+    Variant("with C10, C01", (*ALL, "C10", "C01")),
+    Variant("elongations", ALL, elongation=True),
+    Variant("elongations, own pressure", ALL, OWN_PRESSURE, elongation=True),
 )
 POSITIVE = {"C10": (0.0, 1e5), "C01": (0.0, 1e5)}  # [Pa]: so that the law stays stable
 
 
-def found(variant: Variant, measurements: Sequence[Measurements]) -> Identified:
+def found(variant: Variant, data: Sequence[Measurements]) -> Identified:
     """Identify one variant, from `calibrated`, or from `reproduction` where phi stays 0."""
     bounds = {name: limits for name, limits in POSITIVE.items() if name in variant.free}
     return identify(
-        measurements,
+        data,
         SILICONE,
         variant.free,
         coefficients=CALIBRATED if "phi" in variant.free else Coefficients(),
@@ -127,33 +148,42 @@ def strongest(result: Identified) -> str:
     return f"{names[j]}, {names[i]}: {result.uncertainty.correlation[i, j]:.3f}"
 
 
-def main() -> None:
-    """Print everything."""
-    print("angles, each robot alone: k_e, k_b")
-    for name in ANGLES:
-        result = found(Variant(name, ("k_e", "k_b")), [angles(name)])
-        print(f"  {name}: {describe(result)}; {shown_angles(result)}; mean error {mean_angle_error(result):.1f} deg")
-    print("angles, shared by four robots")
-    every = [angles(name) for name in ANGLES]
-    for variant in SHARED:
-        result = found(variant, every)
-        print(f"  {variant.label}: {describe(result)}; mean error {mean_angle_error(result):.1f} deg", flush=True)
-        print(f"    {shown_angles(result)}; strongest correlation {strongest(result)}")
-    print("forces along the curve and angles, from `calibrated`")
-    rows = [both(name) for name in FORCES]
-    for variant in TOGETHER:
-        result = found(variant, rows)
-        force = result.errors()["blocked_force"]
-        if variant is TOGETHER[0]:
-            before = result.errors(False)["blocked_force"].mape
-            print(f"  calibrated: forces {before:.1f} %, angles {mean_angle_error(result, False):.1f} deg")
-        print(f"  {variant.label}: {describe(result)}", flush=True)
-        print(
-            f"    forces {force.mape:.1f} %, angles {mean_angle_error(result):.1f} deg; {shown_angles(result)}; "
-            f"strongest correlation {strongest(result)}",
-            flush=True,
+def told(result: Identified) -> str:
+    """Return the errors that are left, and what the model gives."""
+    left = result.errors()
+    parts = [f"angles {mean_angle_error(result):.1f} deg"]
+    if "blocked_force" in left:
+        parts.insert(0, f"forces {left['blocked_force'].mape:.1f} %")
+    if "elongation" in left:
+        values = np.concatenate(
+            [v[:, 4][np.isfinite(d.values[:, 4])] for v, d in zip(result.after, result.data, strict=True)]
         )
+        parts.append(f"elongations {np.min(values) / MILLIMETRE:.1f} to {np.max(values) / MILLIMETRE:.1f} mm")
+    return f"{', '.join(parts)}; {shown_angles(result)}; strongest correlation {strongest(result)}"
+
+
+def main(parts: Sequence[str] = ("alone", "shared", "together")) -> None:
+    """Print the parts asked for."""
+    if "alone" in parts:
+        print("angles, each robot alone: k_e, k_b")
+        for name in ANGLES:
+            result = found(Variant(name, ("k_e", "k_b")), [measurements(name, forces=False, elongation=False)])
+            print(f"  {name}: {describe(result)}\n    {told(result)}", flush=True)
+    groups = {"shared": (SHARED, tuple(ANGLES)), "together": (TOGETHER, tuple(FORCES))}
+    for part, (variants, names) in groups.items():
+        if part not in parts:
+            continue
+        print(
+            "angles, shared by four robots" if part == "shared" else "forces along the curve and angles, eight robots"
+        )
+        for variant in variants:
+            rows = [measurements(n, forces=part == "together", elongation=variant.elongation) for n in names]
+            result = found(variant, rows)
+            if variant is TOGETHER[0]:
+                before = result.errors(False)["blocked_force"].mape
+                print(f"  `calibrated`: forces {before:.1f} %, angles {mean_angle_error(result, False):.1f} deg")
+            print(f"  {variant.label}: {describe(result)}\n    {told(result)}", flush=True)
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:] or ("alone", "shared", "together"))
