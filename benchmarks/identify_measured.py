@@ -21,7 +21,8 @@ from softnlp.conventions import COEFFICIENT_SETS, REPRODUCTION, Coefficients, Co
 from softnlp.materials import material
 from softnlp.robot import robot
 from softnlp.rod import Loads
-from softnlp.studies.identify import Identified, identify
+from softnlp.studies.identified import Identified
+from softnlp.studies.identify import identify
 from softnlp.studies.measurements import Measurements
 from softnlp.units import BAR, DEGREE, MILLIMETRE, STANDARD_GRAVITY
 

@@ -38,7 +38,7 @@ from softnlp.robot import Robot
 from softnlp.scenario import load_scenario, scenario_from_text
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.fit_statistics import uncertainty
-from softnlp.studies.identify import Identified
+from softnlp.studies.identified import Identified
 from softnlp.studies.identify_nlp import identify_at_once
 from softnlp.studies.identify_task import RobotTask
 from softnlp.studies.measurements import checked_measurements
@@ -424,3 +424,17 @@ def test_no_pose_ends_with_3(tmp_path: Path) -> None:
 def test_another_study_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["identify", str(ROOT / "scenarios" / "D25L60_one_set.toml")]) == 2
     assert "expected 'identify'" in capsys.readouterr().err
+
+
+def test_a_pose_beyond_the_fitted_stretch_is_named() -> None:
+    P = BAR * np.array([[0.5, 0, 0], [1.5, 1.5, 1.5]])
+    free = identify(Measurements(robot("D25L60"), P, bending_angle=[0.6, np.nan]), SILICONE, ["k_b"])
+    assert not any("stretched" in w for w in free.warnings)
+    soft = replace(SILICONE, constants={k: 0.75 * v for k, v in SILICONE.constants.items()})
+    far = identify(
+        Measurements(robot("D25L60"), P, bending_angle=[0.6, np.nan]),
+        soft,
+        ["k_b"],
+        coefficients=Coefficients(elongation=0),
+    )
+    assert any("D25L60, measurement 2: the free robot is stretched to" in w for w in far.warnings)

@@ -38,7 +38,13 @@ LAYERS = (
         "studies.implicit",
     ),
     *("studies.free_shape", "studies.blocked_grid", "studies.blocked_step", "studies.blocked", "studies.multistart"),
-    *("studies.trial", "studies.predicted_pose", "studies.predicted_force", "studies.identify_task"),
+    *(
+        "studies.trial",
+        "studies.predicted_pose",
+        "studies.predicted_force",
+        "studies.identify_task",
+        "studies.identified",
+    ),
     *("studies.force_inversion", "studies.*"),
     *(
         "scenario_schema",

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from softnlp.scenario import Scenario
-    from softnlp.studies.identify import Identified
+    from softnlp.studies.identified import Identified
     from softnlp.studies.identify_task import RobotTask, TensileTask
     from softnlp.studies.tensile import TensileFit
 

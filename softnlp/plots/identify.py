@@ -13,7 +13,7 @@ from softnlp.studies.measurements import column_slice
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from softnlp.studies.identify import Identified
+    from softnlp.studies.identified import Identified
     from softnlp.studies.tensile import TensileFit
 
 KILOPASCAL = 1e3

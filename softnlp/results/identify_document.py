@@ -20,7 +20,7 @@ from softnlp.units import BAR, DEGREE, MEGAPASCAL, MILLIMETRE
 
 if TYPE_CHECKING:
     from softnlp.scenario import Scenario
-    from softnlp.studies.identify import Identified
+    from softnlp.studies.identified import Identified
     from softnlp.studies.identify_task import RobotTask, TensileTask
     from softnlp.studies.tensile import LawFit, TensileFit
 
@@ -73,7 +73,9 @@ def tensile_document(asked: Scenario, task: TensileTask, fit: TensileFit) -> dic
         "files": list(task.files),
         "points": int(task.stretch.size),
         "fitted_stretch": [float(v) for v in next(iter(fit.fits.values())).fitted_stretch],
-        "before": None if before is None else {"rmse_MPa": before.rmse / MEGAPASCAL, "mape_percent": before.mape},
+        "before": None
+        if before is None
+        else {"rmse_MPa": number(before.rmse / MEGAPASCAL), "mape_percent": number(before.mape)},
         "best": None if best is None else best.law.name,
         "laws": [_law(f) for f in fit.fits.values()],
     }

@@ -9,7 +9,6 @@ with all poses as unknowns.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,17 +21,16 @@ from softnlp.numerics import Numerics
 from softnlp.quantities import Model
 from softnlp.rod import Loads
 from softnlp.status import Status
-from softnlp.studies.fit_statistics import Misfit, Uncertainty, misfit, uncertainty
+from softnlp.studies.fit_statistics import Uncertainty, uncertainty
 from softnlp.studies.forward import checked_loads
 from softnlp.studies.free_constants import FreeConstants, free_constants
+from softnlp.studies.identified import Identified
 from softnlp.studies.measurements import (
     COLUMNS,
-    OBSERVABLES,
     POSE_COLUMNS,
     Data,
     Measurements,
     checked_measurements,
-    column_slice,
 )
 from softnlp.studies.predicted_force import BlockedForces
 from softnlp.studies.predicted_pose import ArcPoses, Failure, FreePoses, LoadedPoses, Prediction
@@ -46,56 +44,6 @@ _MOVED = 1e-4  # relative; constants that move more are followed once more from 
 _TIGHT = 1e-13
 _NEARLY = 1e-2  # of a constant or its scale: a rough search that ends nearer to a bound is about to reach it
 _AT_BOUND = 1e-6  # of a constant or its scale
-
-
-@dataclass(frozen=True, eq=False)
-class Identified:
-    """What an identification found. SI units.
-
-    status : solved, or why the model could not be compared with the measurements; `message` says where. free : names,
-    start and bounds. constants : (n,) found, nan where nothing was. at_bound : names of those at a bound.
-    uncertainty : of the constants. material, coefficients : with the constants found.
-    data : the measurements; before, after : (rows, 6) each, the model at the start and at the end, in the order of
-    `COLUMNS`, nan where nothing was measured. evaluations : how often all poses were solved.
-    """
-
-    status: Status
-    message: str
-    free: FreeConstants
-    constants: Array
-    at_bound: tuple[str, ...]
-    uncertainty: Uncertainty
-    material: Material
-    coefficients: Coefficients
-    data: tuple[Data, ...]
-    before: tuple[Array, ...]
-    after: tuple[Array, ...]
-    evaluations: int
-    warnings: tuple[str, ...]
-
-    def errors(self, after: bool = True) -> dict[str, Misfit]:
-        """Return the misfit by observable over all robots [m, rad, N].
-
-        A tip position's error is a distance, compared with the robot's length; others are compared with the number
-        measured.
-        """
-        return observable_misfits(self.data, self.after if after else self.before)
-
-
-def observable_misfits(data: Sequence[Data], predicted: Sequence[Array]) -> dict[str, Misfit]:
-    """Return the misfit of predictions by observable, see `Identified.errors`."""
-    found = {}
-    for observable in OBSERVABLES:
-        errors, sizes = [], []
-        for d, values in zip(data, predicted, strict=True):
-            difference = (values - d.values)[:, column_slice(observable)]
-            rows = np.any(np.isfinite(d.of(observable)), axis=1)
-            errors.append(np.sqrt(np.nansum(difference[rows] ** 2, axis=1)))
-            length = np.full(int(np.sum(rows)), float(d.robot.length))
-            sizes.append(length if observable == "tip_position" else d.of(observable)[rows, 0])
-        if sum(e.size for e in errors):
-            found[observable] = misfit(np.concatenate(errors), np.concatenate(sizes))
-    return found
 
 
 def identify(
@@ -140,7 +88,7 @@ def identify(
         raise InputError("expected measurements of at least one robot", key="measurements")
     data = tuple(checked_measurements(m) for m in given)
     chosen = free_constants(free, material, coefficients, bounds)
-    count = sum(int(np.sum(d.measured)) for d in data)
+    count = sum(int(np.sum(d.measured[d.root_weight > 0])) for d in data)
     if count < len(free):
         raise InputError(f"{count} numbers measured cannot determine {len(free)} constants", key="free")
     loads, contact = checked_loads(loads), checked_contact(contact)
@@ -209,6 +157,7 @@ class _Fit:
         self.progress = progress
         self.evaluations = 0
         self.measured = [d.measured for d in data]
+        self.fitted = [d.measured & (d.root_weight[:, None] > 0) for d in data]
         self._last: tuple[Array, list[Prediction]] | None = None
 
     def solve(self) -> Identified:
@@ -245,14 +194,14 @@ class _Fit:
     def residuals(self, found: Sequence[Prediction]) -> Array:
         """Return the weighted residuals of all numbers measured; nan where a pose was not found."""
         parts = []
-        for d, prediction, mask in zip(self.data, found, self.measured, strict=True):
+        for d, prediction, mask in zip(self.data, found, self.fitted, strict=True):
             parts.append(((prediction.values - d.values) / d.sigma * d.root_weight[:, None])[mask])
         return np.concatenate(parts)
 
     def jacobian(self, found: Sequence[Prediction]) -> Array:
         """Return the derivative of the weighted residuals by the constants."""
         parts = []
-        for d, prediction, mask in zip(self.data, found, self.measured, strict=True):
+        for d, prediction, mask in zip(self.data, found, self.fitted, strict=True):
             parts.append((prediction.slopes / d.sigma[:, :, None] * d.root_weight[:, None, None])[mask])
         return np.concatenate(parts)
 
@@ -336,6 +285,7 @@ class _Fit:
                 warnings.append(
                     f"{name} ended at its bound {x[k]:.4g}; it was held there for the other standard errors"
                 )
+        warnings += self._stretched(last)
         status, message = Status.SOLVED, "the sum of squares is at a minimum"
         material, coefficients = self.material, self.coefficients
         try:
@@ -343,6 +293,20 @@ class _Fit:
         except MaterialError as error:
             status, message = Status.UNSTABLE_MATERIAL, f"the constants found are no material: {error.message}"
         return self._result(status, message, x, at_bound, known, material, coefficients, first, last, warnings)
+
+    def _stretched(self, found: Sequence[Prediction]) -> list[str]:
+        """Say where a free robot is stretched beyond the range in which the material was fitted."""
+        low, high = self.material.fitted_stretch
+        warnings = []
+        for d, prediction in zip(self.data, found, strict=True):
+            stretch = 1 + prediction.values[:, POSE_COLUMNS.index("elongation")] / float(d.robot.length)
+            row = int(np.argmax(stretch))
+            if stretch[row] > high:
+                warnings.append(
+                    f"{d.label}, measurement {row + 1}: the free robot is stretched to {stretch[row]:.3f}, outside "
+                    f"{low:g} to {high:g}, where {self.material.name} was fitted"
+                )
+        return warnings
 
     def _unsolved(self, status: Status, message: str, first: Sequence[Prediction]) -> Identified:
         n = len(self.free.names)
