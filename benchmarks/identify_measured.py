@@ -1,6 +1,6 @@
 """What the published angles and forces (Ecoflex 00-50, Mooney-Rivlin) say of the constants; the tables of identify.md.
 
-    python -m benchmarks.identify_measured [alone] [shared] [together]
+    python -m benchmarks.identify_measured [alone] [shared] [proposals] [together]
 
 Angles at 1.5 bar, one and two sets, of four robots: constants of each robot, then shared ones, with and without phi and
 with terms that the default conventions leave out. Then forces along the curve of eight robots and the angles together,
@@ -11,20 +11,27 @@ pressure of each chamber, as printed. Minutes on one core, most of them for the 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.identify_data import ANGLES, CURVE, FORCES, HIGHEST
 from softnlp.conventions import COEFFICIENT_SETS, REPRODUCTION, Coefficients, Conventions
 from softnlp.materials import material
+from softnlp.numerics import Numerics
+from softnlp.quantities import Model
 from softnlp.robot import robot
 from softnlp.rod import Loads
 from softnlp.studies.identified import Identified
 from softnlp.studies.identify import identify
 from softnlp.studies.measurements import Measurements
+from softnlp.studies.predicted_pose import ArcPoses
+from softnlp.studies.trial import TrialPoses
 from softnlp.units import BAR, DEGREE, MILLIMETRE, STANDARD_GRAVITY
+
+Array = NDArray[np.float64]
 
 SILICONE = material("Ecoflex 00-50")
 CALIBRATED = COEFFICIENT_SETS["calibrated"]
@@ -64,6 +71,7 @@ def measurements(name: str, *, forces: bool, elongation: bool) -> Measurements:
         blocked_force=force,
         elongation=length * MILLIMETRE,
         sigma=sigma,
+        label=name,
     )
 
 
@@ -163,13 +171,80 @@ def told(result: Identified) -> str:
     return f"{', '.join(parts)}; {shown_angles(result)}; strongest correlation {strongest(result)}"
 
 
-def main(parts: Sequence[str] = ("alone", "shared", "together")) -> None:
+def search(
+    conventions: Conventions,
+    own: Callable[[str, Array], dict[str, float]],
+    more: Sequence[tuple[float, float, float]],
+    elongation: bool,
+) -> tuple[Array, float]:
+    """Return k_e, k_b and further unknowns that fit the angles of four robots, and the mean error of the angles [deg].
+
+    own : values of quantities of a robot, by its name and the further unknowns. more : (start, lower, upper) of those.
+    """
+    from scipy.optimize import least_squares
+
+    rows = [measurements(name, forces=False, elongation=elongation) for name in ANGLES]
+    every = TrialPoses(Model(rows[0].robot, SILICONE, CALIBRATED, conventions), Numerics())
+    poses = [ArcPoses(every.of(m.robot), np.asarray(m.pressure), ()) for m in rows]
+
+    def residuals(z: Array) -> Array:
+        parts = []
+        for m, arcs in zip(rows, poses, strict=True):
+            values = {"stiffening.elongation": z[0], "stiffening.bending": z[1], **own(m.label, z[2:])}
+            seen = arcs.evaluate(values).values
+            parts.append((seen[:2, 3] - m.bending_angle[:2]) / ANGLE_SIGMA)
+            parts.append((seen[2:, 4] - m.elongation[2:]) / m.sigma["elongation"])
+        return np.concatenate(parts)
+
+    start, low, high = np.array([(0.4, 0.0, 20.0), (2.5, 0.0, 50.0), *more]).T
+    done = least_squares(residuals, start, bounds=(low, high), xtol=1e-12, ftol=1e-12)
+    width = 3 if elongation else 2
+    angles = done.fun.reshape(len(rows), width)[:, :2]
+    return np.asarray(done.x), float(np.mean(np.abs(angles)) * ANGLE_SIGMA / DEGREE)
+
+
+def proposals() -> None:
+    """Print what would explain D20L60 and D10L60: a phi of each, one that grows with the wall, the thread elsewhere."""
+    names = list(ANGLES)
+
+    def each(name: str, z: Array) -> dict[str, float]:
+        return {"corrections.bore_fraction": float(z[names.index(name)])}
+
+    def wall_over_bore(name: str, z: Array) -> dict[str, float]:
+        r = robot(name)
+        return {"corrections.bore_fraction": min(float(z[0] * r.chamber_wall / r.bore_radius), 1.0)}
+
+    def thread(name: str, z: Array) -> dict[str, float]:
+        moved = dict(zip(("D20L60", "D10L60"), z[1:], strict=True)).get(name, 0.0) * MILLIMETRE
+        return {"corrections.bore_fraction": float(z[0]), "robot.chamber_wall": robot(name).chamber_wall + moved}
+
+    fraction, factor, place = (0.4, 0.0, 1.0), (0.6, 0.0, 3.0), (0.0, -0.45, 0.45)
+    asked = (
+        ("phi of each robot", each, [fraction] * 4),
+        ("phi = c delta_c / r_ci", wall_over_bore, [factor]),
+        ("phi, thread of D20L60 and D10L60 moved [mm]", thread, [fraction, place, place]),
+    )
+    for label, own, more in asked:
+        for conventions in (REPRODUCTION, OWN_PRESSURE):
+            for elongation in (False, True):
+                x, error = search(conventions, own, more, elongation)
+                data = "angles, elongations" if elongation else "angles"
+                print(f"  {label}; {conventions.name}; {data}: {np.round(x, 3).tolist()}, {error:.1f} deg", flush=True)
+
+
+PARTS = ("alone", "shared", "proposals", "together")
+
+
+def main(parts: Sequence[str] = PARTS) -> None:
     """Print the parts asked for."""
     if "alone" in parts:
         print("angles, each robot alone: k_e, k_b")
         for name in ANGLES:
             result = found(Variant(name, ("k_e", "k_b")), [measurements(name, forces=False, elongation=False)])
             print(f"  {name}: {describe(result)}\n    {told(result)}", flush=True)
+    if "proposals" in parts:
+        print("what would explain D20L60 and D10L60: k_e, k_b and what is named")
+        proposals()
     groups = {"shared": (SHARED, tuple(ANGLES)), "together": (TOGETHER, tuple(FORCES))}
     for part, (variants, names) in groups.items():
         if part not in parts:
@@ -187,4 +262,4 @@ def main(parts: Sequence[str] = ("alone", "shared", "together")) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or ("alone", "shared", "together"))
+    main(sys.argv[1:] or PARTS)
