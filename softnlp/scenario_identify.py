@@ -235,6 +235,7 @@ def _measurements(robot: Robot, label: str, places: Sequence[tuple[Columns, int]
                     line, name, f"{expected}{'nothing' if np.isnan(value) else f'{value:g}'}; {UNIT_HINT}"
                 )
         pressure.append(values * BAR)
+    _refuse_more_sets(robot, label, places)
     tip = np.column_stack([column(name) for name in _TIP]) * MILLIMETRE
     seen = {key: column(name) * unit for key, (name, unit) in _SCALARS.items()}
     sigma: dict[str, Array] = {}
@@ -268,6 +269,17 @@ def _measurements(robot: Robot, label: str, places: Sequence[tuple[Columns, int]
     except InputError as error:
         raise InputError(f"{label}: {error}", table="measurements", key="file") from None
     return made
+
+
+def _refuse_more_sets(robot: Robot, label: str, places: Sequence[tuple[Columns, int]]) -> None:
+    """Refuse a pressure in a set that the robot does not have."""
+    for columns, row in places:
+        for name in columns.header:
+            number = name.removeprefix("p").removesuffix("_bar")
+            if name == f"p{number}_bar" and number.isdecimal() and int(number) > robot.chamber_sets:
+                value = columns.numbers(name, blank=True)[row]
+                if value != 0 and not np.isnan(value):
+                    raise columns.wrong(row, name, f"expected 0 or nothing: {label} has {robot.chamber_sets} sets")
 
 
 def _free(table: MeasurementsTable, material: Material) -> tuple[tuple[str, ...], dict[str, tuple[float, float]]]:

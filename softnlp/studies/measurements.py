@@ -96,9 +96,6 @@ def checked_measurements(given: Measurements) -> Data:
         shape = (rows,) if len(parts) == 1 else (rows, len(parts))
         column = _numbers(value, shape, observable)
         values[:, column_slice(observable)] = column.reshape(rows, -1)
-    for key in ("bending_angle", "blocked_force"):
-        if np.any(values[:, column_slice(key)] < 0):
-            raise InputError("expected numbers that are not negative", key=key)
     if not np.any(np.isfinite(values)):
         raise InputError(f"expected at least one number of {', '.join(OBSERVABLES)}", key="measurements")
     weight = np.ones(rows) if given.weight is None else _numbers(given.weight, (rows,), "weight")

@@ -72,7 +72,8 @@ class BlockedForces:
 
     def _moved(self, solver: TrialBlocked, lengths: Array) -> bool:
         """Solve every known blocked shape at other constants; whether all are still there, and near."""
-        if len(self._known) < len(self._pressure):
+        pressed = {int(row) for row in np.flatnonzero(np.any(self._pressure > 0, axis=1))}
+        if not pressed <= set(self._known):
             return False  # not solved yet, or a shape that did not touch the wall may do so now
         moved = {}
         for row, found in self._known.items():

@@ -27,6 +27,7 @@ _EXPONENTS = (-20.0, -12.0, -8.0, -5.0, -3.0, -2.0, -1.0, -0.4, 0.4, 1.0, 2.0, 3
 _LARGEST_EXPONENT = 40.0
 _FACTORS = (1.0, 0.2, 5.0, -1.0, 0.04, 25.0)  # of a start for a person's law
 _MOST_GRID, _STARTS_A_SIGN = 1296, 3
+_EXACT = 1e-26  # half the mean square of a misfit that is round-off, relative to the largest stress
 _RANK = 1e-13  # relative size below which a direction of the linear constants is noise
 _STRETCHES = 401
 _LOOK_AHEAD = 1.5  # beyond the largest measured stretch, times its extension, stability is looked for
@@ -314,6 +315,8 @@ def _minimise(curve: _Curve, x: Array, y: Array, size: float, starts: list[Array
         )
         if done.cost < least:
             best, least = projected(done.x, c)[0], float(done.cost)
+        if least < _EXACT * x.size:
+            break
     return best
 
 
