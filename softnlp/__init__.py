@@ -48,13 +48,16 @@ if TYPE_CHECKING:
     from softnlp.studies.ellipsoids import stiffness_ellipsoid as stiffness_ellipsoid
     from softnlp.studies.force_inversion import pressure_for_force as pressure_for_force
     from softnlp.studies.forward import forward as forward
+    from softnlp.studies.identify import identify as identify
     from softnlp.studies.inverse import inverse as inverse
+    from softnlp.studies.measurements import Measurements as Measurements
     from softnlp.studies.report import sensitivity_report as sensitivity_report
     from softnlp.studies.sensitivity import sensitivities as sensitivities
     from softnlp.studies.sensitivity import tip_compliance as tip_compliance
     from softnlp.studies.sensitivity import tip_jacobian as tip_jacobian
     from softnlp.studies.step import Run as Run
     from softnlp.studies.step import Step as Step
+    from softnlp.studies.tensile import fit_tensile as fit_tensile
     from softnlp.studies.tolerances import error_bars as error_bars
     from softnlp.studies.tolerances import monte_carlo as monte_carlo
     from softnlp.studies.weight_sensitivity import weight_sensitivity as weight_sensitivity
@@ -80,12 +83,15 @@ _HOMES = {
     "studies.ellipsoids": ("compliance_ellipsoid", "manipulability", "stiffness_ellipsoid"),
     "studies.force_inversion": ("pressure_for_force",),
     "studies.forward": ("forward",),
+    "studies.identify": ("identify",),
     "studies.inverse": ("inverse",),
+    "studies.measurements": ("Measurements",),
     "studies.report": ("sensitivity_report",),
     "studies.sensitivity": ("sensitivities", "tip_compliance", "tip_jacobian"),
-    "studies.weight_sensitivity": ("weight_sensitivity",),
     "studies.step": ("Run", "Step"),
+    "studies.tensile": ("fit_tensile",),
     "studies.tolerances": ("error_bars", "monte_carlo"),
+    "studies.weight_sensitivity": ("weight_sensitivity",),
     "units": ("BAR", "DEGREE", "MILLIMETRE", "NEWTON_MILLIMETRE"),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}

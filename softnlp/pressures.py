@@ -97,7 +97,7 @@ def _ramp(ramp: RampTable, sets: int) -> Array:
 
 def _csv(text: str, sets: int) -> PressurePath:
     """Read a header of t_s (optional) and one column a set, in any order, and one row a step."""
-    rows = _rows(text)
+    rows = csv_rows(text)
     line, header = next(rows, (1, []))
     if not header:
         raise InputError(f"expected a header {_names(sets)} and rows of numbers, got an empty file")
@@ -115,7 +115,7 @@ def _csv(text: str, sets: int) -> PressurePath:
         raise InputError("expected at least one row of numbers below the header, got none")
     table = np.frombuffer(values).reshape(-1, len(header))
     if text.count("_") > sum(name.count("_") for name in header):  # Python reads 1_5 as 15
-        for line, row in list(_rows(text))[1:]:
+        for line, row in list(csv_rows(text))[1:]:
             if any("_" in cell for cell in row):
                 raise _not_a_number(line, header, row)
     _require_possible(table, lines, columns)
@@ -123,7 +123,7 @@ def _csv(text: str, sets: int) -> PressurePath:
     return PressurePath(pressures * BAR, table[:, columns[TIME_COLUMN]].copy() if TIME_COLUMN in columns else None)
 
 
-def _rows(text: str) -> Iterator[tuple[int, list[str]]]:
+def csv_rows(text: str) -> Iterator[tuple[int, list[str]]]:
     """Yield each row that is not blank with the line it ends on, counted from 1."""
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:

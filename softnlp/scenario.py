@@ -23,6 +23,7 @@ from softnlp.robot import DIMENSIONS, ROBOTS, Robot, Violation, check, violation
 from softnlp.rod import Loads
 from softnlp.scenario_check import first_of, parse
 from softnlp.scenario_contact import contact_settings, contact_task
+from softnlp.scenario_identify import Given, identify_task
 from softnlp.scenario_inverse import inverse_task
 from softnlp.scenario_schema import RobotTable, ScenarioFile
 from softnlp.scenario_workspace import workspace_task
@@ -138,7 +139,8 @@ def _scenario(text: str, path: Path) -> Scenario:
     file = parse(data)
     errors: list[InputError] = []
     made = _attempt(errors, "robot", lambda: _robot(file.robot))
-    chosen = _attempt(errors, "material", lambda: material_from_table(data["material"], folder=path.parent))
+    silicone = data.get("material") or file.material.model_dump(exclude_none=True)
+    chosen = _attempt(errors, "material", lambda: material_from_table(silicone, folder=path.parent))
     steps = made and _attempt(errors, "pressure", lambda: _steps(file, made[0].chamber_sets, path.parent))
     contact = task = None
     if (wall := getattr(file, "contact", None)) is not None:
@@ -280,9 +282,16 @@ def _inverse_task(given: Read) -> Task:
     return inverse_task(given.file.target, given.file.bounds, given.robot)
 
 
+def _identify_task(given: Read) -> Task:
+    return identify_task(
+        Given(given.file, given.data, given.robot, given.material, given.folder, lambda table: _robot(table)[0])
+    )
+
+
 TASKS: Mapping[str, tuple[str, Callable[[Read], Task]]] = {
     "blocked-force": ("contact", _contact_task),
     "workspace": ("workspace", _workspace_task),
     "inverse": ("target", _inverse_task),
+    "identify": ("measurements", _identify_task),
 }
 """For each study with tables of its own: the table that its errors are about, and what reads them."""

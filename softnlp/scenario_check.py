@@ -11,6 +11,7 @@ from pydantic_core import ErrorDetails
 from softnlp.errors import InputError, nearest
 from softnlp.reading import choices, did_you_mean, one_line, shown
 from softnlp.scenario_schema import BlockedForceFile, ForwardFile, ScenarioFile
+from softnlp.schema_identify import IdentifyFile
 from softnlp.schema_inverse import InverseFile
 from softnlp.schema_workspace import WorkspaceFile
 
@@ -19,6 +20,7 @@ SCHEMAS: Mapping[str, type[ScenarioFile]] = {
     "blocked-force": BlockedForceFile,
     "inverse": InverseFile,
     "workspace": WorkspaceFile,
+    "identify": IdentifyFile,
 }
 """The studies that this version runs, and the file of each."""
 
@@ -157,6 +159,8 @@ def _keys(schema: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
 def _model(schema: type[BaseModel], loc: tuple[int | str, ...]) -> type[BaseModel]:
     """Return the table at a place of the file."""
     for part in loc:
+        if part not in schema.model_fields:
+            continue  # a name that a person gave, as in [robots.NAME]
         annotation = schema.model_fields[str(part)].annotation
         candidates = (annotation, *get_args(annotation))
         schema = next(a for a in candidates if isinstance(a, type) and issubclass(a, BaseModel))

@@ -198,4 +198,6 @@ def test_links_lead_somewhere() -> None:
 
 
 def test_the_studies_that_run_are_those_of_the_documents() -> None:
-    assert set(SCHEMAS) == set(re.findall(r'"(forward|blocked-force|inverse|workspace)"', SCENARIO.read_text()))
+    assert set(SCHEMAS) == set(
+        re.findall(r'"(forward|blocked-force|identify|inverse|workspace)"', SCENARIO.read_text())
+    )

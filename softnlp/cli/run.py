@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 _COMMANDS: Mapping[str, str] = {
     "workspace": "sweep",
+    "identify": "identify",
 }
 """Studies whose result is no list of steps: which module of this package has the `run_study` that runs a scenario."""
 

@@ -3,6 +3,7 @@
 from softnlp.plots.blocked import blocked_figure
 from softnlp.plots.comparison import comparison_figure
 from softnlp.plots.dexterity import dexterity_figure
+from softnlp.plots.identify import identified_figure, tensile_figure
 from softnlp.plots.material import material_figure
 from softnlp.plots.run import run_figure
 from softnlp.plots.section import section_figure
@@ -13,9 +14,11 @@ __all__ = [
     "blocked_figure",
     "comparison_figure",
     "dexterity_figure",
+    "identified_figure",
     "material_figure",
     "run_figure",
     "save_figure",
     "section_figure",
+    "tensile_figure",
     "workspace_figure",
 ]

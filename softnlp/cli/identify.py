@@ -1,0 +1,241 @@
+"""`softnlp identify`: constants from a tensile test or from measurements of robots."""
+
+from __future__ import annotations
+
+import io
+import json as json_module
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say, say_rows
+from softnlp.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from softnlp.scenario import Scenario
+    from softnlp.studies.identified import Identified
+    from softnlp.studies.identify_task import RobotTask, TensileTask
+    from softnlp.studies.tensile import TensileFit
+
+
+class _Stop(Exception):
+    """Ends an identification between two evaluations."""
+
+
+def identify(scenario: Path, /, *, out: Path | None = None, json: bool = False) -> int:
+    """Find constants from a tensile test or from measurements of robots, as a scenario of study "identify" asks.
+
+    Prints the constants with their standard errors and what is left of the data; writes identified.json, table.csv,
+    tables to paste into a scenario (material.toml of a tensile test, else identified.toml), figure.png, versions.json
+    and a copy of the scenario. The exit status is 0, 3 when nothing was found, 2 for bad input, 130 when stopped.
+
+    Parameters
+    ----------
+    scenario
+        TOML file; docs/identify.md lists what it may hold.
+    out
+        Folder for the results; by default results/NAME, where NAME is that of the scenario file.
+    json
+        Print one JSON document and nothing else; no files are written unless --out is given.
+    """
+    from softnlp.scenario import load_scenario
+
+    asked = load_scenario(scenario)
+    if asked.study != "identify":
+        raise InputError(
+            f"expected 'identify', got {asked.study!r}; softnlp run runs it", source=str(scenario), key="study"
+        )
+    return run_study(asked, out, json)
+
+
+def run_study(asked: Scenario, out: Path | None, json: bool) -> int:
+    """Identify what a scenario asks for, print it and write the results; return the exit status."""
+    from softnlp.cli.run import _require_writable
+    from softnlp.studies.identify_task import TensileTask
+
+    folder = out if out is not None or json else Path("results") / asked.path.stem
+    if folder is not None:
+        _require_writable(folder)
+    tensile = isinstance(asked.task, TensileTask)
+    return _tensile(asked, folder, json) if tensile else _robots(asked, folder, json)
+
+
+def _tensile(asked: Scenario, folder: Path | None, json: bool) -> int:
+    from softnlp.results.identify_document import (
+        document_text,
+        material_file_text,
+        tensile_document,
+        tensile_table_text,
+    )
+    from softnlp.studies.identify_task import TensileTask
+    from softnlp.studies.tensile import fit_tensile
+
+    task = asked.task
+    assert isinstance(task, TensileTask)
+    fit = fit_tensile(task.stretch, task.stress, task.laws, name=task.name, density=task.density, start=task.start)
+    document = document_text(tensile_document(asked, task, fit))
+    if folder is not None:
+        from softnlp.plots import tensile_figure
+
+        texts = {
+            "identified.json": document,
+            "table.csv": tensile_table_text(task, fit),
+            "material.toml": material_file_text(task, fit),
+        }
+        _write(folder, asked, texts, tensile_figure(fit, task.name, task.before))
+    if json:
+        say(document.rstrip("\n"))
+    else:
+        _say_tensile(task, fit)
+        if folder is not None:
+            say(f"results in {folder}")
+    return SOLVED if all(f.material is not None for f in fit.fits.values()) else SOME_UNSOLVED
+
+
+def _say_tensile(task: TensileTask, fit: TensileFit) -> None:
+    """Print the constants of every law."""
+    low, high = next(iter(fit.fits.values())).fitted_stretch
+    say(f"{task.name}: {task.stretch.size} points, stretch {low:.4g} to {high:.4g}")
+    if task.before is not None:
+        from softnlp.studies.tensile import tensile_misfit
+
+        old = tensile_misfit(task.before, task.stretch, task.stress)
+        say(
+            f"before, {task.before.name} ({task.before.law.name}): rmse {old.rmse / 1e3:.4g} kPa, mape {old.mape:.3g} %"
+        )
+    rows = []
+    for f in fit.fits.values():
+        constants = ", ".join(
+            f"{c.file_key} = {f.constants[c.name] / c.scale:.6g} +- {f.standard_errors[c.name] / c.scale:.2g}"
+            for c in f.law.constants
+        )
+        rows.append([f.law.name, f"{f.r_squared:.6f}", f"{f.misfit.rmse / 1e3:.4g}", f"{f.misfit.mape:.3g}", constants])
+    say_rows(["law", "R^2", "rmse_kPa", "mape_percent", "constants"], rows)
+    for f in fit.fits.values():
+        for warning in f.warnings:
+            say(f"{f.law.name}: {warning}")
+
+
+def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
+    from softnlp.results.identify_document import document_text, identified_text, robot_document, robot_table_text
+    from softnlp.status import Status
+    from softnlp.studies.identify_task import RobotTask
+
+    task = asked.task
+    assert isinstance(task, RobotTask)
+    try:
+        found = _identified(asked, task)
+    except _Stop:
+        complain("stopped; an identification that is not finished leaves no constants")
+        return STOPPED
+    solved = found.status is Status.SOLVED
+    document = document_text(robot_document(asked, task, found))
+    if folder is not None:
+        texts = {"identified.json": document, "table.csv": robot_table_text(task, found)}
+        figure = None
+        if solved:
+            from softnlp.plots import identified_figure
+
+            texts["identified.toml"] = identified_text(asked, found)
+            figure = identified_figure(found, asked.title)
+        _write(folder, asked, texts, figure)
+    if json:
+        say(document.rstrip("\n"))
+    else:
+        _say_robots(asked, found)
+        if folder is not None:
+            say(f"results in {folder}")
+    return SOLVED if solved else SOME_UNSOLVED
+
+
+def _identified(asked: Scenario, task: RobotTask) -> Identified:
+    """Identify with a progress bar, which counts evaluations up to a guess of how many there will be."""
+    from softnlp.contact_settings import ContactSettings
+    from softnlp.studies.identify import identify
+
+    with progress(_GUESS, asked.title) as (advance, stop_asked):
+
+        def tell(evaluations: int, error: float) -> None:
+            advance(min(evaluations, _GUESS - 1))
+            if stop_asked():
+                raise _Stop
+
+        return identify(
+            task.measurements,
+            asked.material,
+            task.free,
+            coefficients=asked.coefficients,
+            bounds=task.bounds,
+            contact=asked.contact or ContactSettings(),
+            loads=asked.loads,
+            conventions=asked.conventions,
+            numerics=asked.numerics,
+            progress=tell,
+        )
+
+
+_GUESS = 40
+
+
+def _say_robots(asked: Scenario, found: Identified) -> None:
+    """Print constants and misfits."""
+    from softnlp.results.identify_document import UNITS, file_name
+
+    say(f"{asked.title}: {', '.join(d.label for d in found.data)}; {asked.material.name} ({asked.material.law.name})")
+    if found.status != "solved":
+        say(f"{found.status}: {found.message}")
+        return
+    rows = []
+    for k, name in enumerate(found.free.names):
+        key, scale = file_name(name, found.material)
+        error = found.uncertainty.standard_errors[k] / scale
+        values = (found.constants[k] / scale, error, found.free.start[k] / scale)
+        rows.append([key, *(f"{v:.6g}" for v in values)])
+    say_rows(["constant", "value", "standard_error", "start"], rows)
+    before, after = found.errors(False), found.errors()
+    say_rows(
+        ["observable", "numbers", "rmse_before", "rmse_after", "mape_before_percent", "mape_after_percent", "sigma"],
+        [
+            [
+                UNITS[key][0],
+                str(after[key].count),
+                *(f"{m[key].rmse / UNITS[key][1]:.4g}" for m in (before, after)),
+                *(f"{m[key].mape:.3g}" for m in (before, after)),
+                _sigma_text(found, key),
+            ]
+            for key in after
+        ],
+    )
+    for warning in found.warnings:
+        say(f"warning: {warning}")
+
+
+def _sigma_text(found: Identified, key: str) -> str:
+    """Return the range of standard deviations that the residuals of an observable were divided by."""
+    import numpy as np
+
+    from softnlp.results.identify_document import UNITS
+    from softnlp.studies.measurements import column_slice
+
+    used = np.concatenate([d.sigma[:, column_slice(key)][np.isfinite(d.of(key))] for d in found.data]) / UNITS[key][1]
+    low, high = float(np.min(used)), float(np.max(used))
+    return f"{low:.3g}" if high <= low * 1.0001 else f"{low:.3g} to {high:.3g}"
+
+
+def _write(folder: Path, asked: Scenario, texts: Mapping[str, str], figure: Figure | None) -> None:
+    """Write everything, each file whole, after all of it is made."""
+    from softnlp.results.files import make_folder, write_whole
+    from softnlp.results.inputs import versions
+
+    contents: dict[str, Any] = {name: text.encode() for name, text in texts.items()}
+    contents["versions.json"] = (json_module.dumps(versions(), indent=2) + "\n").encode()
+    contents["scenario.toml"] = asked.text.encode()
+    if figure is not None:
+        png = io.BytesIO()
+        figure.savefig(png, format="png")
+        contents["figure.png"] = png.getvalue()
+    make_folder(folder)
+    for name, content in contents.items():
+        write_whole(folder / name, content)

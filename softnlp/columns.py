@@ -1,0 +1,89 @@
+"""A CSV file of measurements: columns by name, blank cells where nothing was measured, others passed through."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.errors import InputError
+from softnlp.pressures import csv_rows
+from softnlp.reading import LONGEST_NAME, one_line, read_text, shown
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """The cells of a file as text. file : as it was named. lines : of each row, counted from 1."""
+
+    file: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    lines: tuple[int, ...]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.header
+
+    def text(self, name: str) -> list[str]:
+        """Return the cells of a column, "" where the file has no such column."""
+        if name not in self.header:
+            return [""] * len(self.rows)
+        at = self.header.index(name)
+        return [row[at].strip() for row in self.rows]
+
+    def numbers(self, name: str, *, blank: bool = False) -> Array:
+        """Return a column as numbers; nan where a cell is blank, if it may be, or where there is no such column.
+
+        Raises `InputError` naming file, line and column of the first cell that is not a finite number.
+        """
+        values = np.full(len(self.rows), np.nan)
+        if name not in self.header:
+            return values
+        for k, cell in enumerate(self.text(name)):
+            if cell == "" and blank:
+                continue
+            try:
+                values[k] = float(cell)
+            except ValueError:
+                raise self.wrong(k, name, f"expected a number, got {shown(cell)}") from None
+            if not isfinite(values[k]) or "_" in cell:
+                raise self.wrong(k, name, f"expected a finite number, got {shown(cell)}")
+        return values
+
+    def wrong(self, row: int, name: str, message: str) -> InputError:
+        """Return an error about a cell."""
+        return InputError(f"{self.file}: line {self.lines[row]}: {name}: {message}", key="file")
+
+
+def read_columns(folder: Path, file: str, needed: Collection[str] = ()) -> Columns:
+    """Return the columns of a CSV file.
+
+    Raises `InputError` with the key "file" for a file that cannot be read, a column that is missing or given twice, a
+    row of another length, or no row.
+    """
+    label = one_line(file, LONGEST_NAME)
+    try:
+        rows = list(csv_rows(read_text(folder / file)))
+    except InputError as error:
+        raise InputError(f"{label}: {error.message}", key="file") from None
+    if len(rows) < 2:
+        raise InputError(f"{label}: expected a header and rows of numbers", key="file")
+    header = tuple(one_line(name.strip(), LONGEST_NAME) for name in rows[0][1])
+    for name in header:
+        if name and header.count(name) > 1:
+            raise InputError(f"{label}: expected each column once, got {shown(name)} twice", key="file")
+    for name in needed:
+        if name not in header:
+            raise InputError(f"{label}: missing column {name!r}; it has {', '.join(header)}", key="file")
+    for line, row in rows[1:]:
+        if len(row) != len(header):
+            raise InputError(
+                f"{label}: line {line}: expected {len(header)} values as in the header, got {len(row)}", key="file"
+            )
+    cells = tuple(tuple(row) for _, row in rows[1:])
+    return Columns(label, header, cells, tuple(line for line, _ in rows[1:]))

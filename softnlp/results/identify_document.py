@@ -1,0 +1,313 @@
+"""What an identification leaves behind: a JSON document, a table of the data, and tables that a scenario accepts."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Mapping
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softnlp.materials import Material
+from softnlp.results.inputs import package_version, tidy
+from softnlp.studies.fit_statistics import Misfit
+from softnlp.studies.free_constants import COEFFICIENTS
+from softnlp.studies.measurements import OBSERVABLES, column_slice
+from softnlp.units import BAR, DEGREE, MEGAPASCAL, MILLIMETRE
+
+if TYPE_CHECKING:
+    from softnlp.scenario import Scenario
+    from softnlp.studies.identified import Identified
+    from softnlp.studies.identify_task import RobotTask, TensileTask
+    from softnlp.studies.tensile import LawFit, TensileFit
+
+UNITS: Mapping[str, tuple[str, float]] = {
+    "tip_position": ("tip_position_mm", MILLIMETRE),
+    "bending_angle": ("bending_angle_deg", DEGREE),
+    "elongation": ("elongation_mm", MILLIMETRE),
+    "blocked_force": ("blocked_force_N", 1.0),
+}
+"""Key of each observable in files, and its unit there."""
+
+_TABLE_OF = {"stiffening": ("k_e", "k_b"), "corrections": ("k_a", "k_i", "phi"), "contact": ("k_c",)}
+
+
+def number(value: float) -> float | None:
+    """Return a number for JSON, None where it is none."""
+    return float(value) if isfinite(value) else None
+
+
+def document_text(document: Mapping[str, Any]) -> str:
+    """Return a document as JSON text."""
+    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _head(asked: Scenario) -> dict[str, Any]:
+    return {
+        "softnlp": package_version(),
+        "title": asked.title,
+        "study": "identify",
+        "conventions": asked.conventions.name,
+    }
+
+
+def _misfit(found: Misfit, unit: float) -> dict[str, Any]:
+    return {"count": found.count, "rmse": number(found.rmse / unit), "mape_percent": number(found.mape)}
+
+
+# --- tensile tests ----------------------------------------------------------------------------------------------------
+
+
+def tensile_document(asked: Scenario, task: TensileTask, fit: TensileFit) -> dict[str, Any]:
+    """Return the JSON document of a tensile test."""
+    from softnlp.studies.tensile import tensile_misfit
+
+    best = fit.best
+    before = None if task.before is None else tensile_misfit(task.before, task.stretch, task.stress)
+    return {
+        **_head(asked),
+        "material": task.name,
+        "files": list(task.files),
+        "points": int(task.stretch.size),
+        "fitted_stretch": [float(v) for v in next(iter(fit.fits.values())).fitted_stretch],
+        "before": None
+        if before is None
+        else {"rmse_MPa": number(before.rmse / MEGAPASCAL), "mape_percent": number(before.mape)},
+        "best": None if best is None else best.law.name,
+        "laws": [_law(f) for f in fit.fits.values()],
+    }
+
+
+def _law(fit: LawFit) -> dict[str, Any]:
+    constants = fit.law.constants
+    return {
+        "model": fit.law.name,
+        "status": "solved" if fit.material is not None else "unstable_material",
+        "message": fit.problem or "the sum of squares is at a minimum",
+        "constants": {c.file_key: number(fit.constants[c.name] / c.scale) for c in constants},
+        "standard_errors": {c.file_key: number(fit.standard_errors[c.name] / c.scale) for c in constants},
+        "correlation": _matrix(fit.correlation),
+        "condition": number(fit.condition),
+        "r_squared": number(fit.r_squared),
+        "rmse_MPa": number(fit.misfit.rmse / MEGAPASCAL),
+        "mape_percent": number(fit.misfit.mape),
+        "unstable_from_stretch": fit.unstable_from,
+        "warnings": list(fit.warnings),
+    }
+
+
+def material_file_text(task: TensileTask, fit: TensileFit) -> str:
+    """Return a materials file with every fitted law that is a material; the others are comments."""
+    low, high = next(iter(fit.fits.values())).fitted_stretch
+    name = _quoted(task.name)
+    source = f"tensile test: {', '.join(task.files)}, {task.stretch.size} points"
+    lines = [
+        "# Constants fitted by softnlp identify; +- is one standard error.",
+        "",
+        f"[{name}]",
+        f"density_kg_m3 = {tidy(task.density)!r}",
+        f"fitted_stretch = [{tidy(low)!r}, {tidy(high)!r}]",
+        f"source = {_quoted(source, always=True)}",
+    ]
+    for f in fit.fits.values():
+        block = [f"[{name}.{_quoted(f.law.name)}]"]
+        formula = formula_of(f.law)
+        if formula is not None:
+            block.append(f"formula = {_quoted(formula, always=True)}")
+            block.append(f"[{name}.{_quoted(f.law.name)}.constants]")
+        for c in f.law.constants:
+            value, error = f.constants[c.name] / c.scale, f.standard_errors[c.name] / c.scale
+            block.append(f"{c.file_key} = {value!r}  # +- {error:.2g}")
+        note = f"# R^2 = {f.r_squared:.6f}, rmse {f.misfit.rmse / MEGAPASCAL:.3g} MPa"
+        lines += ["", note, *(f"# {_plain(w)}" for w in f.warnings)]
+        lines += block if f.material is not None else [f"# {line}" for line in block]
+    return "\n".join(lines) + "\n"
+
+
+def formula_of(law: Any) -> str | None:
+    """Return the text of a person's law, None for a built-in one."""
+    function = getattr(law.formula, "function", None)
+    text = getattr(function, "text", None)
+    return str(text) if text is not None else None
+
+
+def tensile_table_text(task: TensileTask, fit: TensileFit) -> str:
+    """Return the data and every law's stress at them as CSV."""
+    laws = list(fit.fits.values())
+    curves = [f.stress(task.stretch) / MEGAPASCAL for f in laws]
+    if task.before is not None:
+        curves.insert(0, np.asarray(task.before.engineering_stress(task.stretch)) / MEGAPASCAL)
+    before = ["before_MPa"] if task.before is not None else []
+    header = ["file", "stretch", "stress_MPa", *before, *(f"{f.law.name}_MPa" for f in laws)]
+    rows = [
+        [task.files[task.file_of_point[k]], task.stretch[k], task.stress[k] / MEGAPASCAL, *(c[k] for c in curves)]
+        for k in range(task.stretch.size)
+    ]
+    return _csv(header, rows)
+
+
+# --- measurements of robots -------------------------------------------------------------------------------------------
+
+
+def robot_document(asked: Scenario, task: RobotTask, found: Identified) -> dict[str, Any]:
+    """Return the JSON document of measurements of robots."""
+    constants = []
+    for k, name in enumerate(found.free.names):
+        key, scale = file_name(name, found.material)
+        constants.append(
+            {
+                "name": key,
+                "value": number(found.constants[k] / scale),
+                "standard_error": number(found.uncertainty.standard_errors[k] / scale),
+                "start": number(found.free.start[k] / scale),
+                "bounds": [number(found.free.lower[k] / scale), number(found.free.upper[k] / scale)],
+                "at_bound": name in found.at_bound,
+            }
+        )
+    return {
+        **_head(asked),
+        "status": str(found.status),
+        "message": found.message,
+        "constants": constants,
+        "correlation": _matrix(found.uncertainty.correlation),
+        "condition": number(found.uncertainty.condition),
+        "errors": {
+            when: {UNITS[key][0]: _misfit(m, UNITS[key][1]) for key, m in found.errors(after).items()}
+            for when, after in (("before", False), ("after", True))
+        },
+        "sigma": {d.label: _sigma(d) for d in found.data},
+        "tables": scenario_tables(found) if found.status == "solved" else None,
+        "measurements": [row for k in range(len(found.data)) for row in _rows(found, k)],
+        "evaluations": found.evaluations,
+        "warnings": list(found.warnings),
+    }
+
+
+def file_name(name: str, material: Material) -> tuple[str, float]:
+    """Return the key that files have for a constant, and its unit there in SI."""
+    plain = name.removeprefix("material.")
+    for c in material.law.constants:
+        if c.name == plain and name not in COEFFICIENTS:
+            return c.file_key, c.scale
+    return name, 1.0
+
+
+def _sigma(data: Any) -> dict[str, float]:
+    """Return the root mean square of the standard deviations that the residuals were divided by."""
+    found = {}
+    for key, (file_key, unit) in UNITS.items():
+        used = data.sigma[:, column_slice(key)][np.isfinite(data.of(key))]
+        if used.size:
+            found[file_key] = float(np.sqrt(np.mean(used**2)) / unit)
+    return found
+
+
+def _rows(found: Identified, k: int) -> list[dict[str, Any]]:
+    """Return what was measured of one robot with the model before and after."""
+    data = found.data[k]
+    rows = []
+    for j, P in enumerate(data.pressure):
+        row: dict[str, Any] = {"robot": data.label, "pressure_bar": [tidy(p, BAR) for p in P]}
+        for when, values in (("measured", data.values), ("before", found.before[k]), ("after", found.after[k])):
+            row[when] = {
+                UNITS[key][0]: _value(values[j, column_slice(key)] / UNITS[key][1])
+                for key in OBSERVABLES
+                if np.any(np.isfinite(data.values[j, column_slice(key)]))
+            }
+        rows.append(row)
+    return rows
+
+
+def _value(values: Any) -> Any:
+    numbers = [number(v) for v in values]
+    return numbers[0] if len(numbers) == 1 else numbers
+
+
+def scenario_tables(found: Identified) -> dict[str, Any]:
+    """Return the tables of a scenario with what was identified, and the coefficients that go with it."""
+    values = {name: float(getattr(found.coefficients, c.field)) for name, c in COEFFICIENTS.items()}
+    tables: dict[str, Any] = {}
+    for table, names in _TABLE_OF.items():
+        if table != "contact" or "k_c" in found.free.names:
+            tables[table] = {COEFFICIENTS[n].field: values[n] for n in names}
+    if any(q.startswith("material.") for q in found.free.quantities):
+        material = found.material
+        formula = formula_of(material.law)
+        tables["material"] = {
+            "name": material.name,
+            "model": material.law.name,
+            "density_kg_m3": tidy(material.density),
+            "fitted_stretch": [tidy(v) for v in material.fitted_stretch],
+            **({} if formula is None else {"formula": formula}),
+            "constants": {c.file_key: float(material.constants[c.name]) / c.scale for c in material.law.constants},
+        }
+    return tables
+
+
+def identified_text(asked: Scenario, found: Identified) -> str:
+    """Return tables to paste into a scenario, with standard errors as comments."""
+    errors = {}
+    for k, name in enumerate(found.free.names):
+        key, scale = file_name(name, found.material)
+        key = COEFFICIENTS[name].field if name in COEFFICIENTS else key
+        error = found.uncertainty.standard_errors[k] / scale
+        errors[key] = f"  # identified, +- {error:.2g}" if isfinite(error) else "  # identified, without standard error"
+        if name in found.at_bound:
+            errors[key] = "  # identified, at its bound"
+    lines = [f"# Identified from {_plain(asked.title)}; tables to paste into a scenario."]
+    for table, values in scenario_tables(found).items():
+        if table == "contact":
+            lines += ["", "# for study blocked-force only"]
+        lines += ["", f"[{table}]"] if table != "contact" else [f"[{table}]"]
+        for key, value in values.items():
+            if isinstance(value, dict):
+                lines += ["", f"[{table}.{key}]"]
+                lines += [f"{_quoted(k)} = {v!r}{errors.get(k, '')}" for k, v in value.items()]
+            else:
+                text = _quoted(value, always=True) if isinstance(value, str) else repr(value)
+                lines.append(f"{key} = {text}{errors.get(key, '')}")
+    return "\n".join(lines) + "\n"
+
+
+def robot_table_text(task: RobotTask, found: Identified) -> str:
+    """Return the rows of the files with what the model says before and after, as CSV."""
+    names, picks = [], []
+    for key, (file_key, unit) in UNITS.items():
+        parts = [file_key] if key != "tip_position" else ["x_mm", "y_mm", "z_mm"]
+        where = range(column_slice(key).start, column_slice(key).stop)
+        for part, column in zip(parts, where, strict=True):
+            if any(np.any(d.measured[:, column]) for d in found.data):
+                names.append(part)
+                picks.append((column, unit))
+    header = [*task.columns, *(f"{n}_{when}" for n in names for when in ("before", "after"))]
+    rows = []
+    for k, cells in enumerate(task.cells):
+        for j, row in enumerate(cells):
+            pairs = [(found.before[k][j, c] / unit, found.after[k][j, c] / unit) for c, unit in picks]
+            rows.append([*row, *(v if isfinite(v) else "" for pair in pairs for v in pair)])
+    return _csv(header, rows)
+
+
+def _matrix(values: Any) -> list[list[float | None]]:
+    return [[number(v) for v in row] for row in values]
+
+
+def _csv(header: list[str], rows: list[list[Any]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows([[f"{v:.10g}" if isinstance(v, float) else v for v in row] for row in rows])
+    return text.getvalue()
+
+
+def _quoted(text: str, *, always: bool = False) -> str:
+    """Return a key, or text, as TOML writes it."""
+    bare = text.replace("-", "").replace("_", "")
+    return text if not always and bare.isascii() and bare.isalnum() else json.dumps(text, ensure_ascii=False)
+
+
+def _plain(text: str) -> str:
+    return " ".join(text.split())

@@ -1,0 +1,118 @@
+"""How well data determine the constants that were fitted to them: standard errors, correlations, what stays open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+CLOSE = 0.99  # two constants whose estimates are correlated more than this are hardly told apart
+POORLY_CONDITIONED = 1e4  # of the Jacobian with columns of length one
+_LEAST_UNUSED = 0.1
+_NOTHING = 1e-6  # of the largest size: such as the angle of a straight shape
+SINGULAR = 1e10  # beyond it a combination of constants is open altogether
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """What is known of fitted constants, in their order.
+
+    standard_errors : (n,) in the units of the constants; inf where the data leave the constant open, nan where it was
+    held or there are as many constants as data. correlation : (n, n), nan where it is not defined. condition : of the
+    Jacobian with its columns scaled to length one. warnings : what the data cannot tell apart, by name.
+    """
+
+    standard_errors: Array
+    correlation: Array
+    condition: float
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """How far a model is from data.
+
+    count : of values. rmse : in the data's unit. mape : mean absolute error [%] of what each value is compared with;
+    nan where there is nothing to compare with.
+    """
+
+    count: int
+    rmse: float
+    mape: float
+
+
+def misfit(errors: Array, sizes: Array) -> Misfit:
+    """Return the misfit of errors, each compared with a size; where that is next to nothing, for the rmse alone."""
+    compared = np.abs(sizes) > _NOTHING * np.max(np.abs(sizes))
+    percent = 100 * np.mean(np.abs(errors[compared]) / np.abs(sizes[compared])) if np.any(compared) else np.nan
+    return Misfit(errors.size, float(np.sqrt(np.mean(errors**2))), float(percent))
+
+
+def uncertainty(names: Sequence[str], J: Array, residuals: Array, held: Sequence[bool] | None = None) -> Uncertainty:
+    """Return the uncertainty of constants at a least-squares solution.
+
+    J : (m, n) derivative of the weighted residuals (m,) by the constants. held : constants that are not estimated, such
+    as those at a bound. The covariance is s^2 (J^T J)^-1, which takes the weighted errors as independent and of one
+    size; a standard error is that of the HC3 estimate (MacKinnon and White 1985) where this is larger, so that it holds
+    also where errors grow with the value.
+    """
+    m, n = J.shape
+    free = np.flatnonzero(~np.asarray(held, bool)) if held is not None else np.arange(n)
+    errors, correlation = np.full(n, np.nan), np.full((n, n), np.nan)
+    if free.size == 0:
+        return Uncertainty(errors, correlation, 1.0, ())
+    lengths = np.linalg.norm(J[:, free], axis=0)
+    U, s, Vt = np.linalg.svd(J[:, free] / np.where(lengths > 0, lengths, 1.0), full_matrices=False)
+    condition = float(s[0] / s[-1]) if s[-1] > 0 and m >= free.size else np.inf
+    freed = [names[int(k)] for k in free]
+    if not condition < SINGULAR:
+        weak = _weak_directions(Vt, s)
+        opened = np.flatnonzero(np.max(np.abs(weak), axis=0) > 1e-3)
+        errors[free[opened]] = np.inf
+        return Uncertainty(errors, correlation, condition, (_undetermined(freed, weak[-1]),))
+    covariance = (Vt.T / s**2) @ Vt
+    sizes = np.sqrt(np.diag(covariance))
+    correlation[np.ix_(free, free)] = covariance / np.outer(sizes, sizes)
+    warnings = list(_close_pairs(freed, correlation[np.ix_(free, free)]))
+    if condition > POORLY_CONDITIONED and not warnings:
+        warnings.append(_undetermined(freed, Vt[-1], f"hardly determine (condition number {condition:.2g})"))
+    if m > free.size:
+        spread = np.sqrt(float(residuals @ residuals) / (m - free.size))
+        unused = np.maximum(1 - np.sum(U**2, axis=1), _LEAST_UNUSED)  # of a value, by the fit: 1 - leverage
+        each = np.sqrt(np.sum(((Vt.T / s) @ (U.T * residuals / unused)) ** 2, axis=1))
+        errors[free] = np.maximum(spread * sizes, each) / lengths
+    else:
+        warnings.append(f"{m} values determine {free.size} constants without any to spare: no standard errors")
+    return Uncertainty(errors, correlation, condition, tuple(warnings))
+
+
+def _weak_directions(Vt: Array, s: Array) -> Array:
+    """Return the directions of the constants that the data leave open, as rows; the weakest last."""
+    weak = Vt[s < s[0] / SINGULAR]
+    return weak if len(weak) else Vt[-1:]
+
+
+def _close_pairs(names: Sequence[str], correlation: Array) -> list[str]:
+    """Say in one line which pairs of constants the data hardly tell apart."""
+    pairs = [
+        f"{names[j]} and {names[i]} (correlation {correlation[i, j]:.4f})"
+        for i in range(len(names))
+        for j in range(i)
+        if abs(correlation[i, j]) > CLOSE
+    ]
+    if not pairs:
+        return []
+    return [f"the data hardly tell apart {', '.join(pairs)}: fix one of each pair, or add measurements of another kind"]
+
+
+def _undetermined(names: Sequence[str], direction: Array, how: str = "do not determine") -> str:
+    """Say which constants have most part in a direction that the data leave open."""
+    order = np.argsort(-np.abs(direction))[:2]
+    chosen = [names[int(k)] for k in order if abs(direction[k]) > 1e-3]
+    if len(chosen) < 2:
+        return f"the data {how} {chosen[0]}: fix it, or add measurements that depend on it"
+    return f"the data {how} {chosen[0]} and {chosen[1]} apart: fix one of them, or add measurements of another kind"

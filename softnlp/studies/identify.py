@@ -1,0 +1,349 @@
+"""Identification: constants of the model from measurements of one or several robots, as one least-squares problem.
+
+Every number measured gives a residual (model - measured) / sigma; the constants are shared by all. The poses are the
+solutions of the model's equations at the trial constants, and their derivatives are exact, so this is Gauss-Newton in
+a trust region (scipy's `least_squares`) on the constants alone; `softnlp.studies.identify_nlp` solves the same problem
+with all poses as unknowns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.contact_settings import ContactSettings
+from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.errors import InputError, MaterialError
+from softnlp.materials import Material
+from softnlp.numerics import Numerics
+from softnlp.quantities import Model
+from softnlp.rod import Loads
+from softnlp.status import Status
+from softnlp.studies.fit_statistics import Uncertainty, uncertainty
+from softnlp.studies.forward import checked_loads
+from softnlp.studies.free_constants import FreeConstants, free_constants
+from softnlp.studies.identified import Identified
+from softnlp.studies.measurements import (
+    COLUMNS,
+    POSE_COLUMNS,
+    Data,
+    Measurements,
+    checked_measurements,
+)
+from softnlp.studies.predicted_force import BlockedForces
+from softnlp.studies.predicted_pose import ArcPoses, Failure, FreePoses, LoadedPoses, Prediction
+from softnlp.studies.trial import TrialBlocked, TrialPoses
+from softnlp.studies.wall import checked_contact
+
+Array = NDArray[np.float64]
+
+_MOST_EVALUATIONS = 200
+_MOVED = 1e-4  # relative; constants that move more are followed once more from zero pressure
+_TIGHT = 1e-13
+_NEARLY = 1e-2  # of a constant or its scale: a rough search that ends nearer to a bound is about to reach it
+_AT_BOUND = 1e-6  # of a constant or its scale
+
+
+def identify(
+    measurements: Measurements | Sequence[Measurements],
+    material: Material,
+    free: Sequence[str],
+    *,
+    coefficients: Coefficients = Coefficients(),
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    contact: ContactSettings = ContactSettings(),
+    loads: Loads = Loads(),
+    conventions: Conventions = REPRODUCTION,
+    numerics: Numerics = Numerics(),
+    progress: Callable[[int, float], None] | None = None,
+) -> Identified:
+    """Find the constants that bring the model nearest to the measurements.
+
+    Parameters
+    ----------
+    measurements
+        Of one robot or of several that share the constants.
+    material, coefficients
+        Where the constants start, and the values of those that are not free.
+    free
+        Of "k_e", "k_b", "k_a", "k_i", "phi", "k_c" and the names of the material's constants, such as "C10".
+    bounds
+        (lower, upper) by name, SI, in place of the default ones.
+    contact, loads, conventions, numerics
+        As `softnlp.blocked_force`; the same in every measurement.
+    progress
+        Called with the number of evaluations and the root mean square of the residuals.
+
+    Raises
+    ------
+    InputError
+        For measurements, names or bounds that are not right, fewer numbers than constants, or a constant that no
+        measurement depends on.
+
+    """
+    given = (measurements,) if isinstance(measurements, Measurements) else tuple(measurements)
+    if not given:
+        raise InputError("expected measurements of at least one robot", key="measurements")
+    data = tuple(checked_measurements(m) for m in given)
+    chosen = free_constants(free, material, coefficients, bounds)
+    count = sum(int(np.sum(d.measured[d.root_weight > 0])) for d in data)
+    if count < len(free):
+        raise InputError(f"{count} numbers measured cannot determine {len(free)} constants", key="free")
+    loads, contact = checked_loads(loads), checked_contact(contact)
+    if contact.closure == "weighted" and any(np.any(d.measured[:, -1]) for d in data):
+        raise InputError("expected a closure that has a definite force; 'weighted' depends on weights", key="closure")
+    kinds: dict[tuple[int, int], TrialBlocked] = {}
+    models = []
+    for d in data:
+        kind = (d.robot.chamber_sets, d.robot.chambers_per_set)
+        if kind not in kinds:
+            model = Model(d.robot, material, coefficients, conventions)
+            kinds[kind] = TrialBlocked(TrialPoses(model, numerics), contact)
+        models.append(_Predicted(d, kinds[kind].of(d.robot), chosen, loads))
+    return _Fit(data, models, chosen, material, coefficients, progress).solve()
+
+
+class _Predicted:
+    """Everything measured of one robot, as the model predicts it."""
+
+    def __init__(self, data: Data, solver: TrialBlocked, free: FreeConstants, loads: Loads) -> None:
+        self._data = data
+        unloaded = not np.any([loads.tip_force, loads.tip_moment, loads.gravity])
+        self._poses: FreePoses = (
+            ArcPoses(solver.poses, data.pressure, free.quantities)
+            if unloaded
+            else LoadedPoses(solver.poses, data.pressure, loads, free.quantities)
+        )
+        self._rows = np.flatnonzero(data.measured[:, -1])
+        self._forces: BlockedForces | None = None
+        if self._rows.size:
+            self._forces = BlockedForces(solver, data.pressure[self._rows], loads, free.quantities)
+
+    def evaluate(self, constants: Mapping[str, float], anew: bool) -> Prediction:
+        """Return the values in the order of `COLUMNS`, and their derivatives."""
+        poses = self._poses.evaluate(constants, anew)
+        k, n = len(POSE_COLUMNS), poses.slopes.shape[-1]
+        rows = len(self._data.pressure)
+        values, slopes = np.full((rows, len(COLUMNS)), np.nan), np.full((rows, len(COLUMNS), n), np.nan)
+        values[:, :k], slopes[:, :k] = poses.values[:, :k], poses.slopes[:, :k]
+        failures = poses.failures
+        if self._forces is not None and not failures:
+            r = self._rows
+            forces = self._forces.evaluate(constants, poses.values[r, k:], poses.slopes[r, k:], anew)
+            values[r, k:], slopes[r, k:] = forces.values, forces.slopes
+            failures = tuple(Failure(int(r[f.row]), f.status, f.message) for f in forces.failures)
+        return Prediction(values, slopes, failures)
+
+
+class _Fit:
+    """The least-squares problem of an identification."""
+
+    def __init__(
+        self,
+        data: tuple[Data, ...],
+        models: Sequence[_Predicted],
+        free: FreeConstants,
+        material: Material,
+        coefficients: Coefficients,
+        progress: Callable[[int, float], None] | None,
+    ) -> None:
+        self.data = data
+        self.models = models
+        self.free = free
+        self.material = material
+        self.coefficients = coefficients
+        self.progress = progress
+        self.evaluations = 0
+        self.measured = [d.measured for d in data]
+        self.fitted = [d.measured & (d.root_weight[:, None] > 0) for d in data]
+        self._last: tuple[Array, list[Prediction]] | None = None
+
+    def solve(self) -> Identified:
+        """Minimise from the start; then follow every pose again from zero pressure, to be sure of its branch."""
+        first = self.predictions(self.free.start, anew=True)
+        if (lost := self._lost(first)) is not None:
+            return self._unsolved(*lost, first)
+        self._require_dependence(first)
+        x = self._minimise(self.free.start)
+        last = self.predictions(x, anew=True)
+        if (lost := self._lost(last)) is not None:
+            return self._unsolved(*lost, first)
+        again = self._minimise(x)  # on the grids that suit the poses there
+        last = self.predictions(
+            again, anew=bool(np.any(np.abs(again - x) > _MOVED * np.maximum(np.abs(x), self.free.scale)))
+        )
+        if (lost := self._lost(last)) is not None:
+            return self._unsolved(*lost, first)
+        return self._found(again, first, last)
+
+    def predictions(self, x: Array, anew: bool = False) -> list[Prediction]:
+        """Return what the model says of every robot; the last result is kept."""
+        if not anew and self._last is not None and np.array_equal(self._last[0], x):
+            return self._last[1]
+        values = self.free.values(x)
+        found = [model.evaluate(values, anew) for model in self.models]
+        self.evaluations += 1
+        self._last = (x.copy(), found)
+        if self.progress is not None:
+            r = self.residuals(found)
+            self.progress(self.evaluations, float(np.sqrt(np.mean(r**2))))
+        return found
+
+    def residuals(self, found: Sequence[Prediction]) -> Array:
+        """Return the weighted residuals of all numbers measured; nan where a pose was not found."""
+        parts = []
+        for d, prediction, mask in zip(self.data, found, self.fitted, strict=True):
+            parts.append(((prediction.values - d.values) / d.sigma * d.root_weight[:, None])[mask])
+        return np.concatenate(parts)
+
+    def jacobian(self, found: Sequence[Prediction]) -> Array:
+        """Return the derivative of the weighted residuals by the constants."""
+        parts = []
+        for d, prediction, mask in zip(self.data, found, self.fitted, strict=True):
+            parts.append((prediction.slopes / d.sigma[:, :, None] * d.root_weight[:, None, None])[mask])
+        return np.concatenate(parts)
+
+    def _minimise(self, start: Array) -> Array:
+        """Return the constants at the minimum within the bounds.
+
+        An interior method comes near a bound ever more slowly. So the first search is a rough one; what has then all
+        but reached a bound that the sum of squares pushes it against is held there while the others are found.
+        """
+        free = self.free
+        every = np.ones(start.size, bool)
+        x = self._search(start, every, 1e-7)
+        near = _NEARLY * np.maximum(free.scale, np.abs(x))
+        low, high = x - free.lower < near, free.upper - x < near
+        bound = np.where(low, free.lower, np.where(high, free.upper, x))
+        moving = ~(low | high)
+        if np.all(moving) or not np.any(moving):
+            return self._search(bound, every, _TIGHT)
+        held = self._search(bound, moving, _TIGHT)
+        found = self.predictions(held)
+        if self._lost(found) is None:
+            slope = self.jacobian(found).T @ self.residuals(found)
+            if np.all(slope[low] >= 0) and np.all(slope[high] <= 0):
+                return held
+        return self._search(x, every, _TIGHT)
+
+    def _search(self, start: Array, moving: NDArray[np.bool_], tolerance: float) -> Array:
+        """Return the minimum over the constants that move."""
+        from scipy.optimize import least_squares
+
+        scale = self.free.scale
+
+        def at(z: Array) -> list[Prediction]:
+            x = start.copy()
+            x[moving] = z * scale[moving]
+            return self.predictions(x)
+
+        done = least_squares(
+            lambda z: self.residuals(at(z)),
+            start[moving] / scale[moving],
+            jac=lambda z: (self.jacobian(at(z)) * scale)[:, moving],
+            bounds=(self.free.lower[moving] / scale[moving], self.free.upper[moving] / scale[moving]),
+            x_scale="jac",
+            ftol=tolerance,
+            xtol=tolerance,
+            gtol=_TIGHT,
+            max_nfev=_MOST_EVALUATIONS,
+        )
+        x = start.copy()
+        x[moving] = done.x * scale[moving]
+        return x
+
+    def _lost(self, found: Sequence[Prediction]) -> tuple[Status, str] | None:
+        """Return the status of the first measurement that the model has no pose for."""
+        for d, prediction in zip(self.data, found, strict=True):
+            for failure in prediction.failures:
+                where = f"{d.label}, measurement {failure.row + 1}"
+                return failure.status, f"{where}: {failure.message}"
+        return None
+
+    def _require_dependence(self, found: Sequence[Prediction]) -> None:
+        """Refuse a constant that no measurement depends on."""
+        J = np.abs(self.jacobian(found)) * self.free.scale
+        for k, name in enumerate(self.free.names):
+            if not np.max(J[:, k]) > 0:
+                raise InputError(f"no measurement depends on {name!r}; fix it", key="free")
+
+    def _held(self, x: Array) -> list[bool]:
+        """Whether each constant is at a bound."""
+        free = self.free
+        near = _AT_BOUND * np.maximum(free.scale, np.abs(x))
+        return [bool(v) for v in (x - free.lower < near) | (free.upper - x < near)]
+
+    def _found(self, x: Array, first: Sequence[Prediction], last: Sequence[Prediction]) -> Identified:
+        held = self._held(x)
+        at_bound = tuple(name for name, h in zip(self.free.names, held, strict=True) if h)
+        known = uncertainty(self.free.names, self.jacobian(last), self.residuals(last), held)
+        warnings = list(known.warnings)
+        for k, name in enumerate(self.free.names):
+            if held[k]:
+                warnings.append(
+                    f"{name} ended at its bound {x[k]:.4g}; it was held there for the other standard errors"
+                )
+        warnings += self._stretched(last)
+        status, message = Status.SOLVED, "the sum of squares is at a minimum"
+        material, coefficients = self.material, self.coefficients
+        try:
+            material, coefficients = self.free.applied(x, material, coefficients)
+        except MaterialError as error:
+            status, message = Status.UNSTABLE_MATERIAL, f"the constants found are no material: {error.message}"
+        return self._result(status, message, x, at_bound, known, material, coefficients, first, last, warnings)
+
+    def _stretched(self, found: Sequence[Prediction]) -> list[str]:
+        """Say where a free robot is stretched beyond the range in which the material was fitted."""
+        low, high = self.material.fitted_stretch
+        warnings = []
+        for d, prediction in zip(self.data, found, strict=True):
+            stretch = 1 + prediction.values[:, POSE_COLUMNS.index("elongation")] / float(d.robot.length)
+            row = int(np.argmax(stretch))
+            if stretch[row] > high:
+                warnings.append(
+                    f"{d.label}, measurement {row + 1}: the free robot is stretched to {stretch[row]:.3f}, outside "
+                    f"{low:g} to {high:g}, where {self.material.name} was fitted"
+                )
+        return warnings
+
+    def _unsolved(self, status: Status, message: str, first: Sequence[Prediction]) -> Identified:
+        n = len(self.free.names)
+        nothing = Uncertainty(np.full(n, np.nan), np.full((n, n), np.nan), np.nan, ())
+        nowhere = [Prediction(np.full_like(p.values, np.nan), p.slopes, ()) for p in first]
+        x = np.full(n, np.nan)
+        return self._result(status, message, x, (), nothing, self.material, self.coefficients, first, nowhere, [])
+
+    def _result(
+        self,
+        status: Status,
+        message: str,
+        x: Array,
+        at_bound: tuple[str, ...],
+        known: Uncertainty,
+        material: Material,
+        coefficients: Coefficients,
+        first: Sequence[Prediction],
+        last: Sequence[Prediction],
+        warnings: Sequence[str],
+    ) -> Identified:
+        before, after = (
+            tuple(np.where(m, p.values, np.nan) for p, m in zip(every, self.measured, strict=True))
+            for every in (first, last)
+        )
+        return Identified(
+            status=status,
+            message=message,
+            free=self.free,
+            constants=x,
+            at_bound=at_bound,
+            uncertainty=known,
+            material=material,
+            coefficients=coefficients,
+            data=self.data,
+            before=before,
+            after=after,
+            evaluations=self.evaluations,
+            warnings=tuple(warnings),
+        )

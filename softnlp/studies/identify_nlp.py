@@ -1,0 +1,202 @@
+"""Identification as one NLP: every pose of every measurement an unknown, the constants shared, the misfit minimised.
+
+It is the same problem as that of `softnlp.studies.identify`, which eliminates the poses; here IPOPT moves poses and
+constants together. It is the slower of the two and there to check the other: nothing but the rod is shared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.contact_settings import ContactSettings
+from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.errors import InputError
+from softnlp.loadcase import LoadCase, load_case, rod_functions
+from softnlp.materials import Material
+from softnlp.numerics import Numerics
+from softnlp.problem import CompiledProblem, compile_problem
+from softnlp.quantities import Model, Quantity
+from softnlp.rod import Loads
+from softnlp.solver import Engine
+from softnlp.status import Status
+from softnlp.studies.blocked import BlockedSolver
+from softnlp.studies.blocked_grid import Blocked
+from softnlp.studies.forward import checked_loads
+from softnlp.studies.free_constants import FreeConstants, free_constants
+from softnlp.studies.measurements import COLUMNS, POSE_COLUMNS, RELATIVE_NOISE, Data, Measurements, checked_measurements
+from softnlp.studies.pose_grid import Solved
+from softnlp.studies.statics import PoseSolver
+from softnlp.studies.wall import checked_contact, standing_wall
+from softnlp.tip import tip_conditions
+from softnlp.transcription import method_named
+
+Array = NDArray[np.float64]
+
+_OBJECTIVE = RELATIVE_NOISE**2  # what multiplies the cost, so that its gradient is about as large as the equations'
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedAtOnce:
+    """What the NLP gave. constants : by name as asked, SI, nan unless solved. cost : half the sum of squares.
+
+    residual : largest scaled violation of any equation, evaluated again.
+    """
+
+    status: Status
+    constants: Mapping[str, float]
+    cost: float
+    residual: float
+    iterations: int
+
+
+class _Nlp:
+    """Load cases, values and first guesses, gathered measurement by measurement."""
+
+    def __init__(self, free: FreeConstants, intervals: int) -> None:
+        self.free = free
+        self.numerics = Numerics(intervals=intervals)
+        self.method = method_named(self.numerics.transcription, intervals)
+        self.declared: dict[str, Quantity] = {}
+        self.cases: list[LoadCase] = []
+        self.values: dict[str, Array] = {}
+        self.guesses: list[Array] = []
+        self.squares: list[ca.MX] = []
+
+    def own(self, name: str, like: Quantity, value: Array | float) -> Quantity:
+        """Return a quantity of one robot or measurement, with its value."""
+        made = replace(like, name=name, symbol=ca.MX.sym(name, like.size))
+        self.declared[name] = made
+        self.values[name] = np.asarray(value, float)
+        return made
+
+    def add_robot(self, data: Data, model: Model, contact: ContactSettings, loads: Loads, label: str) -> None:
+        """Add the load cases of everything measured of one robot."""
+        poses = PoseSolver(model, self.numerics)
+        given = {}
+        for name, q in poses.quantities.items():
+            if name.startswith("robot."):
+                given[name] = self.own(f"{label}.{name}", q, q.nominal)
+            else:  # shared by all robots
+                given[name] = self.declared.setdefault(name, q)
+        for name in ("tip_force", "tip_moment", "gravity"):
+            self.values[name] = np.asarray(getattr(loads, name), float)
+        blocked = BlockedSolver(model, self.numerics, contact, poses=poses)
+        has_force = bool(np.any(data.measured[:, -1]))
+        wall = standing_wall(poses, blocked.contact, data.pressure, loads) if has_force else None
+        rod = rod_functions(model, tip_conditions(contact.closure)) if has_force else None
+        near_free: Solved | None = None
+        near: Blocked | None = None
+        for row, P in enumerate(data.pressure):
+            mask = data.measured[row]
+            if not np.any(mask):
+                continue
+            here = f"{label}.{row}"
+            step, near_free = poses.solve(P, loads, near_free)
+            if near_free is None:
+                raise InputError(f"measurement {row + 1}: no pose to start from: {step.message}", key="measurements")
+            at = given | {"pressure": self.own(f"{here}.pressure", given["pressure"], P)}
+            free = load_case(f"{here} free", poses.functions, at, self.method)
+            self.cases.append(free)
+            self.guesses.append(near_free.solution.x)
+            self._add_squares(_pose_observables(free), data, row, range(len(POSE_COLUMNS)))
+            if not mask[-1]:
+                continue
+            assert wall is not None
+            assert rod is not None
+            step, near = blocked.solve(P, loads, wall, near)
+            if near is None:
+                raise InputError(f"measurement {row + 1}: no blocked shape: {step.message}", key="measurements")
+            lengths = free.outputs["chamber_lengths"]
+            contact_values = blocked.values(near.situation, near.pressed, np.zeros(0))
+            for name, q in rod.declared().items():
+                if name == "contact.free_lengths":
+                    at[name] = replace(q, symbol=lengths)
+                elif name == "contact.chamber_reaction":
+                    at[name] = self.declared.setdefault(name, q)
+                elif name.startswith("contact."):
+                    at[name] = self.own(f"{here}.{name}", q, np.asarray(contact_values.get(name, q.nominal), float))
+            ordered = {name: at[name] for name in rod.declared()}
+            pressed = load_case(f"{here} blocked", rod, ordered, self.method)
+            self.cases.append(pressed)
+            self.guesses.append(near.solution.x)
+            self._add_squares([pressed.outputs["tip_forces"][0]], data, row, [len(COLUMNS) - 1])
+
+    def _add_squares(self, observed: Sequence[ca.MX], data: Data, row: int, columns: Sequence[int]) -> None:
+        """Add the squared residuals of what was measured."""
+        for value, column in zip(observed, columns, strict=True):
+            if data.measured[row, column]:
+                error = (value - data.values[row, column]) / data.sigma[row, column]
+                self.squares.append((data.root_weight[row] * error) ** 2)
+
+    def compiled(self) -> CompiledProblem:
+        """Return the problem with the constants free."""
+        declared = dict(self.declared)
+        for name, lower, upper, scale in zip(
+            self.free.quantities, self.free.lower, self.free.upper, self.free.scale, strict=True
+        ):
+            if name not in declared:
+                raise InputError(f"no measurement depends on {name!r}; fix it", key="free")
+            declared[name] = replace(declared[name], lower=float(lower), upper=float(upper), scale=float(scale))
+        return compile_problem(
+            list(declared.values()),
+            self.cases,
+            free=self.free.quantities,
+            objective=_OBJECTIVE * sum(self.squares[1:], self.squares[0]) / 2,
+        )
+
+
+def _pose_observables(case: LoadCase) -> list[ca.MX]:
+    out = case.outputs
+    tip = out["tip_position"]
+    return [tip[0], tip[1], tip[2], out["bending_angle"], out["backbone_length"] - case.length_unit]
+
+
+def identify_at_once(
+    measurements: Measurements | Sequence[Measurements],
+    material: Material,
+    free: Sequence[str],
+    *,
+    coefficients: Coefficients = Coefficients(),
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    contact: ContactSettings = ContactSettings(),
+    loads: Loads = Loads(),
+    conventions: Conventions = REPRODUCTION,
+    intervals: int = 20,
+) -> IdentifiedAtOnce:
+    """Find the constants as `softnlp.studies.identify.identify` does, with all poses as unknowns of one NLP.
+
+    The arguments are those of `identify`; intervals : of every rod. It starts from the poses at the first constants.
+    A bending angle of a straight shape cannot be among the measurements: it has no derivative.
+
+    Raises
+    ------
+    InputError
+        As `identify`, and where a measurement has no pose at the start.
+    """
+    given = (measurements,) if isinstance(measurements, Measurements) else tuple(measurements)
+    chosen = free_constants(free, material, coefficients, bounds)
+    nlp = _Nlp(chosen, intervals)
+    loads, contact = checked_loads(loads), checked_contact(contact)
+    for k, m in enumerate(given):
+        data = checked_measurements(m)
+        nlp.add_robot(data, Model(data.robot, material, coefficients, conventions), contact, loads, f"robot {k + 1}")
+    problem = nlp.compiled()
+    known = {q.name for q in problem.fixed}
+    p = problem.pack({name: value for name, value in nlp.values.items() if name in known})
+    head = problem.pack_free(chosen.values(chosen.start))
+    solution = Engine(problem, tolerance=1e-10).solve(p, np.concatenate([head, *nlp.guesses]))
+    cost = float(ca.Function("cost", [problem.nlp["x"], problem.nlp["p"]], [problem.nlp["f"]])(solution.x, p))
+    cost /= _OBJECTIVE
+    solved = solution.holds(nlp.numerics.tolerance) and solution.engine_status == "Solve_Succeeded"
+    found = problem.free_values(solution.x)
+    constants = {
+        name: float(found[q][0]) if solved else float("nan")
+        for name, q in zip(chosen.names, chosen.quantities, strict=True)
+    }
+    status = Status.SOLVED if solved else Status.DIVERGED
+    return IdentifiedAtOnce(status, constants, cost if solved else float("nan"), solution.residual, solution.iterations)

@@ -1,0 +1,57 @@
+"""What a scenario asks of an identification, as data in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.laws import Law
+from softnlp.materials import Material
+from softnlp.studies.measurements import Measurements
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class TensileTask:
+    """Laws to fit to a tensile test.
+
+    stretch, stress : (points,), [-] and engineering [Pa], of every file. file_of_point : (points,) from 0. files : as
+    they were named. name, density : of the silicone. start : of a person's law, SI. before : to compare with, or None.
+    """
+
+    stretch: Array
+    stress: Array
+    file_of_point: NDArray[np.intp]
+    files: tuple[str, ...]
+    laws: tuple[Law, ...]
+    name: str
+    density: float
+    start: Mapping[str, float] | None
+    before: Material | None
+
+    def step_count(self, pressures: int) -> int:
+        """Return one: it is solved as a whole."""
+        return 1
+
+
+@dataclass(frozen=True, eq=False)
+class RobotTask:
+    """Constants to identify from measurements of robots.
+
+    measurements : of each robot. free : names of constants. bounds : by name, SI. columns : the header of the file.
+    cells : for each robot and row, the cells of the file as they were read.
+    """
+
+    measurements: tuple[Measurements, ...]
+    free: tuple[str, ...]
+    bounds: Mapping[str, tuple[float, float]]
+    columns: tuple[str, ...]
+    cells: tuple[tuple[tuple[str, ...], ...], ...]
+
+    def step_count(self, pressures: int) -> int:
+        """Return one: it is solved as a whole."""
+        return 1

@@ -1,0 +1,142 @@
+"""Measurements of one robot: what was seen of its pose and of its blocked force at each pressure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.errors import InputError, nearest
+from softnlp.robot import LOWERABLE_RULES, Robot, check
+from softnlp.studies.forward import pressure_table
+
+Array = NDArray[np.float64]
+
+POSE_COLUMNS = ("tip_x", "tip_y", "tip_z", "bending_angle", "elongation")
+COLUMNS = (*POSE_COLUMNS, "blocked_force")
+"""What can be measured, one number each; m, rad, N."""
+
+OBSERVABLES: Mapping[str, tuple[str, ...]] = {
+    "tip_position": ("tip_x", "tip_y", "tip_z"),
+    "bending_angle": ("bending_angle",),
+    "elongation": ("elongation",),
+    "blocked_force": ("blocked_force",),
+}
+RELATIVE_NOISE = 0.01  # of what is measured, where nothing is said of its noise
+_FLOOR = 0.1  # of an observable's root mean square: smaller numbers count as if they were this large
+
+
+@dataclass(frozen=True, eq=False)
+class Measurements:
+    """What was measured of one robot, a row a measurement; nan where a number was not measured. SI, world frame.
+
+    robot : whose it is. pressure : (rows, sets) [Pa]. tip_position : (rows, 3) [m]. bending_angle : (rows,) integral of
+    the curvature over the backbone [rad]. elongation : (rows,) backbone length - L_0 [m]. blocked_force : (rows,) [N];
+    the tip is free in the other observables of the same row.
+    sigma : standard deviation of an observable by name, a number or (rows,); by default 1 % of each number, where
+    those below a tenth of the observable's root mean square over this robot's rows count as that tenth does.
+    weight : (rows,) of the squared misfit, 1 by default. label : of the robot in results.
+    """
+
+    robot: Robot
+    pressure: Any
+    tip_position: Any = None
+    bending_angle: Any = None
+    elongation: Any = None
+    blocked_force: Any = None
+    sigma: Mapping[str, Any] = field(default_factory=dict)
+    weight: Any = None
+    label: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """Checked measurements. values, sigma : (rows, 6) in the order of `COLUMNS`; nan where not measured.
+
+    root_weight : (rows,) what a residual is multiplied by.
+    """
+
+    robot: Robot
+    label: str
+    pressure: Array
+    values: Array
+    sigma: Array
+    root_weight: Array
+
+    @property
+    def measured(self) -> NDArray[np.bool_]:
+        """Which entries of `values` there are."""
+        return np.asarray(np.isfinite(self.values))
+
+    def of(self, observable: str) -> Array:
+        """Return the columns of an observable, (rows, 1 or 3)."""
+        return self.values[:, column_slice(observable)]
+
+
+def column_slice(observable: str) -> slice:
+    """Return where an observable stands in `COLUMNS`."""
+    parts = OBSERVABLES[observable]
+    first = COLUMNS.index(parts[0])
+    return slice(first, first + len(parts))
+
+
+def checked_measurements(given: Measurements) -> Data:
+    """Return measurements as arrays, or raise `InputError` naming what is not right."""
+    check(given.robot, allow=LOWERABLE_RULES)
+    P = pressure_table(given.pressure, given.robot.chamber_sets)
+    rows = len(P)
+    values = np.full((rows, len(COLUMNS)), np.nan)
+    for observable, parts in OBSERVABLES.items():
+        value = getattr(given, observable)
+        if value is None:
+            continue
+        shape = (rows,) if len(parts) == 1 else (rows, len(parts))
+        column = _numbers(value, shape, observable)
+        values[:, column_slice(observable)] = column.reshape(rows, -1)
+    if not np.any(np.isfinite(values)):
+        raise InputError(f"expected at least one number of {', '.join(OBSERVABLES)}", key="measurements")
+    weight = np.ones(rows) if given.weight is None else _numbers(given.weight, (rows,), "weight")
+    if not np.all(weight >= 0):
+        raise InputError("expected weights that are not negative", key="weight")
+    data = Data(given.robot, given.label or given.robot.name, P, values, np.ones_like(values), np.sqrt(weight))
+    return replace(data, sigma=_sigmas(data, given.sigma))
+
+
+def _sigmas(data: Data, given: Mapping[str, Any]) -> Array:
+    """Return the standard deviation of every number measured."""
+    sigma = np.full_like(data.values, np.nan)
+    for key in given:
+        if key not in OBSERVABLES:
+            raise InputError(f"unknown observable{nearest(key, OBSERVABLES)}", key=f"sigma.{key}")
+    for observable in OBSERVABLES:
+        values = data.of(observable)
+        if not np.any(np.isfinite(values)):
+            continue
+        squares = np.nansum(values**2, axis=1)
+        where = np.any(np.isfinite(values), axis=1)
+        column = RELATIVE_NOISE * np.sqrt(squares + _FLOOR**2 * np.mean(squares[where]))
+        if observable in given:
+            stated = np.asarray(given[observable], float)
+            if stated.shape not in ((), (len(values),)):
+                raise InputError(f"expected a number or {len(values)} of them", key=f"sigma.{observable}")
+            column = np.where(np.isnan(stated), column, stated)
+        if not np.all(column[where] > 0) or not np.all(np.isfinite(column[where])):
+            raise InputError("expected standard deviations above 0", key=f"sigma.{observable}")
+        sigma[:, column_slice(observable)] = column[:, None]
+    return sigma
+
+
+def _numbers(value: Any, shape: tuple[int, ...], key: str) -> Array:
+    """Return an array of a shape whose entries are finite or nan."""
+    try:
+        array = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError("expected numbers", key=key) from None
+    if array.shape != shape:
+        raise InputError(f"expected the shape {shape}, a row a measurement, got {array.shape}", key=key)
+    if np.any(np.isinf(array)):
+        raise InputError("expected finite numbers, or nan where nothing was measured", key=key)
+    return array

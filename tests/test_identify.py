@@ -1,0 +1,446 @@
+"""Identification from measurements: constants recovered, derivatives, two ways that agree, files, what is refused."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # benchmarks/ is not installed
+
+from benchmarks.identify_data import TABLES
+from benchmarks.identify_data import main as write_shipped_files
+from softnlp import (
+    BAR,
+    Coefficients,
+    InputError,
+    Loads,
+    Measurements,
+    Numerics,
+    Status,
+    forward,
+    identify,
+    material,
+    robot,
+)
+from softnlp.cli import main
+from softnlp.contact_settings import ContactSettings
+from softnlp.materials import Material
+from softnlp.quantities import Model
+from softnlp.robot import Robot
+from softnlp.scenario import load_scenario, scenario_from_text
+from softnlp.studies.blocked_force import blocked_force
+from softnlp.studies.fit_statistics import uncertainty
+from softnlp.studies.identified import Identified
+from softnlp.studies.identify_nlp import identify_at_once
+from softnlp.studies.identify_task import RobotTask
+from softnlp.studies.measurements import checked_measurements
+from softnlp.studies.predicted_force import BlockedForces
+from softnlp.studies.predicted_pose import ArcPoses, FreePoses, LoadedPoses
+from softnlp.studies.trial import TrialBlocked, TrialPoses
+
+ROOT = Path(__file__).parents[1]
+SCENARIOS = ROOT / "scenarios" / "identify"
+SILICONE = material("Ecoflex 00-50")
+TRUE = Coefficients(elongation=0.6, bending=2.0, area=0.95, inertia=1.1, bore_fraction=0.2, chamber_reaction=1.1)
+POSES = BAR * np.array(
+    [[0.4, 0, 0], [0.8, 0, 0], [1.2, 0, 0], [0.6, 0.6, 0], [1.1, 0.7, 0], [0.5, 0.5, 0.5], [1, 1, 1]]
+)
+LOADED = Loads(tip_force=(0.0, 0.01, 0.0), gravity=(0.0, 0.0, 9.81))
+
+
+def forward_poses(r: Robot, P: Any, coefficients: Coefficients, **options: Any) -> Measurements:
+    """Return the poses that forward solves give, as if they had been measured."""
+    poses = [step.pose for step in forward(r, SILICONE, P, coefficients=coefficients, **options).steps]
+    assert all(pose is not None for pose in poses)
+    return Measurements(
+        r,
+        P,
+        tip_position=[pose.tip_position for pose in poses if pose],
+        bending_angle=[pose.bending_angle for pose in poses if pose],
+        elongation=[pose.backbone_length - r.length for pose in poses if pose],
+    )
+
+
+@cache
+def closed_form() -> TrialPoses:
+    return TrialPoses(Model(robot("D25L60"), SILICONE, TRUE), Numerics())
+
+
+def seen(r: Robot, P: Any, bending: float = 2.0) -> Measurements:
+    """Return the unloaded poses of the true constants in closed form, which a test below holds against the rod."""
+    poses = closed_form().of(r).at({"stiffening.bending": bending})
+    values = ArcPoses(poses, np.asarray(P), ()).evaluate({"stiffening.bending": bending}).values
+    return Measurements(r, P, tip_position=values[:, :3], bending_angle=values[:, 3], elongation=values[:, 4])
+
+
+def started(free: Sequence[str]) -> Coefficients:
+    """Return the true coefficients with the free ones at their defaults."""
+    fields = {"k_e": "elongation", "k_b": "bending", "k_a": "area", "k_i": "inertia", "phi": "bore_fraction"}
+    fields["k_c"] = "chamber_reaction"
+    return replace(TRUE, **{fields[n]: getattr(Coefficients(), fields[n]) for n in free if n in fields})
+
+
+def true_values(found: Identified, silicone: Material = SILICONE) -> list[float]:
+    values = {"k_e": 0.6, "k_b": 2.0, "k_a": 0.95, "k_i": 1.1, "phi": 0.2, "k_c": 1.1, **silicone.constants}
+    return [values[name] for name in found.free.names]
+
+
+@pytest.mark.parametrize(
+    "free", [("k_e", "k_b"), ("k_e", "k_b", "phi", "k_i"), ("k_a", "k_b"), ("C10", "C01", "k_b"), ("k_i", "C20", "phi")]
+)
+def test_constants_come_back_from_poses_of_two_robots(free: tuple[str, ...]) -> None:
+    start = replace(
+        SILICONE, constants={**SILICONE.constants, **{n: 1.2 * SILICONE.constants[n] for n in free if n[0] == "C"}}
+    )
+    data = [seen(robot(name), POSES) for name in ("D25L60", "D15L40")]
+    found = identify(data, start, free, coefficients=started(free))
+    assert found.status is Status.SOLVED
+    assert found.constants == pytest.approx(true_values(found), rel=1e-6)
+    assert not found.at_bound
+    assert all(m.mape < 1e-4 for m in found.errors().values())
+    assert any(m.mape > 1 for m in found.errors(after=False).values())
+
+
+def test_constants_come_back_from_loaded_poses() -> None:
+    numerics = Numerics(intervals=10)
+    data = forward_poses(robot("D15L60"), POSES[1:6:2], TRUE, loads=LOADED, numerics=numerics)
+    found = identify(
+        data,
+        SILICONE,
+        ["k_e", "k_b", "phi"],
+        coefficients=started(["k_e", "k_b", "phi"]),
+        loads=LOADED,
+        numerics=numerics,
+    )
+    assert found.constants == pytest.approx(true_values(found), rel=1e-6)
+
+
+def test_constants_come_back_from_forces_and_angles() -> None:
+    P = BAR * np.array([[0, 0, 0], [0.5, 0, 0], [1.0, 0, 0]])
+    r = robot("D25L60")
+    contact = ContactSettings(tip_cap=0.005)
+    forces = [s.contact.force for s in blocked_force(r, SILICONE, P, contact, coefficients=TRUE).steps if s.contact]
+    data = replace(seen(r, P), blocked_force=forces, tip_position=None, elongation=None)
+    found = identify(data, SILICONE, ["k_b", "k_c"], coefficients=started(["k_b", "k_c"]), contact=contact)
+    assert found.constants == pytest.approx(true_values(found), rel=1e-6)
+
+
+def test_the_closed_form_is_the_solution_of_the_rod() -> None:
+    r = robot("D20L60")
+    data = forward_poses(r, POSES, TRUE)
+    values = ArcPoses(closed_form().of(r), POSES, ()).evaluate({}).values
+    assert values[:, :3] == pytest.approx(np.array(data.tip_position), abs=1e-8 * r.length)
+    assert values[:, 3] == pytest.approx(np.array(data.bending_angle), abs=2e-8)
+    assert values[:, 4] == pytest.approx(np.array(data.elongation), abs=1e-8 * r.length)
+
+
+NAMES = ("stiffening.elongation", "stiffening.bending", "corrections.bore_fraction", "material.C01")
+AT = {"stiffening.elongation": 0.5, "stiffening.bending": 1.5, "corrections.bore_fraction": 0.3, "material.C01": 15e3}
+
+
+@pytest.mark.parametrize("loaded", [False, True])
+def test_derivatives_of_poses_are_those_of_differences(loaded: bool) -> None:
+    numerics = Numerics(intervals=10)
+    solver = TrialPoses(Model(robot("D15L60"), SILICONE, TRUE), numerics)
+    P = POSES[[1, 3, 5]]
+    poses: FreePoses = LoadedPoses(solver, P, LOADED, NAMES) if loaded else ArcPoses(solver, P, NAMES)
+    slopes = poses.evaluate(AT).slopes
+    for k, name in enumerate(NAMES):
+        h = 1e-4 * AT[name]
+        high, low = (poses.evaluate({**AT, name: AT[name] + sign * h}).values for sign in (1, -1))
+        slope = (high - low) / (2 * h)
+        assert slopes[:, :, k] == pytest.approx(slope, abs=2e-6 * np.max(np.abs(slope)))
+
+
+def test_derivatives_of_forces_are_those_of_differences() -> None:
+    solver = TrialBlocked(TrialPoses(Model(robot("D25L60"), SILICONE, TRUE), Numerics(intervals=10)), ContactSettings())
+    P = BAR * np.array([[0.9, 0, 0]])
+    names, at = (*NAMES[1:], "contact.chamber_reaction"), {**AT, "contact.chamber_reaction": 1.2}
+    poses, forces = ArcPoses(solver.poses, P, names), BlockedForces(solver, P, Loads(), names)
+
+    def force(values: dict[str, float]) -> tuple[float, Any]:
+        free = poses.evaluate(values)
+        found = forces.evaluate(values, free.values[:, 5:], free.slopes[:, 5:])
+        assert not found.failures
+        return float(found.values[0, 0]), found.slopes[0, 0]
+
+    slopes = force(at)[1]
+    for k, name in enumerate(names):
+        h = 1e-4 * at[name]
+        slope = (force({**at, name: at[name] + h})[0] - force({**at, name: at[name] - h})[0]) / (2 * h)
+        assert slopes[k] == pytest.approx(slope, rel=1e-5)
+
+
+def test_one_nlp_of_all_poses_gives_the_same_constants() -> None:
+    """On the same grid of a loaded robot both solve the same equations; the data have errors of some percent."""
+    P = BAR * np.array([[0.9, 0, 0], [0.8, 0.8, 0]])
+    numerics = Numerics(intervals=4)
+    data = forward_poses(robot("D25L60"), P, TRUE, loads=LOADED, numerics=numerics)
+    angle, length = np.array(data.bending_angle) * [1.02, 0.99], np.array(data.elongation) * [1.01, 0.99]
+    wrong = replace(data, bending_angle=angle, elongation=length, tip_position=None)
+    options: dict[str, Any] = {"coefficients": started(["k_b", "k_e"]), "loads": LOADED}
+    reduced = identify(wrong, SILICONE, ["k_b", "k_e"], numerics=numerics, **options)
+    at_once = identify_at_once(wrong, SILICONE, ["k_b", "k_e"], intervals=4, **options)
+    assert at_once.status is Status.SOLVED
+    assert at_once.residual < 1e-8
+    assert list(at_once.constants.values()) == pytest.approx(reduced.constants, rel=1e-5)
+    assert at_once.cost > 0.1
+
+
+@pytest.mark.parametrize("grows", [False, True], ids=["equal noise", "noise that grows with the number"])
+def test_two_sigma_intervals_hold_the_constants(grows: bool) -> None:
+    """Of the linearised problem with the default sigmas; benchmarks/identify.py draws with the whole one."""
+    r, names = robot("D25L60"), NAMES[:3]
+    found = ArcPoses(closed_form().of(r), POSES, names).evaluate({})
+    exact, J = found.values[:, 3:5], found.slopes[:, 3:5]
+    data = checked_measurements(Measurements(r, POSES, bending_angle=exact[:, 0], elongation=exact[:, 1]))
+    sigma = data.sigma[:, 3:5]
+    size = np.abs(exact) if grows else np.sqrt(np.mean(exact**2, axis=0))
+    random = np.random.default_rng(7)
+    weighted = (J / sigma[:, :, None]).reshape(-1, len(names))
+    inside = []
+    for _ in range(400):
+        y = (0.01 * size * random.standard_normal(exact.shape) / sigma).ravel()
+        change = np.linalg.lstsq(weighted, y, rcond=None)[0]
+        errors = uncertainty(names, weighted, weighted @ change - y).standard_errors
+        inside.append(np.abs(change) <= 2 * errors)
+    assert np.min(np.mean(inside, axis=0)) >= 0.9
+
+
+def test_constants_that_the_data_cannot_tell_apart_are_named() -> None:
+    """k_i and k_b both stiffen the bending; one pressure shows their sum alone."""
+    data = seen(robot("D25L60"), POSES[1:2])
+    found = identify(replace(data, elongation=None), SILICONE, ["k_b", "k_i"], coefficients=started(["k_b"]))
+    assert any("k_b" in w and "k_i" in w for w in found.warnings)
+    assert np.isinf(found.uncertainty.standard_errors).all()
+
+
+def test_a_constant_at_its_bound_is_named_and_the_others_are_at_their_best() -> None:
+    data = seen(robot("D25L60"), POSES, bending=0.0)
+    off = replace(data, bending_angle=np.array(data.bending_angle) * 1.1, tip_position=None)
+    found = identify(off, SILICONE, ["k_b", "k_e"], coefficients=started(["k_b", "k_e"]))
+    assert found.at_bound == ("k_b",)
+    assert found.constants[0] == 0.0
+    assert any("k_b ended at its bound 0" in w for w in found.warnings)
+    alone = identify(off, SILICONE, ["k_e"], coefficients=replace(TRUE, bending=0.0, elongation=0.41))
+    assert found.constants[1] == pytest.approx(alone.constants[0], rel=1e-6)
+    assert found.uncertainty.standard_errors[1] == pytest.approx(alone.uncertainty.standard_errors[0], rel=1e-4)
+
+
+def test_where_the_model_has_no_pose_nothing_is_identified() -> None:
+    soft = material("Ecoflex 00-20", "yeoh")
+    data = Measurements(robot("D25L60"), [[0.1 * BAR, 0, 0], [9 * BAR] * 3], bending_angle=[0.1, 0.0])
+    found = identify(data, soft, ["k_b"], coefficients=Coefficients(elongation=0.0))
+    assert found.status in (Status.NO_EQUILIBRIUM, Status.UNSTABLE_MATERIAL)
+    assert "D25L60, measurement 2" in found.message
+    assert np.isnan(found.constants).all()
+
+
+def test_weights_and_sigmas_choose_what_counts() -> None:
+    r = robot("D25L60")
+    P = [[BAR, 0, 0]] * 2
+    rows = Measurements(r, P, bending_angle=[1.0, 1.2])
+    first = identify(replace(rows, weight=[1.0, 0.0]), SILICONE, ["k_b"])
+    assert first.after[0][0, 3] == pytest.approx(1.0, rel=1e-8)
+    sharp = identify(replace(rows, sigma={"bending_angle": [0.01, 0.03]}), SILICONE, ["k_b"])
+    assert sharp.after[0][0, 3] == pytest.approx((9 * 1.0 + 1.2) / 10, rel=1e-6)
+    even = identify(rows, SILICONE, ["k_b"])  # by default each in proportion to its size
+    small, large = 1 / (1 + 0.01 * 1.22), 1 / (1.44 + 0.01 * 1.22)
+    assert even.after[0][0, 3] == pytest.approx((small * 1.0 + large * 1.2) / (small + large), rel=1e-6)
+
+
+def test_uncertainty_is_that_of_a_straight_line() -> None:
+    x = np.linspace(0, 1, 30)
+    J = np.column_stack([np.ones(30), x])
+    r = 0.1 * np.random.default_rng(2).standard_normal(30)
+    r -= J @ np.linalg.lstsq(J, r, rcond=None)[0]
+    found = uncertainty(["a", "b"], J, r)
+    classic = np.sqrt(np.diag(np.linalg.inv(J.T @ J)) * (r @ r) / 28)
+    assert np.all((found.standard_errors >= classic * (1 - 1e-12)) & (found.standard_errors < 1.5 * classic))
+    held = uncertainty(["a", "b"], J, r, [False, True])
+    assert np.isnan(held.standard_errors[1])
+    assert held.condition == 1.0
+
+
+@pytest.mark.parametrize(
+    ("free", "measured", "said"),
+    [
+        (["k_x"], {"bending_angle": [1.0]}, "did you mean"),
+        (["k_b", "k_b"], {"bending_angle": [1.0]}, "twice"),
+        ([], {"bending_angle": [1.0]}, "at least one of"),
+        (["k_b", "k_e"], {"bending_angle": [1.0]}, "cannot determine 2"),
+        (["k_c"], {"bending_angle": [1.0]}, "no measurement depends on 'k_c'"),
+        (["k_b"], {"elongation": [0.01]}, "no measurement depends on 'k_b'"),
+        (["k_b"], {}, "at least one number"),
+        (["k_b"], {"bending_angle": [np.inf]}, "finite"),
+        (["k_b"], {"bending_angle": [1.0, 2.0]}, "expected the shape"),
+        (["k_b"], {"bending_angle": [1.0], "sigma": {"bending_angle": 0.0}}, "above 0"),
+        (["k_b"], {"bending_angle": [1.0], "sigma": {"angle": 1.0}}, "did you mean 'bending_angle'"),
+        (["k_b"], {"bending_angle": [1.0], "weight": [-1.0]}, "weights"),
+    ],
+)
+def test_what_cannot_be_identified_is_refused(free: list[str], measured: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        identify(Measurements(robot("D25L60"), [[BAR, 0, 0]], **measured), SILICONE, free)
+
+
+# --- scenarios --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["measured_angles", "measured_forces"])
+def test_a_shipped_identification_runs(name: str, tmp_path: Path) -> None:
+    assert main(["run", str(SCENARIOS / f"{name}.toml"), "--out", str(tmp_path)]) == 0
+    files = {path.name for path in tmp_path.iterdir()}
+    assert files == {"identified.json", "table.csv", "identified.toml", "figure.png", "versions.json", "scenario.toml"}
+    document = json.loads((tmp_path / "identified.json").read_text())
+    assert document["status"] == "solved"
+    for key, after in document["errors"]["after"].items():
+        assert after["rmse"] < document["errors"]["before"][key]["rmse"]
+    study = "blocked-force" if name == "measured_forces" else "forward"
+    text = f'study = "{study}"\n[robot]\nname = "D25L60"\n[material]\nname = "Ecoflex 00-50"\nmodel = "yeoh"\n'
+    text += "[pressure]\nsequence_bar = [[1, 0, 0]]\n" + (tmp_path / "identified.toml").read_text()
+    pasted = scenario_from_text(text, "x.toml").coefficients
+    fields = {"k_e": "elongation", "k_b": "bending", "phi": "bore_fraction", "k_c": "chamber_reaction"}
+    for constant in document["constants"]:
+        assert getattr(pasted, fields[constant["name"]]) == pytest.approx(constant["value"], rel=1e-12, abs=1e-15)
+
+
+def test_every_shipped_file_is_as_its_script_writes_it(tmp_path: Path) -> None:
+    write_shipped_files(tmp_path)
+    for make in TABLES:
+        name = f"{make.__name__}.csv"
+        assert (tmp_path / name).read_text() == (ROOT / "scenarios" / "files" / name).read_text()
+    both = load_scenario(SCENARIOS / "measured_forces_and_angles.toml").task
+    assert isinstance(both, RobotTask)
+    assert sum(len(m.pressure) for m in both.measurements) == 44
+
+
+HEAD = 'study = "identify"\n[material]\nname = "Ecoflex 00-50"\nmodel = "mooney-rivlin"\n'
+ONE = '[robot]\nname = "D25L60"\n'
+
+
+def scenario(folder: Path, csv: str, table: str = 'free = ["k_b"]', more: str = ONE) -> Path:
+    (folder / "m.csv").write_text(csv)
+    path = folder / "m.toml"
+    path.write_text(f'{HEAD}{more}[measurements]\nfile = "m.csv"\n{table}\n')
+    return path
+
+
+def test_a_comparison_file_is_read_with_its_blank_cells_and_its_extra_columns(tmp_path: Path) -> None:
+    csv = (
+        "t_s,p1_bar,p2_bar,p3_bar,x_mm,y_mm,z_mm,bending_angle_deg,camera,sigma_bending_angle_deg,weight\n"
+        "0,1,0,0,-30,0,,,left,,\n1,1,1,0,,,,90,right,2,3\n"
+    )
+    task = load_scenario(scenario(tmp_path, csv)).task
+    assert isinstance(task, RobotTask)
+    (m,) = task.measurements
+    assert np.array(m.tip_position) == pytest.approx(np.array([[-0.03, 0, np.nan], [np.nan] * 3]), nan_ok=True)
+    assert np.array(m.bending_angle) == pytest.approx([np.nan, np.pi / 2], nan_ok=True)
+    assert list(m.weight) == [1, 3]
+    assert np.rad2deg(m.sigma["bending_angle"][1]) == pytest.approx(2)
+    assert main(["identify", str(tmp_path / "m.toml"), "--out", str(tmp_path / "o")]) == 0
+    header, first, _ = (tmp_path / "o" / "table.csv").read_text().splitlines()
+    assert header.startswith("t_s,p1_bar,p2_bar,p3_bar,x_mm,y_mm,z_mm,bending_angle_deg,camera,")
+    assert header.endswith("y_mm_before,y_mm_after,bending_angle_deg_before,bending_angle_deg_after")
+    assert first.split(",")[8] == "left"
+
+
+def test_robots_of_a_table_and_of_the_library_share_constants(tmp_path: Path) -> None:
+    csv = "robot,p1_bar,p2_bar,p3_bar,bending_angle_deg\nmine,1,0,0,80\nD15L60,1,0,0,100\n,1,0,0,70\n"
+    more = ONE + '[robots.mine]\nname = "D25L60"\nlength_mm = 70\n'
+    task = load_scenario(
+        scenario(tmp_path, csv, 'free = ["k_b", "C10_MPa"]\nbounds = { C10_MPa = [0, 0.1] }', more)
+    ).task
+    assert isinstance(task, RobotTask)
+    assert [m.label for m in task.measurements] == ["mine", "D15L60", "D25L60"]
+    assert float(task.measurements[0].robot.length) == pytest.approx(0.07)
+    assert task.free == ("k_b", "C10")
+    assert task.bounds == {"C10": (0, pytest.approx(1e5))}
+
+
+GOOD = "p1_bar,p2_bar,p3_bar,bending_angle_deg\n1,0,0,80\n"
+
+
+@pytest.mark.parametrize(
+    ("csv", "table", "more", "said"),
+    [
+        (GOOD, 'free = ["k_b"]', "", "a column robot, or a table [robot]"),
+        (GOOD.replace("80", "x"), 'free = ["k_b"]', ONE, "line 2: bending_angle_deg: expected a number, got 'x'"),
+        (GOOD.replace("1,0,0", "1,,0"), 'free = ["k_b"]', ONE, "line 2: p2_bar: expected a pressure"),
+        (GOOD.replace("1,0,0", "1000,0,0"), 'free = ["k_b"]', ONE, "1 bar = 100 kPa"),
+        (GOOD.replace("80", ""), 'free = ["k_b"]', ONE, "at least one number"),
+        (GOOD, 'free = ["kb"]', ONE, "did you mean 'k_b'"),
+        (
+            "p4_bar," + GOOD.replace("\n1", "\n2,1"),
+            'free = ["k_b"]',
+            ONE,
+            "p4_bar: expected 0 or nothing: D25L60 has 3 sets",
+        ),
+        (GOOD, "", ONE, "[measurements] free: missing"),
+        (GOOD, 'free = ["k_b"]\nbounds = { k_e = [0, 1] }', ONE, "bounds.k_e"),
+        (GOOD, 'free = ["k_b"]\nbounds = { k_b = [1, 0] }', ONE, "lower and an upper"),
+        (GOOD, 'free = ["k_b"]', '[robots.mine]\nnam = "D25L60"\n', "did you mean 'name'"),
+        ("robot," + GOOD.replace("\n1", "\nD25L6,1"), 'free = ["k_b"]', "", "did you mean 'D25L60'"),
+        (GOOD, 'free = ["k_b"]', ONE + '[contact]\nclosure = "weighted"\n', "closure free, compliant or rigid"),
+        (GOOD, 'free = ["k_b"]', ONE + "[contact]\ntarget_force_N = 1\n", "target_force_N"),
+        (GOOD, 'free = ["k_b"]', ONE + "[sigma]\nelongation_m = 1\n", "did you mean 'elongation_mm'"),
+        (GOOD, 'free = ["k_b", "k_e"]', ONE, "1 numbers measured cannot determine 2 constants"),
+    ],
+)
+def test_a_broken_scenario_is_one_line(
+    csv: str, table: str, more: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["identify", str(scenario(tmp_path, csv, table, more)), "--json"]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert len(shown.err.splitlines()) == 1
+    assert said in shown.err
+
+
+def test_json_alone_goes_to_standard_output(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["identify", str(scenario(tmp_path, GOOD.replace("80", "60"))), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["study"] == "identify"
+    assert document["constants"][0]["standard_error"] is None
+    assert document["measurements"][0]["after"]["bending_angle_deg"] == pytest.approx(60, abs=1e-5)
+    assert not (tmp_path / "results").exists()
+
+
+def test_no_pose_ends_with_3(tmp_path: Path) -> None:
+    csv = GOOD.replace("1,0,0", "9,9,9")
+    path = scenario(tmp_path, csv, more=ONE + "[stiffening]\nelongation = 0\n")
+    assert main(["identify", str(path), "--out", str(tmp_path / "o")]) == 3
+    document = json.loads((tmp_path / "o" / "identified.json").read_text())
+    assert document["status"] in ("no_equilibrium", "unstable_material")
+    assert document["constants"][0]["value"] is None
+    assert not (tmp_path / "o" / "identified.toml").exists()
+
+
+def test_another_study_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["identify", str(ROOT / "scenarios" / "D25L60_one_set.toml")]) == 2
+    assert "expected 'identify'" in capsys.readouterr().err
+
+
+def test_a_pose_beyond_the_fitted_stretch_is_named() -> None:
+    P = BAR * np.array([[0.5, 0, 0], [1.5, 1.5, 1.5]])
+    free = identify(Measurements(robot("D25L60"), P, bending_angle=[0.6, np.nan]), SILICONE, ["k_b"])
+    assert not any("stretched" in w for w in free.warnings)
+    soft = replace(SILICONE, constants={k: 0.75 * v for k, v in SILICONE.constants.items()})
+    far = identify(
+        Measurements(robot("D25L60"), P, bending_angle=[0.6, np.nan]),
+        soft,
+        ["k_b"],
+        coefficients=Coefficients(elongation=0),
+    )
+    assert any("D25L60, measurement 2: the free robot is stretched to" in w for w in far.warnings)
