@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from copy import copy
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -80,6 +81,12 @@ class BlockedSolver:
         other = BlockedSolver(self.model, self.numerics, contact, wall=self.has_wall, poses=self.poses)
         if contact.closure == self.contact.closure:
             other.functions, other._compiled = self.functions, self._compiled
+        return other
+
+    def with_model(self, model: Model) -> BlockedSolver:
+        """Return a solver of a model of the same structure (chambers, law, conventions) that shares what is compiled."""
+        other = copy(self)
+        other.model, other.poses = model, self.poses.with_model(model)
         return other
 
     def grid(self, intervals: int, plane: Array | None) -> BlockedGrid:
@@ -199,6 +206,7 @@ class BlockedSolver:
             values["contact.wall_point"] = situation.wall.point
             values["contact.wall_normal"] = situation.wall.normal
         values["contact.tip_cap"] = self.contact.tip_cap
+        values["contact.chamber_reaction"] = self.model.coefficients.chamber_reaction
         values["contact.free_lengths"] = free_lengths
         values["contact.pressed"] = pressed
         return values

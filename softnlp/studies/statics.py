@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -134,6 +135,14 @@ class PoseSolver:
         self.shape = shape_function(self.functions.field)
         self._transition, self._tip_variation = transition_functions(self.functions.field)
         self._grids: dict[int, Grid] = {}
+        self._numbers: dict[str, Any] = {}
+
+    def with_model(self, model: Model) -> PoseSolver:
+        """Return a solver of a model of the same structure (chambers, law, conventions) that shares what is compiled."""
+        other = copy(self)
+        other.model = model
+        other._numbers = {name: q.nominal for name, q in quantities(model).items()}
+        return other
 
     def grid(self, intervals: int) -> Grid:
         """Return the compiled problem on a grid, building it at first use."""
@@ -155,6 +164,7 @@ class PoseSolver:
     def values(self, pressure: Array, loads: Loads) -> dict[str, Any]:
         """Return the quantities that a step sets."""
         return {
+            **self._numbers,
             "pressure": pressure,
             "tip_force": loads.tip_force,
             "tip_moment": loads.tip_moment,
