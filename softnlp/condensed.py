@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -81,6 +82,14 @@ class CondensedSolver:
     def determinant(self, x: Array, p: Array) -> float:
         """Return the determinant of the tip equations; it changes its sign where the solution turns or branches."""
         return float(np.linalg.det(self._into @ self.tip_system(x, p).matrix))
+
+    def determinant_expression(self, x: Any, p: Any) -> Any:
+        """Return `determinant` as an expression of symbols or of expressions x, p."""
+        _, tip, _ = self._sweep(x, p, ca.DM.zeros(x.numel()))
+        known, columns = self._base.shape[1], tip.shape[1]
+        matrix = ca.DM(self._into) @ ca.horzcat(tip[:, :known], tip[:, known + 1 : columns])
+        entries = ca.SX.sym("entries", *matrix.shape)
+        return ca.Function("determinant", [entries], [ca.det(entries)], {"cse": True})(matrix)
 
     def tip_moves(self, x: Array, p: Array) -> Array:
         """Return how the tip's state moves when the tip equations are off by given errors, (nx, 6 + n_y)."""

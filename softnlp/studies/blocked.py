@@ -141,7 +141,7 @@ class BlockedSolver:
 
     def _settle(self, situation: Situation, free: Solved, near: Blocked | None) -> tuple[Blocked | _Ended, int]:
         """Follow the branch to a situation and refine the grid until its accuracy is met."""
-        plane = self._plane(situation)
+        plane = self.plane(situation)
         pressed = np.array([float(situation.pressure[k] > 0) for k in self.model.robot.set_of_chamber])
         first = self.numerics.intervals or self.poses.first_intervals(free.solution.p, float(free.solution.x[0]))
         intervals = near.grid.intervals if near else first
@@ -172,7 +172,7 @@ class BlockedSolver:
         assert found is not None
         return found, spent
 
-    def _plane(self, situation: Situation) -> Array | None:
+    def plane(self, situation: Situation) -> Array | None:
         """Return the normal of the plane in which wall, pressures and loads keep the rod, or None in space."""
         plane = situation.wall.plane if situation.wall is not None else None
         if plane is None:
@@ -196,7 +196,7 @@ class BlockedSolver:
         same_wall = not walls or (here.wall is not None and situation.wall is not None
                                   and bool(np.all(here.wall.normal == situation.wall.normal)))  # fmt: skip
         rises = bool(np.all(situation.pressure >= here.pressure))
-        same_plane = (self._plane(here) is None) == (plane is None)
+        same_plane = (self.plane(here) is None) == (plane is None)
         return rises and same_wall and same_plane and bool(np.all(near.pressed == pressed))
 
     def values(self, situation: Situation, pressed: Array, free_lengths: Array) -> dict[str, Any]:
