@@ -176,7 +176,7 @@ def _candidate(
         choices |= {name: float(getattr(robot, name)) for name in SIZES if name in task.ranges}
     if evaluation is not None and not isinstance(task.pressure, int | float):
         choices["pressure"] = evaluation.pressure
-    failed = evaluation is not None and evaluation.status in _FAILED
+    failed = found.failed or (evaluation is not None and evaluation.status in _FAILED)
     step = evaluation.step if evaluation else None
     return Candidate(
         number=number,

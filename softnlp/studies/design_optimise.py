@@ -30,6 +30,10 @@ _HOLDS = 1e-7  # scaled violation of a solved program
 _ACTIVE = 1e-6  # a limit is active where its scaled multiplier is above this
 _TRIES = 300  # points among which starts are looked for
 _HALVINGS = 4
+_LOOKS = 32  # points whose free shape is looked at for starts that meet what is asked of it
+_STEPS = 15
+_SMALL = 1e-3  # a scaled choice below this moves by parts of this
+_NEAR = 0.2  # part by which a choice may move in one step of the slow way
 
 
 @dataclass(frozen=True)
@@ -50,10 +54,11 @@ class Active:
 class Optimum:
     """Where the program ended from one start.
 
-    values : the continuous choices, and "pressure", SI. objective : SI. violation : largest scaled one, evaluated
+    x : of the program. values : the continuous choices, and "pressure", SI. objective : SI. violation : largest scaled one, evaluated
     again. engine_status : IPOPT's own word, for information.
     """
 
+    x: Array
     values: dict[str, float]
     objective: float
     violation: float
@@ -72,7 +77,7 @@ class Optimised:
     """The continuous part of a candidate.
 
     found : the design, solved again to the accuracy of the setting; None where nothing was. reasons : why it is not
-    feasible, none where it is. agreeing, starts : how many of how many starts ended there.
+    feasible, none where it is. agreeing, starts : how many of how many starts ended there. failed : a solver gave up.
     """
 
     found: Evaluation | None
@@ -82,6 +87,7 @@ class Optimised:
     starts: int = 0
     iterations: int = 0
     intervals: int = 0
+    failed: bool = False
 
 
 class Optimiser:
@@ -109,6 +115,8 @@ class Optimiser:
             return Optimised(None, ("no start has an equilibrium",))
         intervals = max(self._intervals(e) for e in begun)
         optima = [self.optimise(e, intervals) for e in begun]
+        if not any(o.holds for o in optima):
+            optima += [self._stepwise(e, intervals) for e in begun]
         spent = sum(o.iterations for o in optima)
         sign = self.evaluator.task.sign
         order = sorted((o for o in optima if o.holds), key=lambda o: -sign * o.objective)
@@ -132,20 +140,46 @@ class Optimiser:
     def optimise(self, start: Evaluation, intervals: int) -> Optimum:
         """Solve the program from a solved design."""
         posed = self.problem(intervals, self._plane(start))
-        problem, task = posed.problem, self.evaluator.task
+        return self._solved(posed, *self.start(start, posed), start.pressure, np.inf)
+
+    def _stepwise(self, start: Evaluation, intervals: int) -> Optimum:
+        """Solve the program again and again with the choices kept near the last answer: slower, and more robust."""
+        posed = self.problem(intervals, self._plane(start))
         x, p, scale = self.start(start, posed)
+        n, near, spent = posed.problem.free_size, _NEAR, 0
+        for _ in range(_STEPS):
+            found = self._solved(posed, x, p, scale, start.pressure, near)
+            spent += found.iterations
+            if found.holds:
+                moved = np.abs(found.x[:n] - x[:n]) / np.maximum(np.abs(x[:n]), _SMALL)
+                if np.all(moved < 0.99 * near):  # no bound that is not the task's holds it
+                    return replace(found, iterations=spent)
+                x = found.x
+            else:
+                near /= 2
+        return replace(found, violation=np.inf, iterations=spent)
+
+    def _solved(
+        self, posed: DesignProblem, x: Array, p: Array, scale: float, pressure: float, near: float
+    ) -> Optimum:
+        """Solve the program from x with the choices within a part `near` of where they are."""
+        problem, task = posed.problem, self.evaluator.task
+        lower, upper = problem.lower_x.copy(), problem.upper_x.copy()
+        if np.isfinite(near):
+            n = problem.free_size
+            room = near * np.maximum(np.abs(x[:n]), _SMALL)
+            lower[:n], upper[:n] = np.maximum(lower[:n], x[:n] - room), np.minimum(upper[:n], x[:n] + room)
         try:
-            result = posed.solver(
-                x0=x, p=p, lbx=problem.lower_x, ubx=problem.upper_x, lbg=posed.lower, ubg=posed.upper
-            )
+            result = posed.solver(x0=x, p=p, lbx=lower, ubx=upper, lbg=posed.lower, ubg=posed.upper)
         except RuntimeError as error:  # IPOPT met a number that is not finite
-            return Optimum({}, np.nan, np.inf, (), 0, str(error).splitlines()[-1])
+            return Optimum(x, {}, np.nan, np.inf, (), 0, str(error).splitlines()[-1])
         stats = posed.solver.stats()
         x = np.asarray(result["x"], dtype=float).ravel()
         multipliers = (np.asarray(result[key]).ravel() for key in ("lam_g", "lam_x"))
         values = {name.removeprefix("robot."): float(v[0]) for name, v in problem.free_values(x).items()}
-        values["pressure"] = values.pop(PRESSURE, start.pressure)
+        values["pressure"] = values.pop(PRESSURE, pressure)
         return Optimum(
+            x=x,
             values=values,
             objective=-task.sign * float(result["f"]) * scale,
             violation=violation(problem, x, p),
@@ -268,12 +302,12 @@ class Optimiser:
         """Return the design that misses least where no start led to a feasible one, and what it misses."""
         reached = [o for o in optima if np.isfinite(o.violation)]
         if not reached:
-            return Optimised(None, (f"the optimisation failed: {optima[0].engine_status}",))
+            return Optimised(None, (f"the optimisation failed: {optima[0].engine_status}",), failed=True)
         nearest = min(reached, key=lambda o: o.violation)
         found = self.evaluator.full(_at(model, nearest.values), nearest.values["pressure"])
         reasons = tuple(unmet(found, self.evaluator.task)) + tuple(broken_rules(found.model.robot, self.evaluator.task))
         if not reasons:
-            return Optimised(None, (f"the optimisation did not converge: {nearest.engine_status}",))
+            return Optimised(None, (f"the optimisation did not converge: {nearest.engine_status}",), failed=True)
         return Optimised(found, ("no design meets everything; the nearest misses " + "; ".join(dict.fromkeys(reasons)),))
 
     def _intervals(self, begun: Evaluation) -> int:
@@ -284,15 +318,26 @@ class Optimiser:
         return min(max(next_size(coarse), _COARSEST), _FINEST)
 
     def _starts(self, model: Model, pressure: float | Range) -> Iterator[Evaluation]:
-        """Yield solved designs to start from: those of a low-discrepancy sequence that can be made come first."""
+        """Yield solved designs to start from: those of a low-discrepancy sequence that can be made come first.
+
+        Of these, those come first whose free shape meets what is asked of it.
+        """
         task = self.evaluator.task
         box = dict(task.ranges) | ({"pressure": pressure} if isinstance(pressure, Range) else {})
         points = [dict(zip(box, point, strict=True)) for point in spread(list(box.values()), _TRIES)]
         made = (q for q in points if not broken_rules(_at(model, q).robot, task))
-        chosen = [q for q, _ in zip(made, range(task.starts), strict=False)]
-        chosen += points[: max(0, min(task.starts, 2) - len(chosen))]
+        wanted = task.first_guesses
+        fixed = pressure if not isinstance(pressure, Range) else 0.0
+        meeting: list[dict[str, float]] = []
+        others: list[dict[str, float]] = []
+        for point, _ in zip(made, range(_LOOKS), strict=False):
+            looked = self.evaluator.free(_at(model, point), float(point.get("pressure", fixed)))
+            (others if unmet(looked, task) else meeting).append(point)
+            if len(meeting) == wanted:
+                break
+        chosen = [*meeting, *others, *points][: wanted if meeting or others else min(wanted, 2)]
         for point in chosen:
-            P = point.get("pressure", pressure if not isinstance(pressure, Range) else 0.0)
+            P = point.get("pressure", fixed)
             for _ in range(_HALVINGS if isinstance(pressure, Range) else 1):
                 begun = self.evaluator.full(_at(model, point), float(P))
                 if begun.outputs:

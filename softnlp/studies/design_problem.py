@@ -28,7 +28,7 @@ PRESSURE = "applied pressure"
 OBJECTIVE_SCALE = "objective scale"
 FOLD_SCALE = "fold scale"
 FOLD = 0.02  # of the determinant of the robot at rest: below it the branch of the blocked shape is about to turn
-_ITERATIONS = 80
+_ITERATIONS = 60
 _SLOPE = 1e-3  # of the scaled stretch balance: the branch from zero pressure ends where it vanishes
 
 
@@ -93,6 +93,7 @@ class DesignProblem:
                 "tol": 1e-9,
                 "constr_viol_tol": 1e-9,
                 "acceptable_iter": 0,
+                "diverging_iterates_tol": 1e4,
                 "bound_relax_factor": 1e-10,
                 "nlp_scaling_method": "none",
                 "mu_strategy": "adaptive",

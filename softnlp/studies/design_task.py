@@ -115,7 +115,7 @@ class DesignTask:
     pressure : in each of `sets` (counted from 0), the same [Pa]: a number, a `Range` or `PressureSteps`.
     requirements : `Limits` by name of `OUTPUTS`. maximise, minimise : one of them, a name of `OUTPUTS`.
     allow, minimum_wall : rules of manufacture that may be broken, and delta_s of Eq. (1) [m].
-    starts : first guesses of each optimisation.
+    starts : first guesses of each optimisation; None is 4, and 2 where one number alone is free.
     trials : of the search, where there are more than `MOST_ENUMERATED` combinations.
     """
 
@@ -127,7 +127,7 @@ class DesignTask:
     minimise: str | None = None
     allow: tuple[str, ...] = ()
     minimum_wall: float = MINIMUM_WALL
-    starts: int = 4
+    starts: int | None = None
     trials: int = 500
 
     @property
@@ -159,6 +159,11 @@ class DesignTask:
     def is_continuous(self) -> bool:
         """Whether anything is left to an optimisation."""
         return bool(self.ranges) or isinstance(self.pressure, Range)
+
+    @property
+    def first_guesses(self) -> int:
+        """How many first guesses each optimisation has."""
+        return self.starts or (4 if len(self.ranges) + isinstance(self.pressure, Range) > 1 else 2)
 
     def combinations(self) -> Iterator[dict[str, Any]]:
         """Yield every combination of the discrete choices, the last one changing first."""
@@ -221,7 +226,7 @@ def check_task(task: DesignTask, setting: Setting) -> None:
         if rule not in LOWERABLE_RULES:
             raise InputError(f"expected rules of {', '.join(LOWERABLE_RULES)}, got {rule!r}", key="allow")
     for key, value in (("starts", task.starts), ("trials", task.trials)):
-        if value < 1:
+        if value is not None and value < 1:
             raise InputError(f"expected a number of at least 1, got {value}", key=key)
     if task.needs_force and task.is_continuous and setting.contact.closure == "weighted":
         raise InputError(
