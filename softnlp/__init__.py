@@ -38,6 +38,13 @@ if TYPE_CHECKING:
     from softnlp.runner import run_scenario as run_scenario
     from softnlp.scenario import load_scenario as load_scenario
     from softnlp.status import Status as Status
+    from softnlp.studies.design import Design as Design
+    from softnlp.studies.design import design as design
+    from softnlp.studies.design_task import DesignTask as DesignTask
+    from softnlp.studies.design_task import PressureSteps as PressureSteps
+    from softnlp.studies.design_task import Range as Range
+    from softnlp.studies.design_task import at_least as at_least
+    from softnlp.studies.design_task import at_most as at_most
     from softnlp.studies.forward import forward as forward
     from softnlp.studies.step import Run as Run
     from softnlp.studies.step import Step as Step
@@ -58,6 +65,8 @@ _HOMES = {
     "runner": ("run_scenario",),
     "scenario": ("load_scenario",),
     "status": ("Status",),
+    "studies.design": ("Design", "design"),
+    "studies.design_task": ("DesignTask", "PressureSteps", "Range", "at_least", "at_most"),
     "studies.forward": ("forward",),
     "studies.step": ("Run", "Step"),
     "units": ("BAR", "DEGREE", "MILLIMETRE", "NEWTON_MILLIMETRE"),

@@ -23,6 +23,7 @@ from softnlp.robot import DIMENSIONS, ROBOTS, Robot, Violation, check, violation
 from softnlp.rod import Loads
 from softnlp.scenario_check import first_of, parse
 from softnlp.scenario_contact import contact_settings, contact_task
+from softnlp.scenario_design import design_task
 from softnlp.scenario_schema import RobotTable, ScenarioFile
 from softnlp.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
 
@@ -270,7 +271,12 @@ def _contact_task(given: Read) -> Task:
     return contact_task(given.file.contact, given.steps.pressures)
 
 
+def _design_task(given: Read) -> Task:
+    return design_task(given.file, given.data, given.robot, given.material, given.folder)
+
+
 TASKS: Mapping[str, tuple[str, Callable[[Read], Task]]] = {
     "blocked-force": ("contact", _contact_task),
+    "design": ("choices", _design_task),
 }
 """For each study with tables of its own: the table that its errors are about, and what reads them."""

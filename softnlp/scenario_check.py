@@ -11,10 +11,12 @@ from pydantic_core import ErrorDetails
 from softnlp.errors import InputError, nearest
 from softnlp.reading import choices, did_you_mean, one_line, shown
 from softnlp.scenario_schema import BlockedForceFile, ForwardFile, ScenarioFile
+from softnlp.schema_design import DesignFile
 
 SCHEMAS: Mapping[str, type[ScenarioFile]] = {
     "forward": ForwardFile,
     "blocked-force": BlockedForceFile,
+    "design": DesignFile,
 }
 """The studies that this version runs, and the file of each."""
 

@@ -24,7 +24,7 @@ from softnlp.conventions import COEFFICIENT_SETS, CONVENTIONS
 from softnlp.formula import FUNCTIONS
 from softnlp.laws import LAWS
 from softnlp.scenario import scenario_from_text
-from softnlp.scenario_check import SCHEMAS
+from softnlp.scenario_check import SCHEMAS, STUDIES
 from softnlp.scenario_schema import BlockedForceFile, OffsetRampTable, RampTable
 from softnlp.status import Status
 
@@ -198,4 +198,4 @@ def test_links_lead_somewhere() -> None:
 
 
 def test_the_studies_that_run_are_those_of_the_documents() -> None:
-    assert set(SCHEMAS) == set(re.findall(r'"(forward|blocked-force)"', SCENARIO.read_text()))
+    assert set(SCHEMAS) == set(re.findall(rf'"({"|".join(STUDIES)})"', SCENARIO.read_text()))

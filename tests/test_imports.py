@@ -20,7 +20,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 LAYERS = (
     *("errors", "status", "units", "conventions", "numerics", "reading", "contact_settings"),
     *("formula", "laws", "materials", "robot", "section", "rod", "tip", "transcription"),
-    *("quantities", "loadcase", "problem", "branch", "solver", "condensed", "continuation", "stability"),
+    *("quantities", "loadcase", "unloaded", "problem", "branch", "solver", "condensed", "continuation", "stability"),
     *(
         "studies",
         "studies.step",
@@ -31,9 +31,11 @@ LAYERS = (
         "studies.weighted",
     ),
     *("studies.free_shape", "studies.blocked_grid", "studies.blocked_step", "studies.blocked", "studies.multistart"),
+    *("studies.design_task", "studies.design_evaluate", "studies.design_problem", "studies.design_optimise"),
+    *("studies.design_candidate", "studies.design_search", "studies.design"),
     *("studies.force_inversion", "studies.*"),
-    *("scenario_schema", "scenario_check", "pressures", "scenario_contact", "scenario"),
-    *("runner_blocked", "runner", "results", "plots", "cli", "__main__"),
+    *("scenario_schema", "schema_design", "scenario_check", "pressures", "scenario_contact", "scenario_design"),
+    *("scenario", "runner_blocked", "runner", "runner_design", "results", "plots", "cli", "__main__"),
 )
 MIXED = ("results", "plots", "cli")
 LONGEST_FILE = 400

@@ -54,6 +54,7 @@ def _app() -> App:
     from cyclopts import App, Parameter
 
     from softnlp import __version__
+    from softnlp.cli.design import design
     from softnlp.cli.library import materials, robots
     from softnlp.cli.plot import plot_material, plot_run, plot_section
     from softnlp.cli.run import run
@@ -68,6 +69,7 @@ def _app() -> App:
         default_parameter=Parameter(negative=()),
     )
     app.command(run)
+    app.command(design)
     app.command(robots)
     app.command(materials)
     plot = App(name="plot", help="Draw a cross-section, silicones, or the results of a run.")

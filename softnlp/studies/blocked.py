@@ -84,7 +84,7 @@ class BlockedSolver:
         return other
 
     def with_model(self, model: Model) -> BlockedSolver:
-        """Return a solver of a model of the same structure (chambers, law, conventions) that shares what is compiled."""
+        """Return a solver for a model of the same chambers, law and conventions; it shares what is compiled."""
         other = copy(self)
         other.model, other.poses = model, self.poses.with_model(model)
         return other

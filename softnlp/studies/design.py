@@ -7,7 +7,7 @@ import pickle
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from typing import Any
 
@@ -15,9 +15,11 @@ from softnlp.contact_settings import ContactSettings
 from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.materials import Material
 from softnlp.numerics import Numerics
+from softnlp.quantities import Model
 from softnlp.robot import Robot
 from softnlp.rod import Loads
 from softnlp.studies.design_candidate import Candidate, Workshop, structure
+from softnlp.studies.design_evaluate import Evaluator
 from softnlp.studies.design_task import MOST_ENUMERATED, DesignTask, Setting, check_task, with_choices
 from softnlp.studies.forward import checked_loads
 from softnlp.studies.wall import checked_contact
@@ -28,12 +30,17 @@ _CHUNK = 8  # candidates that a process is given at once; most of one structure,
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A finished design study: what was asked, and every candidate in the order of the combinations."""
+    """A finished design study: what was asked, and every candidate in the order of the combinations.
+
+    free_closure_force : blocked force of the best candidate by the closure `free` [N], where a force was asked for by
+    another one and can be found.
+    """
 
     setting: Setting
     task: DesignTask
     candidates: tuple[Candidate, ...]
     title: str = ""
+    free_closure_force: float | None = None
 
     @property
     def feasible(self) -> tuple[Candidate, ...]:
@@ -95,7 +102,19 @@ def design(
         done.append(candidate)
         if progress is not None:
             progress(len(done), candidate)
-    return Design(setting, task, tuple(sorted(done, key=lambda c: c.number)), title)
+    return finished(setting, task, done, title)
+
+
+def finished(setting: Setting, task: DesignTask, candidates: Sequence[Candidate], title: str = "") -> Design:
+    """Return the design of the candidates that are done, in the order of their numbers."""
+    done = Design(setting, task, tuple(sorted(candidates, key=lambda c: c.number)), title)
+    best = done.best
+    if best is None or not task.needs_force or setting.contact.closure == "free":
+        return done
+    other = replace(setting, contact=replace(setting.contact, closure="free"))
+    model = Model(best.robot, best.material, setting.coefficients, setting.conventions)
+    force = Evaluator(other, task, model).full(model, best.outputs["pressure"]).outputs.get("blocked_force")
+    return replace(done, free_closure_force=force)
 
 
 def _candidates(setting: Setting, task: DesignTask, workers: int) -> Iterator[Candidate]:

@@ -123,7 +123,9 @@ class Workshop:
         missing = [dict(missed_names(e, self.task)) for e in looked if e.outputs]
         always = set.intersection(*(set(m) for m in missing)) if missing else set()
         if always:
-            nearest = min((e for e in looked if e.outputs), key=lambda e: sum(dict(missed_names(e, self.task)).values()))
+            nearest = min(
+                (e for e in looked if e.outputs), key=lambda e: sum(dict(missed_names(e, self.task)).values())
+            )
             reasons = "; ".join(unmet(nearest, self.task))
             return Optimised(nearest, (f"no pressure meets everything; nearest is {reasons}",))
         return optimiser.best(model, pressure)

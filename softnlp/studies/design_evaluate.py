@@ -70,7 +70,10 @@ def missed(outputs: Mapping[str, float], requirements: Mapping[str, Limits]) -> 
         if name not in outputs:
             continue
         output, value = OUTPUTS[name], outputs[name]
-        for limit, off, words in ((limits.lower, limits.lower - value, "least"), (limits.upper, value - limits.upper, "most")):
+        for limit, off, words in (
+            (limits.lower, limits.lower - value, "least"),
+            (limits.upper, value - limits.upper, "most"),
+        ):
             size = max(abs(limit), 1e-3 * output.scale) if np.isfinite(limit) else np.inf
             if not off <= FEASIBLE * size:
                 yield f"{output.file_key}: {shown(output, value)}, at {words} {shown(output, limit)} wanted", off / size

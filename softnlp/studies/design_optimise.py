@@ -54,8 +54,8 @@ class Active:
 class Optimum:
     """Where the program ended from one start.
 
-    x : of the program. values : the continuous choices, and "pressure", SI. objective : SI. violation : largest scaled one, evaluated
-    again. engine_status : IPOPT's own word, for information.
+    x : of the program. values : the continuous choices, and "pressure", SI. objective : SI. violation : largest scaled
+    one, evaluated again. engine_status : IPOPT's own word, for information.
     """
 
     x: Array
@@ -159,9 +159,7 @@ class Optimiser:
                 near /= 2
         return replace(found, violation=np.inf, iterations=spent)
 
-    def _solved(
-        self, posed: DesignProblem, x: Array, p: Array, scale: float, pressure: float, near: float
-    ) -> Optimum:
+    def _solved(self, posed: DesignProblem, x: Array, p: Array, scale: float, pressure: float, near: float) -> Optimum:
         """Solve the program from x with the choices within a part `near` of where they are."""
         problem, task = posed.problem, self.evaluator.task
         lower, upper = problem.lower_x.copy(), problem.upper_x.copy()
@@ -175,7 +173,7 @@ class Optimiser:
             return Optimum(x, {}, np.nan, np.inf, (), 0, str(error).splitlines()[-1])
         stats = posed.solver.stats()
         x = np.asarray(result["x"], dtype=float).ravel()
-        multipliers = (np.asarray(result[key]).ravel() for key in ("lam_g", "lam_x"))
+        lam_g, lam_x = (np.asarray(result[key]).ravel() for key in ("lam_g", "lam_x"))
         values = {name.removeprefix("robot."): float(v[0]) for name, v in problem.free_values(x).items()}
         values["pressure"] = values.pop(PRESSURE, pressure)
         return Optimum(
@@ -183,7 +181,7 @@ class Optimiser:
             values=values,
             objective=-task.sign * float(result["f"]) * scale,
             violation=violation(problem, x, p),
-            active=tuple(self._active(posed, *multipliers, scale)),
+            active=tuple(self._active(posed, lam_g, lam_x, scale)),
             iterations=int(stats["iter_count"]),
             engine_status=str(stats["return_status"]),
         )
@@ -219,9 +217,14 @@ class Optimiser:
         head = posed.problem.pack_free({q.name: 0.0 if q.name == PRESSURE else q.nominal for q in posed.problem.free})
         parts = [head]
         for case in posed.problem.cases:
-            s, none = case.transcribed.points, np.where(np.arange(column.size) < len(self.evaluator.direction), 0.0, column)
+            s, none = (
+                case.transcribed.points,
+                np.where(np.arange(column.size) < len(self.evaluator.direction), 0.0, column),
+            )
             states = np.asarray(case.functions.arc(none, 1.0, s[None, :])) if s.size else np.zeros(0)
-            parts.append(np.concatenate([[1.0], states.T.ravel(), np.zeros(case.functions.tip_unknowns * bool(s.size))]))
+            parts.append(
+                np.concatenate([[1.0], states.T.ravel(), np.zeros(case.functions.tip_unknowns * bool(s.size))])
+            )
         return np.concatenate(parts)
 
     def _plane(self, begun: Evaluation) -> Array | None:
@@ -308,7 +311,9 @@ class Optimiser:
         reasons = tuple(unmet(found, self.evaluator.task)) + tuple(broken_rules(found.model.robot, self.evaluator.task))
         if not reasons:
             return Optimised(None, (f"the optimisation did not converge: {nearest.engine_status}",), failed=True)
-        return Optimised(found, ("no design meets everything; the nearest misses " + "; ".join(dict.fromkeys(reasons)),))
+        return Optimised(
+            found, ("no design meets everything; the nearest misses " + "; ".join(dict.fromkeys(reasons)),)
+        )
 
     def _intervals(self, begun: Evaluation) -> int:
         """Return a grid for the program that is fine enough for the curl of a start."""

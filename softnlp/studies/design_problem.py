@@ -19,8 +19,8 @@ from softnlp.robot import Robot
 from softnlp.studies.design_evaluate import Evaluator, free_outputs, robot_outputs
 from softnlp.studies.design_task import OUTPUTS, Range
 from softnlp.transcription import MultipleShooting
-from softnlp.unloaded import unloaded_case
 from softnlp.units import MILLIMETRE
+from softnlp.unloaded import unloaded_case
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ class DesignProblem:
     @cached_property
     def solver(self) -> ca.Function:
         """IPOPT with the exact Hessian of all but the guard; multipliers are kept."""
-        nlp = dict(self.problem.nlp)
+        nlp: dict[str, Any] = dict(self.problem.nlp)
         x, p, f, g = (nlp[key] for key in "xpfg")
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", g.numel() + (self.guard is not None))
         weighed = lam_f * f + ca.dot(lam_g[: g.numel()], g)
@@ -82,7 +82,7 @@ class DesignProblem:
             size = self.guard(x, p)
             J, g = ca.vertcat(J, ca.jacobian(size, x)), ca.vertcat(g, size)
         nlp["g"] = g
-        options = {
+        options: dict[str, Any] = {
             "jac_g": ca.Function("jac_g", [x, p], [g, J]),
             "hess_lag": ca.Function("hess_lag", [x, p, lam_f, lam_g], [hessian]),
             "print_time": False,

@@ -258,11 +258,13 @@ def _check_choice(name: str, values: Any) -> None:
         if name in kinds:
             right = isinstance(value, kinds[name])
         elif name in COUNTS:
-            right = isinstance(value, Integral) and not isinstance(value, bool) and value >= 1
+            right = isinstance(value, Integral) and not isinstance(value, bool) and int(value) >= 1
         else:
             right = is_number(value) and isfinite(value) and value > 0
         if not right:
-            expected = kinds[name].__name__ if name in kinds else "whole number" if name in COUNTS else "positive number"
+            expected = (
+                kinds[name].__name__ if name in kinds else "whole number" if name in COUNTS else "positive number"
+            )
             raise InputError(f"expected each value to be a {expected}, got {value!r}", key=key)
 
 

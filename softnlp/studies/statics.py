@@ -138,7 +138,7 @@ class PoseSolver:
         self._numbers: dict[str, Any] = {}
 
     def with_model(self, model: Model) -> PoseSolver:
-        """Return a solver of a model of the same structure (chambers, law, conventions) that shares what is compiled."""
+        """Return a solver for a model of the same chambers, law and conventions; it shares what is compiled."""
         other = copy(self)
         other.model = model
         other._numbers = {name: q.nominal for name, q in quantities(model).items()}
