@@ -123,6 +123,7 @@ class RequirementsTable(Table):
     tip_y_mm: LimitsTable | None = None
     tip_z_mm: LimitsTable | None = None
     tip_deflection_mm: LimitsTable | None = None
+    chamber_gap_mm: LimitsTable | None = None
     pressure_bar: LimitsTable | None = None
     outer_diameter_mm: LimitsTable | None = None
     lumen_diameter_mm: LimitsTable | None = None
@@ -130,6 +131,7 @@ class RequirementsTable(Table):
     chamber_diameter_mm: LimitsTable | None = None
     chamber_wall_mm: LimitsTable | None = None
     outer_wall_mm: LimitsTable | None = None
+    inner_wall_mm: LimitsTable | None = None
     wall_mm: LimitsTable | None = None
     length_mm: LimitsTable | None = None
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from softnlp.plots.section import draw_section, stretched_radii
 from softnlp.plots.style import COLOURS, GREY, INK, PALE, SMALL, new_figure, plain
-from softnlp.results.design import label, pressure_words
+from softnlp.results.design import held_back, label, pressure_words
 from softnlp.studies.design import Design
 from softnlp.studies.design_candidate import Candidate
 from softnlp.studies.design_task import OUTPUTS, Output
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_BARS = 30
+_FEWEST = 8  # rows of the panel of bars
 _LONGEST = 62  # characters of a reason
 _BEST, _FEASIBLE = COLOURS[1], COLOURS[0]
 _WIDTH, _ROW, _HEAD = 11.5, 0.24, 1.3  # of the figure, of a bar and of what is around the bars [inch]
@@ -82,7 +83,11 @@ def _bars(axes: Axes, done: Design, shown: list[Candidate]) -> None:
     axes.set_yticks(rows, [f"{shorten(label(done, c), 32)}  {c.number}" for c in shown], size=SMALL)
     axes.tick_params(axis="y", length=0)
     axes.grid(False, axis="y")
-    axes.set_ylim(len(shown) - 0.4, -0.6)
+    axes.set_ylim(max(len(shown), _FEWEST) - 0.4, -0.6)
+    if done.best is not None and len(shown) <= _FEWEST // 2:
+        lines = ["held back by", *(words for words in held_back(done, done.best))]
+        for k, line in enumerate(lines if len(lines) > 1 else []):
+            axes.text(0.02, 0.42 - 0.05 * k, line, size=SMALL, color=INK, transform=axes.transAxes, parse_math=False)
     if len(shown) < len(done.candidates):
         axes.set_title(f"the first {len(shown)} of {len(done.candidates)}", size=SMALL, color=GREY, loc="left")
 

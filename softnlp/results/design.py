@@ -193,10 +193,10 @@ def design_lines(done: Design) -> Group:
 
 
 def shown_outputs(done: Design) -> list[Output]:
-    """Return the outputs worth a column: the objective, what is required or chosen, the pressure, the angle."""
+    """Return the outputs worth a column: the objective, pressure, angle, and what is required of a robot's doing."""
     task = done.task
-    wanted = [task.objective.name, "pressure", *task.requirements, "bending_angle", "stretch", *task.ranges]
-    return [OUTPUTS[name] for name in dict.fromkeys(wanted) if name in OUTPUTS]
+    wanted = dict.fromkeys([task.objective.name, "pressure", "bending_angle", "stretch", *task.requirements])
+    return [OUTPUTS[name] for name in wanted if OUTPUTS[name].kind != "robot" or name == task.objective.name]
 
 
 def _notes(done: Design) -> Iterator[tuple[str, str]]:
@@ -217,15 +217,22 @@ def _notes(done: Design) -> Iterator[tuple[str, str]]:
         yield "  " + ", ".join(f"{key} {value:.6g}" for key, value in chosen.items()), ""
     if done.free_closure_force is not None:
         yield f"  without the chambers' reaction (closure free) the force is {done.free_closure_force:.4g} N", ""
-    for active in (active_table(done, a) for a in best.active):
-        if active["value"] is None:
-            yield f"  held back by: {active['limit']}", ""
-        else:
-            side = "at least" if active["side"] == "lower" else "at most"
-            gain = f"each {active['unit']} looser gains {active['gain_per_unit']:+.4g} {active['gain_unit']}"
-            yield f"  held back by: {active['limit']} {side} {active['value']:.6g} {active['unit']}; {gain}", ""
+    for words in held_back(done, best):
+        yield f"  held back by {words}", ""
     for warning in best.warnings:
         yield f"  warning: {warning}", "yellow"
+
+
+def held_back(done: Design, candidate: Candidate) -> Iterator[str]:
+    """Yield in words each limit that holds the objective back and what loosening it would gain."""
+    for active in (active_table(done, a) for a in candidate.active):
+        if active["value"] is None:
+            yield str(active["limit"])
+            continue
+        side = "at least" if active["side"] == "lower" else "at most"
+        unit = "" if active["unit"] == "1" else f" {active['unit']}"
+        gain = f"{active['gain_per_unit']:+.4g} {active['gain_unit']} for each{unit or ' 1'} looser"
+        yield f"{active['limit']} {side} {active['value']:.6g}{unit}: {gain}"
 
 
 def best_scenario(done: Design, asked: Mapping[str, Any]) -> str | None:

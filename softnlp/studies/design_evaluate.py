@@ -14,7 +14,7 @@ from softnlp.branch import stretch_on_branch
 from softnlp.errors import RobotError
 from softnlp.loadcase import RodFunctions
 from softnlp.quantities import Model
-from softnlp.robot import Robot, violations
+from softnlp.robot import Robot, touching_stretch, violations
 from softnlp.status import Status
 from softnlp.studies.blocked import BlockedSolver
 from softnlp.studies.blocked_grid import Blocked
@@ -34,8 +34,14 @@ _TINY = 1e-24  # [m^2] under the root of the tip's deflection, whose slope has a
 
 def robot_outputs(robot: Robot) -> dict[str, Any]:
     """Return the outputs of kind "robot", SI; numbers or symbols as the dimensions are."""
-    names = [output.name for output in OUTPUTS.values() if output.kind == "robot" and output.name != "wall"]
-    return {**{name: getattr(robot, name) for name in names}, "wall": robot.chamber_wall + robot.outer_wall}
+    r_cp, r_co = robot.chamber_circle_radius, robot.chamber_radius
+    walls = {
+        "outer_wall": robot.outer_radius - r_cp - r_co,
+        "inner_wall": r_cp - r_co - robot.lumen_radius,
+        "wall": robot.chamber_wall + robot.outer_wall,
+    }
+    names = [output.name for output in OUTPUTS.values() if output.kind == "robot" and output.name not in walls]
+    return {name: getattr(robot, name) for name in names} | walls
 
 
 def free_outputs(case: Mapping[str, Any], length: Any) -> dict[str, Any]:
@@ -52,10 +58,30 @@ def free_outputs(case: Mapping[str, Any], length: Any) -> dict[str, Any]:
     }
 
 
+def chamber_gaps(robot: Robot, stretch: Any) -> list[Any]:
+    """Return the gaps between neighbouring reinforced chambers at a stretch [m], numbers or symbols.
+
+    In a set neighbours are alpha_1 apart, from one set to the next 2 pi / n1 - (n2 - 1) alpha_1: the sets are taken not
+    to interleave. The circle shrinks as lambda^-1/2 (S2), r_co stays.
+    """
+    n1, n2 = robot.chamber_sets, robot.chambers_per_set
+    angles = [robot.chamber_angle] if n2 > 1 else []
+    if n1 > 1 or n2 > 2:
+        angles.append(2 * ca.pi / n1 - (n2 - 1) * robot.chamber_angle)
+    shrink = stretch**-0.5
+    return [2 * robot.chamber_circle_radius * shrink * ca.sin(a / 2) - 2 * robot.chamber_radius for a in angles]
+
+
 def pose_outputs(pose: Pose, length: float) -> dict[str, float]:
     """Return the outputs of kind "free" of a solved pose."""
     case = {key: getattr(pose, key) for key in ("bending_angle", "stretch", "backbone_length", "tip_position")}
     return {name: float(value) for name, value in free_outputs(case, length).items()}
+
+
+def _smallest_gap(robot: Robot, stretch: float) -> float:
+    """Return the smallest gap between neighbouring reinforced chambers at a stretch [m]; inf for a single chamber."""
+    touching = touching_stretch(robot)
+    return 2 * float(robot.chamber_radius) * (float(np.sqrt(touching / stretch)) - 1)
 
 
 def shown(output: Output, value: float) -> str:
@@ -148,6 +174,7 @@ class Evaluator:
         numbers = [values.get(name, q.nominal) for name, q in poses.quantities.items()]
         found = zip(self._names, self._arc.call([*numbers, branch.stretch]), strict=True)
         outputs = {**known, **{name: float(value) for name, value in found}}
+        outputs["chamber_gap"] = _smallest_gap(model.robot, branch.stretch)
         return Evaluation(model, pressure, Status.SOLVED, branch.message, outputs)
 
     def full(self, model: Model, pressure: float) -> Evaluation:
@@ -173,6 +200,7 @@ class Evaluator:
         if pose is None:
             return Evaluation(model, pressure, step.status, step.message, {}, step)
         outputs = {**known, **pose_outputs(pose, float(model.robot.length))}
+        outputs["chamber_gap"] = _smallest_gap(model.robot, pose.stretch)
         return Evaluation(model, pressure, step.status, step.message, outputs, step, free)
 
 

@@ -16,7 +16,7 @@ from softnlp.loadcase import LoadCase, load_case
 from softnlp.problem import CompiledProblem, Constraint, compile_problem
 from softnlp.quantities import quantity, with_symbols
 from softnlp.robot import Robot
-from softnlp.studies.design_evaluate import Evaluator, free_outputs, robot_outputs
+from softnlp.studies.design_evaluate import Evaluator, chamber_gaps, free_outputs, robot_outputs
 from softnlp.studies.design_task import OUTPUTS, Range
 from softnlp.transcription import MultipleShooting
 from softnlp.units import MILLIMETRE
@@ -112,7 +112,7 @@ def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) ->
 
     plane : of symmetry, as for `CondensedSolver`, in which the blocked shape folds.
     """
-    task, setting, functions = evaluator.task, evaluator.setting, evaluator.functions
+    task, functions = evaluator.task, evaluator.functions
     declared = functions.declared()
     free_lengths = declared.pop("contact.free_lengths", None)
     for name, values in task.ranges.items():
@@ -133,6 +133,7 @@ def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) ->
     cases: list[LoadCase] = [free_case]
     robot = with_symbols(functions.model, {name: q.symbol for name, q in given.items()}).robot
     outputs = {**robot_outputs(robot), **free_outputs(free_case.outputs, robot.length), "pressure": applied.symbol}
+    outputs["chamber_gap"] = ca.vertcat(*chamber_gaps(robot, free_case.outputs["stretch"]))
     if free_lengths is not None:
         lengths = replace(free_lengths, symbol=free_case.outputs["chamber_lengths"])
         order = {name: lengths if name == "contact.free_lengths" else given[name] for name in functions.declared()}
@@ -179,10 +180,8 @@ def _limits(constraints: list[Constraint], problem: CompiledProblem) -> Iterator
 def _rules(robot: Robot, minimum_wall: float, allow: tuple[str, ...]) -> Iterator[Constraint]:
     """Yield the rules of manufacture as smooth inequalities [mm]; those of numbers only are checked elsewhere.
 
-    The sets are taken not to interleave: in a set neighbours are alpha_1 apart, from one set to the next
-    2 pi / n1 - (n2 - 1) alpha_1.
+    The sets are taken not to interleave, as for `chamber_gaps`.
     """
-    r_cp, r_co, n1, n2 = robot.chamber_circle_radius, robot.chamber_radius, robot.chamber_sets, robot.chambers_per_set
 
     def rule(name: str, expression: Any, lower: float = 0.0) -> Constraint:
         return Constraint(name, ca.MX(expression), lower / MILLIMETRE, np.inf, "m", MILLIMETRE)
@@ -190,13 +189,11 @@ def _rules(robot: Robot, minimum_wall: float, allow: tuple[str, ...]) -> Iterato
     if "wall_thickness" not in allow:
         yield rule("wall_thickness", robot.chamber_wall + robot.outer_wall, minimum_wall)
     if "chamber_overlap" not in allow:
-        if n2 > 1:
-            yield rule("chamber_overlap", 2 * r_cp * ca.sin(robot.chamber_angle / 2) - 2 * r_co)
-        if n1 * n2 > n2 or n2 > 2:
-            between = 2 * np.pi / n1 - (n2 - 1) * robot.chamber_angle
-            yield rule("chamber_overlap", 2 * r_cp * ca.sin(between / 2) - 2 * r_co)
-    yield rule("chambers_inside_wall", robot.outer_radius - r_cp - r_co)
-    yield rule("chambers_inside_wall", r_cp - r_co - robot.lumen_radius)
+        for gap in chamber_gaps(robot, 1.0):
+            yield rule("chamber_overlap", gap)
+    walls = robot_outputs(robot)
+    yield rule("chambers_inside_wall", walls["outer_wall"])
+    yield rule("chambers_inside_wall", walls["inner_wall"])
 
 
 def _guards(cases: list[LoadCase], robot: Robot) -> Iterator[Constraint]:

@@ -1,4 +1,4 @@
-"""Searching more combinations than can be enumerated: optuna's tree-structured Parzen estimator, always the same seed."""
+"""Searching more combinations than can be enumerated, by optuna's tree-structured Parzen estimator with one seed."""
 
 from __future__ import annotations
 

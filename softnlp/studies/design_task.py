@@ -54,6 +54,7 @@ OUTPUTS: Mapping[str, Output] = {
         Output("tip_y", "tip_y_mm", MILLIMETRE, "free"),
         Output("tip_z", "tip_z_mm", MILLIMETRE, "free"),
         Output("tip_deflection", "tip_deflection_mm", MILLIMETRE, "free"),
+        Output("chamber_gap", "chamber_gap_mm", MILLIMETRE, "free"),
         Output("pressure", "pressure_bar", BAR, "pressure"),
         Output("outer_diameter", "outer_diameter_mm", MILLIMETRE, "robot"),
         Output("lumen_diameter", "lumen_diameter_mm", MILLIMETRE, "robot"),
@@ -61,11 +62,14 @@ OUTPUTS: Mapping[str, Output] = {
         Output("chamber_diameter", "chamber_diameter_mm", MILLIMETRE, "robot"),
         Output("chamber_wall", "chamber_wall_mm", MILLIMETRE, "robot"),
         Output("outer_wall", "outer_wall_mm", MILLIMETRE, "robot"),
+        Output("inner_wall", "inner_wall_mm", MILLIMETRE, "robot"),
         Output("wall", "wall_mm", MILLIMETRE, "robot"),
         Output("length", "length_mm", MILLIMETRE, "robot"),
     )
 }
-"""By name: `tip_deflection` is the tip's distance from the z axis, `wall` is delta_c + delta_r of Eq. (1)."""
+"""By name: `tip_deflection` is the tip's distance from the z axis, `chamber_gap` the smallest one between neighbouring
+reinforced chambers under pressure, `outer_wall` and `inner_wall` what is left between their threads and the surface or
+the lumen, `wall` is delta_c + delta_r of Eq. (1), for which the chambers are taken to be in the middle."""
 
 
 @dataclass(frozen=True)
@@ -213,11 +217,16 @@ def check_task(task: DesignTask, setting: Setting) -> None:
         raise InputError("expected something to choose", key="choices")
     if (task.maximise is None) == (task.minimise is None):
         raise InputError("expected one of maximise, minimise", key="objective")
-    _known(task.maximise or task.minimise or "", "maximise" if task.maximise else "minimise")
+    way = "maximise" if task.maximise else "minimise"
+    _known(task.maximise or task.minimise or "", way)
+    if task.objective.name == "chamber_gap":
+        raise InputError("the gap may be required but not optimised: it is the smallest of several", key=way)
     for name, limits in task.requirements.items():
         _known(name, f"requirements.{name}")
         if not limits.lower <= limits.upper or limits == Limits():
             raise InputError("expected a least value, a largest one above it, or both", key=f"requirements.{name}")
+        if name == "chamber_gap" and limits.upper < inf:
+            raise InputError("expected a least value only", key=f"requirements.{name}")
     counts = [*(r.chamber_sets for r in task.lists.get("robot", (setting.robot,))), *task.lists.get("chamber_sets", ())]
     fewest = min(task.lists.get("chamber_sets", counts))
     if not task.sets or any(not 0 <= k < fewest for k in task.sets) or len(set(task.sets)) < len(task.sets):
@@ -230,8 +239,8 @@ def check_task(task: DesignTask, setting: Setting) -> None:
             raise InputError(f"expected a number of at least 1, got {value}", key=key)
     if task.needs_force and task.is_continuous and setting.contact.closure == "weighted":
         raise InputError(
-            "expected 'free', 'compliant' or 'rigid' where something continuous is chosen by the force: what 'weighted' "
-            "minimises is a problem of its own",
+            "expected 'free', 'compliant' or 'rigid' where something continuous is chosen by the force: 'weighted' "
+            "minimises something of its own",
             key="closure",
         )
 
