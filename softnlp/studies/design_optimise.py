@@ -331,6 +331,9 @@ class Optimiser:
         box = dict(task.ranges) | ({"pressure": pressure} if isinstance(pressure, Range) else {})
         points = [dict(zip(box, point, strict=True)) for point in spread(list(box.values()), _TRIES)]
         made = (q for q in points if not broken_rules(_at(model, q).robot, task))
+        # An arc is all that the program needs where nothing else is solved.
+        arcs = self.evaluator.solver is None and not self.evaluator.is_loaded
+        look = self.evaluator.free if arcs else self.evaluator.full
         wanted = task.first_guesses
         fixed = pressure if not isinstance(pressure, Range) else 0.0
         meeting: list[dict[str, float]] = []
@@ -344,7 +347,7 @@ class Optimiser:
         for point in chosen:
             P = point.get("pressure", fixed)
             for _ in range(_HALVINGS if isinstance(pressure, Range) else 1):
-                begun = self.evaluator.full(_at(model, point), float(P))
+                begun = look(_at(model, point), float(P))
                 if begun.outputs:
                     break
                 P = P / 2
