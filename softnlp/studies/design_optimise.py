@@ -22,8 +22,9 @@ from softnlp.studies.wall import Situation
 
 Array = NDArray[np.float64]
 
-AGREES = 1e-4
-"""Part of the objective by which the program and the solve that follows it may differ."""
+AGREES = 1e-3
+"""Part of the objective by which the program and the solve that follows it may differ; beyond it they are not on the
+same branch. From a tenth of it the program is solved again on a finer grid."""
 
 _COARSEST, _FINEST = 15, 80  # intervals of the program
 _HOLDS = 1e-7  # scaled violation of a solved program
@@ -279,22 +280,24 @@ class Optimiser:
         task = self.evaluator.task
         while True:
             found = self.evaluator.full(_at(model, optimum.values), optimum.values["pressure"])
-            right = not unmet(found, task) and not self._disagreement(found, optimum)
+            right = not unmet(found, task) and not self._disagreement(found, optimum, AGREES / 10)
             if not found.outputs or right or 2 * intervals > _FINEST:
                 return found, optimum, intervals
             intervals *= 2
             finer = self.optimise(found, intervals)
             if not finer.holds:
-                return found, optimum, intervals
+                finer = self._stepwise(found, intervals)
+            if not finer.holds:
+                return found, optimum, intervals // 2
             optimum = finer
 
-    def _disagreement(self, found: Evaluation, optimum: Optimum) -> tuple[str, ...]:
+    def _disagreement(self, found: Evaluation, optimum: Optimum, within: float = AGREES) -> tuple[str, ...]:
         """Say where the program's answer is not the one followed from zero pressure."""
         name = self.evaluator.task.objective.name
         if not found.outputs:
             return (f"the optimum found is not on the branch from zero pressure: {found.message}",)
         exact = found.outputs[name]
-        if abs(exact - optimum.objective) <= AGREES * max(abs(exact), 1e-3 * OUTPUTS[name].scale):
+        if abs(exact - optimum.objective) <= within * max(abs(exact), 1e-3 * OUTPUTS[name].scale):
             return ()
         return (
             f"the optimum found is not on the branch from zero pressure: {OUTPUTS[name].file_key} is "
