@@ -6,7 +6,7 @@
 `softnlp.design` as a script calls it: everything built, every start, the answer solved again. The other is
 scipy.optimize.minimize with Nelder-Mead from the middle of the same box, requirements and rules of manufacture as
 penalties, around the forward solve, begun again from its best design until it is within 0.1 % of our answer or has
-solved 1,500 designs: "as run" calls `softnlp.forward` or `softnlp.blocked_force` for each design, as a
+solved 400 designs: "as run" calls `softnlp.forward` or `softnlp.blocked_force` for each design, as a
 script would; "kept" keeps one solver with everything compiled. Seconds of processor time, in one run.
 
 "random": 2,000 random designs that meet every requirement, judged by the same forward solve, against the optimum.
@@ -35,7 +35,7 @@ from softnlp.studies.design_task import OUTPUTS, Setting
 FILE = Path(__file__).parents[1] / "scenarios" / "design" / "D25L60_dimensions.toml"
 PENALTY = 20.0  # objective units for missing a requirement by all of its limit, or a wall by a millimetre
 RANDOM = 2000
-MOST_EVALUATIONS = 1500
+MOST_EVALUATIONS = 400
 REACHED = 1e-3
 
 Outputs = Callable[[Robot], dict[str, float]]

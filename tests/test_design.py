@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from contextlib import chdir
 from dataclasses import replace
@@ -34,6 +35,15 @@ from softnlp.cli import main
 from softnlp.contact_settings import ContactSettings
 from softnlp.quantities import Model
 from softnlp.runner_design import run_design
+from softnlp.scenario import scenario_from_text
+from softnlp.schema_design import (
+    ActuationTable,
+    LimitsTable,
+    MaterialChoices,
+    ObjectiveTable,
+    RequirementsTable,
+    RobotChoices,
+)
 from softnlp.studies import design as design_module
 from softnlp.studies.blocked import BlockedSolver
 from softnlp.studies.design import Design
@@ -46,14 +56,14 @@ from softnlp.studies.wall import standing_wall
 
 FOLDER = Path(__file__).parents[1] / "scenarios" / "design"
 D25, SOFT = robot("D25L60"), material("Ecoflex 00-50")
-STRETCHED = {"stretch": at_most(1.2), "outer_wall": at_least(1.0 * MILLIMETRE)}
+STRETCHED = {"stretch": at_most(1.2), "outer_wall": at_least(1.2 * MILLIMETRE)}
 
 
 def angle_task(names: tuple[str, ...], **changes: Any) -> DesignTask:
     """Return the task of bending most at 1 bar with one or two dimensions free."""
     ranges = {
-        "chamber_diameter": Range(3.0 * MILLIMETRE, 5.5 * MILLIMETRE),
-        "lumen_diameter": Range(6.0 * MILLIMETRE, 11.0 * MILLIMETRE),
+        "chamber_diameter": Range(4.0 * MILLIMETRE, 5.0 * MILLIMETRE),
+        "lumen_diameter": Range(7.0 * MILLIMETRE, 11.0 * MILLIMETRE),
     }
     task = DesignTask(
         {name: ranges[name] for name in names}, 1.0 * BAR, requirements=STRETCHED, maximise="bending_angle"
@@ -72,7 +82,7 @@ def test_the_optimum_agrees_with_dense_enumeration(names: tuple[str, ...]) -> No
     best = design(D25, SOFT, task).best
     assert best is not None
     evaluator = evaluator_of(task, Model(D25, SOFT))
-    points = 41 if len(names) == 2 else 401
+    points = 21 if len(names) == 2 else 101
     axes = [np.linspace(task.ranges[name].lower, task.ranges[name].upper, points) for name in names]
     met = []
     for values in np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(names)):
@@ -83,9 +93,9 @@ def test_the_optimum_agrees_with_dense_enumeration(names: tuple[str, ...]) -> No
         if not unmet(found, task):
             met.append((found.outputs["bending_angle"], values))
     angle, place = max(met, key=lambda pair: pair[0])
-    assert len(met) > points
+    assert len(met) > points // 2
     assert best.objective >= angle
-    assert best.objective == pytest.approx(angle, rel=2e-3 if len(names) == 1 else 2e-2)
+    assert best.objective == pytest.approx(angle, rel=1e-2 if len(names) == 1 else 5e-2)
     for name, value, axis in zip(names, place, axes, strict=True):
         assert abs(best.choices[name] - value) <= 1.5 * (axis[1] - axis[0])
     assert best.agreeing == best.starts
@@ -122,7 +132,7 @@ def forced() -> tuple[DesignTask, Optimiser]:
 
 
 def test_the_derivatives_of_the_program_are_those_of_differences() -> None:
-    task, optimiser = forced()
+    _, optimiser = forced()
     begun = optimiser.evaluator.full(Model(D25, SOFT), 0.6 * BAR)
     posed = optimiser.problem(15, optimiser._plane(begun))
     x, p, _ = optimiser.start(begun, posed)
@@ -160,7 +170,10 @@ def test_the_largest_force_is_on_the_branch_and_cannot_be_beaten_nearby() -> Non
     rng = np.random.default_rng(5)
     feasible = 0
     for _ in range(12):
-        changed = {name: float(found.found.outputs[name] * rng.uniform(0.94, 1.03)) for name in task.ranges}
+        changed = {
+            name: float(np.clip(found.found.outputs[name] * rng.uniform(0.94, 1.03), r.lower, r.upper))
+            for name, r in task.ranges.items()
+        }
         made = Model(replace(D25, **changed), SOFT)
         if not broken_rules(made.robot, task):
             near = optimiser.evaluator.full(made, found.found.pressure)
@@ -173,7 +186,7 @@ def test_the_largest_force_is_on_the_branch_and_cannot_be_beaten_nearby() -> Non
 
 
 def test_a_force_that_ends_in_a_fold_stays_on_its_branch() -> None:
-    """With the pressure free the program would go on behind the fold; along the branch the force only rises to there."""
+    """With the pressure free the program would go on behind the fold; along the branch the force rises up to it."""
     task = DesignTask({}, Range(0.0, 3.0 * BAR), maximise="blocked_force", starts=1)
     laparoscope = robot("laparoscope-6")
     best = design(laparoscope, material("Ecoflex 00-30"), task, numerics=Numerics(accuracy=1e-4)).best
@@ -275,7 +288,7 @@ def test_a_design_that_nothing_meets_names_what_is_missed() -> None:
     assert candidate.status == "infeasible"
     assert "bending_angle_deg" in candidate.reasons[0]
     assert "400 deg wanted" in candidate.reasons[0]
-    assert candidate.outputs["chamber_diameter"] == pytest.approx(5.5e-3, rel=1e-3)  # as far as it can go
+    assert candidate.outputs["chamber_diameter"] == pytest.approx(5.0e-3, rel=1e-3)  # as far as it can go
 
 
 def test_loads_are_part_of_the_program() -> None:
@@ -428,7 +441,7 @@ def test_the_command_leaves_results_and_a_scenario_of_the_best(
         best = document["best"]
         assert best["status"] == "feasible"
         assert best["outputs"]["blocked_force_N"] >= 1.0
-        assert best["choices"]["robot.chamber_diameter_mm"] == best["outputs"]["chamber_diameter_mm"]
+        assert best["choices"]["robot.chamber_diameter_mm"] == pytest.approx(best["outputs"]["chamber_diameter_mm"])
         assert document["candidates"][0]["choices"] == best["choices"]
         assert all(active["gain_per_unit"] is None or active["gain_per_unit"] > 0 for active in best["active"])
         assert (folder / "figure.png").stat().st_size > 10_000
@@ -518,3 +531,30 @@ def test_a_broken_scenario_is_one_line(name: str, tmp_path: Path, capsys: pytest
     assert captured.err.startswith(f"softnlp: {path}: ")
     for word in words:
         assert word in captured.err
+
+
+def test_every_key_of_a_design_is_documented() -> None:
+    text = (FOLDER.parents[1] / "docs" / "design.md").read_text()
+    tables = (RobotChoices, MaterialChoices, ActuationTable, RequirementsTable, ObjectiveTable, LimitsTable)
+    for key in (key for table in tables for key in table.model_fields):
+        assert f"`{key}`" in text or f"`robot.{key}`" in text or f"`material.{key}`" in text, key
+    for table in ("choices", "actuation", "requirements", "objective", "contact"):
+        assert f"`[{table}]`" in text
+
+
+def test_the_python_of_the_document_runs() -> None:
+    text = (FOLDER.parents[1] / "docs" / "design.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.S)
+    names: dict[str, Any] = {}
+    exec(compile(code, "design.md", "exec"), names)
+    best = names["found"].best
+    assert best.is_feasible
+    (printed,) = re.findall(r"bends ([\d.]+) deg at ([\d.]+) mm", text)
+    assert best.outputs["bending_angle"] / DEGREE == pytest.approx(float(printed[0]), abs=0.06)
+    assert best.choices["chamber_diameter"] / MILLIMETRE == pytest.approx(float(printed[1]), abs=0.006)
+
+
+def test_the_toml_of_the_document_is_accepted() -> None:
+    text = (FOLDER.parents[1] / "docs" / "design.md").read_text()
+    for block in re.findall(r"```toml\n(.*?)```", text, re.S):
+        assert scenario_from_text(block, "x.toml").task is not None
