@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from softnlp.scenario_check import SCHEMAS, STUDIES
+
 MAIN = "scenario.toml"
 DIRECTORY = object()
 """In place of a file's content: a directory of that name."""
@@ -106,7 +108,8 @@ TABLES = [
         Broken(
             f"study {name} of a later version", scenario(top=f"study = '{name}'\n"), ("study", name, "blocked-force")
         )
-        for name in ("workspace", "inverse", "identify", "design")
+        for name in STUDIES
+        if name not in SCHEMAS
     ),
     Broken("no robot", scenario(robot=""), ("[robot]", "missing")),
     Broken("no material", scenario(material=""), ("[material]", "missing")),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softnlp.plots.section import draw_section, stretched_radii
-from softnlp.plots.style import COLOURS, GREY, INK, PALE, SMALL, new_figure, plain
+from softnlp.plots.style import COLOURS, GREY, INK, PALE, SMALL, TEXT, new_figure, plain
 from softnlp.results.design import held_back, label, pressure_words
 from softnlp.studies.design import Design
 from softnlp.studies.design_candidate import Candidate
@@ -47,9 +47,10 @@ def design_figure(done: Design) -> Figure:
     _scatter(figure.add_axes((0.66, (height - 3.0) / height, 0.32, 2.15 / height)), done)
     if done.best is not None:
         best = done.best
-        axes = figure.add_axes((0.64, 0.0, 0.35, 2.75 / height))
-        title = f"best: {label(done, best)}, {best.outputs['pressure'] / 1e5:.4g} bar"
-        draw_section(axes, best.robot, stretched_radii(best.robot, 1.0), shorten(title, 58), set(), made=True)
+        axes = figure.add_axes((0.64, 0.0, 0.35, 2.7 / height))
+        title = f"best: {shorten(label(done, best), 44)}, {best.outputs['pressure'] / 1e5:.4g} bar"
+        figure.text(0.63, 2.87 / height, title, size=TEXT, weight="bold", color=INK, va="top", parse_math=False)
+        draw_section(axes, best.robot, stretched_radii(best.robot, 1.0), "", set(), made=True)
     return figure
 
 
