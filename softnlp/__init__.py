@@ -43,6 +43,13 @@ if TYPE_CHECKING:
     from softnlp.studies.blocked_force import blocked_force as blocked_force
     from softnlp.studies.blocked_force import constrained_pose as constrained_pose
     from softnlp.studies.blocked_force import force_against_offset as force_against_offset
+    from softnlp.studies.design import Design as Design
+    from softnlp.studies.design import design as design
+    from softnlp.studies.design_task import DesignTask as DesignTask
+    from softnlp.studies.design_task import PressureSteps as PressureSteps
+    from softnlp.studies.design_task import Range as Range
+    from softnlp.studies.design_task import at_least as at_least
+    from softnlp.studies.design_task import at_most as at_most
     from softnlp.studies.ellipsoids import compliance_ellipsoid as compliance_ellipsoid
     from softnlp.studies.ellipsoids import manipulability as manipulability
     from softnlp.studies.ellipsoids import stiffness_ellipsoid as stiffness_ellipsoid
@@ -80,6 +87,8 @@ _HOMES = {
     "scenario": ("load_scenario",),
     "status": ("Status",),
     "studies.blocked_force": ("blocked_force", "constrained_pose", "force_against_offset"),
+    "studies.design": ("Design", "design"),
+    "studies.design_task": ("DesignTask", "PressureSteps", "Range", "at_least", "at_most"),
     "studies.ellipsoids": ("compliance_ellipsoid", "manipulability", "stiffness_ellipsoid"),
     "studies.force_inversion": ("pressure_for_force",),
     "studies.forward": ("forward",),

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -98,6 +99,14 @@ class CondensedSolver:
         if right_sides not in self._sweeps:
             self._sweeps[right_sides] = _sweep_function(self._functions, self._method, self._base, right_sides)
         return self._sweeps[right_sides]
+
+    def determinant_expression(self, x: Any, p: Any) -> Any:
+        """Return the determinant of the tip equations as an expression of symbols or of expressions x, p."""
+        _, tip, _ = self._sweep(1).call([x, p, ca.DM.zeros(x.numel())])
+        known, columns = self._base.shape[1], tip.shape[1]
+        matrix = ca.DM(self._into) @ ca.horzcat(tip[:, :known], tip[:, known + 1 : columns])
+        entries = ca.SX.sym("entries", *matrix.shape)
+        return ca.Function("determinant", [entries], [ca.det(entries)], {"cse": True})(matrix)
 
     def tip_moves(self, x: Array, p: Array) -> Array:
         """Return how the tip's state moves when the tip equations are off by given errors, (nx, 6 + n_y)."""

@@ -23,6 +23,7 @@ from softnlp.robot import DIMENSIONS, ROBOTS, Robot, Violation, check, violation
 from softnlp.rod import Loads
 from softnlp.scenario_check import first_of, parse
 from softnlp.scenario_contact import contact_settings, contact_task
+from softnlp.scenario_design import design_task
 from softnlp.scenario_identify import Given, identify_task
 from softnlp.scenario_inverse import inverse_task
 from softnlp.scenario_schema import RobotTable, ScenarioFile
@@ -288,10 +289,15 @@ def _identify_task(given: Read) -> Task:
     )
 
 
+def _design_task(given: Read) -> Task:
+    return design_task(given.file, given.data, given.robot, given.material, given.folder)
+
+
 TASKS: Mapping[str, tuple[str, Callable[[Read], Task]]] = {
     "blocked-force": ("contact", _contact_task),
     "workspace": ("workspace", _workspace_task),
     "inverse": ("target", _inverse_task),
     "identify": ("measurements", _identify_task),
+    "design": ("choices", _design_task),
 }
 """For each study with tables of its own: the table that its errors are about, and what reads them."""

@@ -34,7 +34,7 @@ LONGEST_LABEL = 200
 LONGEST_FILE_NAME = 500
 
 
-def _wrong(message: str) -> PydanticCustomError:
+def wrong(message: str) -> PydanticCustomError:
     """Wrap a message of our own, which is passed on as it is."""
     return PydanticCustomError("own", "{text}", {"text": message})
 
@@ -44,25 +44,25 @@ def _direction(value: Any) -> tuple[float, float, float]:
     if isinstance(value, str):
         if value not in DIRECTIONS:
             hint = did_you_mean(value, DIRECTIONS)
-            raise _wrong(f"expected one of {choices(DIRECTIONS)}, or a vector, got {shown(value)}{hint}")
+            raise wrong(f"expected one of {choices(DIRECTIONS)}, or a vector, got {shown(value)}{hint}")
         return DIRECTIONS[value]
     if not isinstance(value, list):
-        raise _wrong(f"expected one of {choices(DIRECTIONS)}, or a vector of 3 numbers, got {shown(value)}")
+        raise wrong(f"expected one of {choices(DIRECTIONS)}, or a vector of 3 numbers, got {shown(value)}")
     return _normal(value)
 
 
 def _normal(value: Any) -> tuple[float, float, float]:
     """Normalise a list of three numbers."""
     if not isinstance(value, list) or len(value) != 3:
-        raise _wrong(f"expected a list of 3 numbers, got {shown(value)}")
+        raise wrong(f"expected a list of 3 numbers, got {shown(value)}")
     for component in value:
         if isinstance(component, bool) or not isinstance(component, (int, float)):
-            raise _wrong(f"expected a list of 3 numbers, got {shown(component)} in it")
+            raise wrong(f"expected a list of 3 numbers, got {shown(component)} in it")
         if not abs(component) <= LARGEST_COMPONENT:
-            raise _wrong(f"expected 3 finite numbers, got {shown(component)} among them")
+            raise wrong(f"expected 3 finite numbers, got {shown(component)} among them")
     largest = max(abs(component) for component in value)
     if largest == 0:
-        raise _wrong("expected a direction, got a vector of length 0")
+        raise wrong("expected a direction, got a vector of length 0")
     x, y, z = (component / largest for component in value)  # first, so that no square vanishes or overflows
     length = hypot(x, y, z)
     return x / length, y / length, z / length
@@ -73,7 +73,7 @@ def _intervals(value: Any) -> int | None:
     if value == "auto":
         return None
     if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MOST_INTERVALS:
-        raise _wrong(f"expected 'auto' or a whole number from 1 to {MOST_INTERVALS}, got {shown(value)}")
+        raise wrong(f"expected 'auto' or a whole number from 1 to {MOST_INTERVALS}, got {shown(value)}")
     return value
 
 
@@ -81,7 +81,7 @@ def _label(value: str) -> str:
     """Put a name or a title on one line; control characters would reach a terminal or a figure."""
     label = " ".join(value.split())
     if not label or not label.isprintable():
-        raise _wrong(f"expected text without control characters, got {shown(value)}")
+        raise wrong(f"expected text without control characters, got {shown(value)}")
     return label
 
 

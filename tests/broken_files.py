@@ -102,12 +102,6 @@ TABLES = [
     Broken("misspelt study", scenario(top="study = 'foward'\n"), ("study", "did you mean 'forward'?")),
     Broken("study of a wrong type", scenario(top="study = 1\n"), ("study", "'forward'", "got 1")),
     Broken("study is a table", "[study]\n" + scenario(top=""), ("study", "a table")),
-    *(
-        Broken(
-            f"study {name} of a later version", scenario(top=f"study = '{name}'\n"), ("study", name, "blocked-force")
-        )
-        for name in ("design",)
-    ),
     Broken("no robot", scenario(robot=""), ("[robot]", "missing")),
     Broken("no material", scenario(material=""), ("[material]", "missing")),
     Broken("no pressure", scenario(pressure=""), ("[pressure]", "missing")),

@@ -54,6 +54,7 @@ def _app() -> App:
     from cyclopts import App, Parameter
 
     from softnlp import __version__
+    from softnlp.cli.design import design
     from softnlp.cli.identify import identify
     from softnlp.cli.inverse import inverse
     from softnlp.cli.library import materials, robots
@@ -78,6 +79,7 @@ def _app() -> App:
     app.command(inverse)
     app.command(sensitivity)
     app.command(identify)
+    app.command(design)
     app.command(robots)
     app.command(materials)
     plot = App(name="plot", help="Draw a cross-section, silicones, or the results of a run.")

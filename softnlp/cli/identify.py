@@ -52,12 +52,12 @@ def identify(scenario: Path, /, *, out: Path | None = None, json: bool = False) 
 
 def run_study(asked: Scenario, out: Path | None, json: bool) -> int:
     """Identify what a scenario asks for, print it and write the results; return the exit status."""
-    from softnlp.cli.run import _require_writable
+    from softnlp.cli.run import require_writable
     from softnlp.studies.identify_task import TensileTask
 
     folder = out if out is not None or json else Path("results") / asked.path.stem
     if folder is not None:
-        _require_writable(folder)
+        require_writable(folder)
     tensile = isinstance(asked.task, TensileTask)
     return _tensile(asked, folder, json) if tensile else _robots(asked, folder, json)
 

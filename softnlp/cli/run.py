@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say
+from softnlp.cli.folder import require_writable
 from softnlp.contact_settings import ContactTask
 from softnlp.errors import InputError
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 _COMMANDS: Mapping[str, str] = {
     "workspace": "sweep",
     "identify": "identify",
+    "design": "design",
 }
 """Studies whose result is no list of steps: which module of this package has the `run_study` that runs a scenario."""
 
@@ -57,7 +58,7 @@ def run(scenario: Path, /, *, out: Path | None = None, json: bool = False, branc
         return int(import_module(f"softnlp.cli.{_COMMANDS[asked.study]}").run_study(asked, out, json))
     folder = out if out is not None or json else Path("results") / scenario.stem
     if folder is not None:
-        _require_writable(folder)
+        require_writable(folder)
     done, stopped = _solve(asked, branches)
     try:
         if folder is not None:
@@ -110,15 +111,6 @@ def _solve(asked: Scenario, branches: int) -> tuple[Run, bool]:
             return run_scenario(asked, keep, branches), False
         except _StopRun:
             return partial_run(asked, steps), True
-
-
-def _require_writable(folder: Path) -> None:
-    """Refuse a folder that cannot be written before time is spent on a solve; nothing is made yet."""
-    standing = next((p for p in (folder, *folder.parents) if os.path.lexists(p)), Path())
-    if not standing.is_dir():
-        raise InputError("expected a folder, got a file", source=str(standing))
-    if not os.access(standing, os.W_OK | os.X_OK):
-        raise InputError("this folder cannot be written", source=str(standing))
 
 
 def _write(done: Run, folder: Path, asked: Scenario) -> None:

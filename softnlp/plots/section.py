@@ -79,7 +79,7 @@ def section_figure(robot: Robot, violations: Sequence[Violation] = (), stretch: 
         bottom = height - header - PANEL[1]
         axes = figure.add_axes((k / len(states), bottom / height, 1 / len(states), PANEL[1] / height))
         red = broken if k == 0 else set(range(robot.chambers)) if touching < stretch else set()
-        _draw(axes, robot, radii[k], title, red, made=k == 0)
+        draw_section(axes, robot, radii[k], title, red, made=k == 0)
         if k == 1:
             _circle(axes, (0, 0), robot.outer_radius, fill=False, edgecolor=GREY, linestyle=(0, (2, 3)), zorder=0)
     for j, line in enumerate(lines):
@@ -89,7 +89,7 @@ def section_figure(robot: Robot, violations: Sequence[Violation] = (), stretch: 
     return figure
 
 
-def _draw(axes: Axes, robot: Robot, radii: SectionRadii, title: str, red: Collection[int], made: bool) -> None:
+def draw_section(axes: Axes, robot: Robot, radii: SectionRadii, title: str, red: Collection[int], made: bool) -> None:
     """Draw one section [mm] with axes, dimensions and title.
 
     red : chambers (from 0) to mark. made : letters of the section as made (D_r), else of a deformed one (r_r).

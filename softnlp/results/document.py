@@ -49,9 +49,13 @@ def to_json(run: Run) -> dict[str, Any]:
 
 def json_text(run: Run) -> str:
     """Return the document of `to_json` as text, ending in a newline."""
-    text = json.dumps(to_json(run), indent=2, ensure_ascii=False, allow_nan=False)
-    # A list of numbers goes on one line; strings hold no bare newline, so none is touched.
-    return re.sub(r"\[\n\s+([^\[\]{}\"]*?)\n\s+\]", lambda m: f"[{' '.join(m[1].split())}]", text) + "\n"
+    return compact_json(json.dumps(to_json(run), indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
+
+
+def compact_json(text: str) -> str:
+    """Put each list of numbers of an indented document on one line."""
+    # Strings hold no bare newline, so none is touched.
+    return re.sub(r"\[\n\s+([^\[\]{}\"]*?)\n\s+\]", lambda m: f"[{' '.join(m[1].split())}]", text)
 
 
 def _step(run: Run, step: Step) -> dict[str, Any]:

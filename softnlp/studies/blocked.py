@@ -219,6 +219,7 @@ class BlockedSolver:
             values["contact.wall_point"] = situation.wall.point
             values["contact.wall_normal"] = situation.wall.normal
         values["contact.tip_cap"] = self.contact.tip_cap
+        values["contact.chamber_reaction"] = self.model.coefficients.chamber_reaction
         values["contact.free_lengths"] = free_lengths
         values["contact.pressed"] = pressed
         return values

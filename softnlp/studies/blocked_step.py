@@ -72,7 +72,7 @@ def solved_step(
     began: float,
 ) -> Step:
     """Return the step of a solution with its certificate, the wall and the warnings."""
-    model, grid, solution = functions.model, found.grid, found.solution
+    model, grid, solution = poses.model, found.grid, found.solution
     problem, situation = grid.problem, found.situation
     L_0, F_0 = (float(v) for v in np.asarray(problem.units(solution.x, solution.p)).ravel())
     y = grid.tip_forces(solution.x)

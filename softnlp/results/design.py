@@ -1,0 +1,297 @@
+"""A design study as a JSON document, a CSV table, a table for the terminal, and its best candidate as a scenario."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+from softnlp.materials import Material
+from softnlp.results.document import compact_json
+from softnlp.results.inputs import (
+    coefficients_table,
+    contact_table,
+    loads_table,
+    material_table,
+    package_version,
+    robot_table,
+    tidy,
+)
+from softnlp.robot import DIMENSIONS, Robot
+from softnlp.studies.design import Design
+from softnlp.studies.design_candidate import Candidate
+from softnlp.studies.design_optimise import Active
+from softnlp.studies.design_task import OUTPUTS, Output, PressureSteps, Range
+from softnlp.units import BAR, DEGREE, MILLIMETRE
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+_FILE = {d.field: (f"robot.{d.file_key}", d.scale) for d in DIMENSIONS}
+
+
+def design_document(done: Design) -> dict[str, Any]:
+    """Return a design as plain dicts, lists, strings, numbers and None; no NaN or infinity."""
+    setting, task, best = done.setting, done.task, done.best
+    limits = {
+        OUTPUTS[name].file_key: {
+            key: tidy(value, OUTPUTS[name].scale)
+            for key, value in (("at_least", limit.lower), ("at_most", limit.upper))
+            if isfinite(value)
+        }
+        for name, limit in task.requirements.items()
+    }
+    found = None if best is None else candidate_table(done, best)
+    if found is not None and done.free_closure_force is not None:
+        found["blocked_force_free_closure_N"] = done.free_closure_force
+    return {
+        "softnlp": package_version(),
+        "title": done.title,
+        "study": "design",
+        "conventions": setting.conventions.name,
+        "robot": robot_table(setting.robot),
+        "material": material_table(setting.material),
+        "coefficients": coefficients_table(setting.coefficients),
+        "loads": loads_table(setting.loads),
+        **({"contact": contact_table(setting.contact)} if task.needs_force else {}),
+        "objective": {"maximise" if task.maximise else "minimise": task.objective.file_key},
+        "requirements": limits,
+        "sets": [k + 1 for k in task.sets],
+        "best": found,
+        "candidates": [candidate_table(done, candidate) for candidate in done.candidates],
+    }
+
+
+def design_json(done: Design) -> str:
+    """Return the document as text, ending in a newline."""
+    return compact_json(json.dumps(design_document(done), indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
+
+
+def candidate_table(done: Design, candidate: Candidate) -> dict[str, Any]:
+    """Return a candidate in the units of files."""
+    outputs = {o.file_key: _plain(candidate.outputs.get(o.name), o.scale) for o in known_outputs(done)}
+    return {
+        "number": candidate.number,
+        "choices": choices_table(candidate.choices),
+        "status": candidate.status,
+        "reasons": list(candidate.reasons),
+        "outputs": outputs,
+        "robot": robot_table(candidate.robot),
+        "active": [active_table(done, active) for active in candidate.active],
+        "starts": candidate.starts,
+        "agreeing": candidate.agreeing,
+        "iterations": candidate.iterations,
+        "intervals": candidate.intervals,
+        "residual": _plain(candidate.step.residual if candidate.step else None),
+        "warnings": list(candidate.warnings),
+        "solve_time_s": candidate.solve_time,
+    }
+
+
+def known_outputs(done: Design) -> list[Output]:
+    """Return the outputs that candidates of a study have."""
+    return [o for o in OUTPUTS.values() if o.kind != "force" or done.task.needs_force]
+
+
+def choices_table(choices: Mapping[str, Any]) -> dict[str, Any]:
+    """Return choices under the keys of [choices]; whole robots and silicones by their names."""
+    table: dict[str, Any] = {}
+    for name, value in choices.items():
+        if isinstance(value, Material):
+            table |= {"material.name": value.name, "material.model": value.law.name}
+        elif isinstance(value, Robot):
+            table["robot.name"] = value.name
+        elif name == "pressure":
+            table["pressure_bar"] = tidy(value, BAR)
+        else:
+            key, scale = _FILE[name]
+            table[key] = int(value) if scale is None else tidy(value, scale)
+    return table
+
+
+def active_table(done: Design, active: Active) -> dict[str, Any]:
+    """Return a limit that holds the objective back; the gain is per unit of the file."""
+    scale, unit = _unit_of(active.name)
+    objective = done.task.objective
+    return {
+        "limit": OUTPUTS[active.name].file_key if active.name in OUTPUTS else active.name,
+        "side": active.side,
+        "value": _plain(active.limit, scale),
+        "unit": unit,
+        "gain_per_unit": None if not isfinite(active.limit) else _plain(active.rate * scale, objective.scale),
+        "gain_unit": objective.unit,
+    }
+
+
+def _unit_of(name: str) -> tuple[float, str]:
+    """Return the scale and the unit in which a limit is written."""
+    if name in OUTPUTS:
+        return OUTPUTS[name].scale, OUTPUTS[name].unit
+    return (DEGREE, "deg") if name == "chamber_angle" else (MILLIMETRE, "mm")
+
+
+def design_csv(done: Design) -> str:
+    """Return the candidates as CSV, a row each; cells of what is not known are empty."""
+    keys = list(dict.fromkeys(key for c in done.candidates for key in choices_table(c.choices)))
+    outputs = [o.file_key for o in known_outputs(done)]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["number", "status", *(f"choice {key}" for key in keys), *outputs, "reasons", "warnings"])
+    for candidate in done.candidates:
+        table = candidate_table(done, candidate)
+        cells = [table["choices"].get(key) for key in keys] + [table["outputs"][key] for key in outputs]
+        row = [table["number"], table["status"], *("" if cell is None else cell for cell in cells)]
+        writer.writerow([*row, "; ".join(table["reasons"]), "; ".join(table["warnings"])])
+    return text.getvalue()
+
+
+def label(done: Design, candidate: Candidate) -> str:
+    """Return the discrete choices of a candidate in a few words; "design" where there are none."""
+    words = []
+    for name, value in candidate.choices.items():
+        if name not in done.task.lists:
+            continue
+        if isinstance(value, Material):
+            several = len({m.law.name for m in done.task.lists["material"]}) > 1
+            words.append(f"{value.name} ({value.law.name})" if several else value.name)
+        elif isinstance(value, Robot):
+            words.append(value.name)
+        elif name == "chambers_per_set":
+            words.append(f"{candidate.robot.chambers} chambers")
+        else:
+            ((key, number),) = choices_table({name: value}).items()
+            stem, _, unit = key.removeprefix("robot.").rpartition("_")
+            words.append(
+                f"{stem.replace('_', ' ')} {number:g} {unit}" if unit in ("mm", "deg") else f"{key[6:]} {number}"
+            )
+    return ", ".join(words) or "design"
+
+
+def design_lines(done: Design) -> Group:
+    """Return a table of the candidates, the best one and what holds it back; print it with rich."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), show_edge=False)
+    table.add_column("", justify="right", no_wrap=True)
+    table.add_column("candidate", overflow="fold")
+    table.add_column("status", no_wrap=True)
+    columns = shown_outputs(done)
+    for output in columns:
+        stem = output.file_key.removesuffix(f"_{output.unit}").replace("_", " ")
+        table.add_column(Text(f"{stem}\n[{output.unit}]"), justify="right", no_wrap=True)
+    for c in done.candidates:
+        cells = [_digits(c.outputs.get(o.name), o.scale) for o in columns]
+        style = "bold green" if c is done.best else "" if c.is_feasible else "bright_black"
+        table.add_row(str(c.number), label(done, c), c.status, *cells, style=style)
+    return Group(table, *(Text(line, style) for line, style in _notes(done)))
+
+
+def shown_outputs(done: Design) -> list[Output]:
+    """Return the outputs worth a column: the objective, pressure, angle, and what is required of a robot's doing."""
+    task = done.task
+    wanted = dict.fromkeys([task.objective.name, "pressure", "bending_angle", "stretch", *task.requirements])
+    return [OUTPUTS[name] for name in wanted if OUTPUTS[name].kind != "robot" or name == task.objective.name]
+
+
+def _notes(done: Design) -> Iterator[tuple[str, str]]:
+    """Yield what is to be said below the table, with a style."""
+    for candidate in done.candidates:
+        if not candidate.is_feasible:
+            yield f"{candidate.number} {candidate.status}: {'; '.join(candidate.reasons)}", "bright_black"
+    best = done.best
+    if best is None:
+        yield "no candidate is feasible", "red"
+        return
+    objective = done.task.objective
+    value = _digits(best.objective, objective.scale)
+    unit = "" if objective.unit == "1" else f" {objective.unit}"
+    yield f"best: {best.number} {label(done, best)}, {objective.file_key} {value}{unit}", "bold green"
+    chosen = {key: value for key, value in choices_table(best.choices).items() if not isinstance(value, str)}
+    if chosen:
+        yield "  " + ", ".join(f"{key} {value:.6g}" for key, value in chosen.items()), ""
+    if done.free_closure_force is not None:
+        yield f"  without the chambers' reaction (closure free) the force is {done.free_closure_force:.4g} N", ""
+    for words in held_back(done, best):
+        yield f"  held back by {words}", ""
+    for warning in best.warnings:
+        yield f"  warning: {warning}", "yellow"
+
+
+def held_back(done: Design, candidate: Candidate) -> Iterator[str]:
+    """Yield in words each limit that holds the objective back and what loosening it would gain."""
+    for active in (active_table(done, a) for a in candidate.active):
+        if active["value"] is None:
+            yield str(active["limit"])
+            continue
+        side = "at least" if active["side"] == "lower" else "at most"
+        unit = "" if active["unit"] == "1" else f" {active['unit']}"
+        gain = f"{active['gain_per_unit']:+.4g} {active['gain_unit']} for each{unit or ' 1'} looser"
+        yield f"{active['limit']} {side} {active['value']:.6g}{unit}: {gain}"
+
+
+def best_scenario(done: Design, asked: Mapping[str, Any]) -> str | None:
+    """Return the best candidate as the text of a scenario that can be run, or None where nothing is feasible.
+
+    asked : the scenario of the design as it was parsed; [robot], [material] and what the pressure is are replaced.
+    """
+    best = done.best
+    if best is None:
+        return None
+    material = dict(asked["material"])
+    if "material" in best.choices:
+        kept = {key: material[key] for key in ("file", "density_kg_m3") if key in material}
+        material = {"name": best.material.name, "model": best.material.law.name, **kept}
+    robot = robot_table(best.robot) | {
+        k: asked["robot"][k] for k in ("allow", "minimum_wall_mm") if k in asked["robot"]
+    }
+    force = done.task.needs_force
+    highest = tidy(best.outputs["pressure"], BAR)
+    tables: dict[str, Any] = {
+        "title": f"{done.title}: {label(done, best)}"[:200],
+        "study": "blocked-force" if force else "forward",
+        "robot": robot,
+        "material": material,
+        **{key: asked[key] for key in ("stiffening", "corrections", "gravity", "tip_load", "solver") if key in asked},
+        **({"contact": asked["contact"]} if force and "contact" in asked else {}),
+        "pressure": {"ramp": {"sets": [k + 1 for k in done.task.sets], "to_bar": highest, "steps": 11}},
+    }
+    lines = []
+    for key, value in tables.items():
+        if isinstance(value, Mapping):
+            lines += ["", f"[{key}]", *(f"{name} = {_toml(item)}" for name, item in value.items())]
+        else:
+            lines.append(f"{key} = {_toml(value)}")
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: Any) -> str:
+    """Return a value of a parsed TOML file as TOML."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return "[" + ", ".join(_toml(item) for item in value) + "]"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def pressure_words(pressure: float | Range | PressureSteps) -> str:
+    """Return what was asked of the pressure in a few words."""
+    if isinstance(pressure, Range):
+        return f"{pressure.lower / BAR:g} to {pressure.upper / BAR:g} bar"
+    if isinstance(pressure, PressureSteps):
+        return f"lowest step of {pressure.step / BAR:g} bar, up to {pressure.highest / BAR:g} bar"
+    return f"{pressure / BAR:g} bar"
+
+
+def _plain(value: float | None, scale: float = 1.0) -> float | None:
+    return None if value is None or not isfinite(value) else float(value) / scale
+
+
+def _digits(value: float | None, scale: float) -> str:
+    number = _plain(value, scale)
+    return "-" if number is None else f"{number:.4g}"

@@ -1,0 +1,52 @@
+"""From a design scenario to a finished design."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from softnlp.contact_settings import ContactSettings
+from softnlp.scenario import Scenario
+from softnlp.studies.design import Design, design, finished
+from softnlp.studies.design_candidate import Candidate
+from softnlp.studies.design_task import DesignTask, Setting
+
+Progress = Callable[[int, Candidate], None]
+
+
+def run_design(scenario: Scenario, progress: Progress | None = None, workers: int = 1) -> Design:
+    """Run a scenario of study "design"; `progress` is called with the number done and each candidate.
+
+    Raises
+    ------
+    InputError
+        As `softnlp.design`.
+    """
+    assert isinstance(scenario.task, DesignTask)
+    return design(
+        scenario.robot,
+        scenario.material,
+        scenario.task,
+        loads=scenario.loads,
+        contact=scenario.contact or ContactSettings(),
+        coefficients=scenario.coefficients,
+        conventions=scenario.conventions,
+        numerics=scenario.numerics,
+        title=scenario.title,
+        workers=workers,
+        progress=progress,
+    )
+
+
+def finished_design(scenario: Scenario, candidates: Sequence[Candidate]) -> Design:
+    """Return the design of a scenario that was stopped after some candidates."""
+    assert isinstance(scenario.task, DesignTask)
+    setting = Setting(
+        scenario.robot,
+        scenario.material,
+        scenario.coefficients,
+        scenario.conventions,
+        scenario.loads,
+        scenario.contact or ContactSettings(),
+        scenario.numerics,
+    )
+    return finished(setting, scenario.task, candidates, scenario.title)

@@ -1,0 +1,173 @@
+"""Design: of all combinations and dimensions that may be chosen, those that meet the requirements, and the best."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, replace
+from multiprocessing import get_context
+from typing import Any
+
+from softnlp.contact_settings import ContactSettings
+from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.materials import Material
+from softnlp.numerics import Numerics
+from softnlp.quantities import Model
+from softnlp.robot import Robot
+from softnlp.rod import Loads
+from softnlp.studies.design_candidate import Candidate, Workshop, structure
+from softnlp.studies.design_evaluate import Evaluator
+from softnlp.studies.design_task import MOST_ENUMERATED, DesignTask, Setting, check_task, with_choices
+from softnlp.studies.forward import checked_loads
+from softnlp.studies.wall import checked_contact
+
+Progress = Callable[[int, Candidate], None]
+_CHUNK = 8  # candidates that a process is given at once; most of one structure, which is compiled once
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A finished design study: what was asked, and every candidate in the order of the combinations.
+
+    free_closure_force : blocked force of the best candidate by the closure `free` [N], where a force was asked for by
+    another one and can be found.
+    """
+
+    setting: Setting
+    task: DesignTask
+    candidates: tuple[Candidate, ...]
+    title: str = ""
+    free_closure_force: float | None = None
+
+    @property
+    def feasible(self) -> tuple[Candidate, ...]:
+        """The candidates that meet everything, best first."""
+        sign = self.task.sign
+        return tuple(sorted((c for c in self.candidates if c.is_feasible), key=lambda c: -sign * c.objective))
+
+    @property
+    def best(self) -> Candidate | None:
+        """The best feasible candidate, or None."""
+        return next(iter(self.feasible), None)
+
+
+def design(
+    robot: Robot,
+    material: Material,
+    task: DesignTask,
+    *,
+    loads: Loads = Loads(),
+    contact: ContactSettings = ContactSettings(),
+    coefficients: Coefficients = Coefficients(),
+    conventions: Conventions = REPRODUCTION,
+    numerics: Numerics = Numerics(),
+    title: str = "",
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> Design:
+    """Find the design that meets every requirement and maximises or minimises an output.
+
+    Every combination of the discrete choices is a candidate. In each, what is a range is optimised as one nonlinear
+    program with exact derivatives from several starts, and the answer solved again to the accuracy of `numerics`. More
+    combinations than `MOST_ENUMERATED` are searched by optuna instead.
+
+    Parameters
+    ----------
+    robot, material
+        What choices do not change.
+    task
+        Choices, requirements, what is best.
+    loads, contact, coefficients, conventions, numerics, title
+        As for `softnlp.forward` and `softnlp.blocked_force`.
+    workers
+        Processes; above 1 a script needs `if __name__ == "__main__"`.
+    progress
+        Called with the number done and each candidate as it is done; what it raises ends the study.
+
+    Raises
+    ------
+    InputError
+        For a task that cannot be meant, or a search without optuna.
+
+    """
+    setting = Setting(
+        robot, material, coefficients, conventions, checked_loads(loads), checked_contact(contact), numerics
+    )
+    check_task(task, setting)
+    done: list[Candidate] = []
+    for candidate in _candidates(setting, task, workers):
+        done.append(candidate)
+        if progress is not None:
+            progress(len(done), candidate)
+    return finished(setting, task, done, title)
+
+
+def finished(setting: Setting, task: DesignTask, candidates: Sequence[Candidate], title: str = "") -> Design:
+    """Return the design of the candidates that are done, in the order of their numbers."""
+    done = Design(setting, task, tuple(sorted(candidates, key=lambda c: c.number)), title)
+    best = done.best
+    if best is None or not task.needs_force or setting.contact.closure == "free":
+        return done
+    other = replace(setting, contact=replace(setting.contact, closure="free"))
+    model = Model(best.robot, best.material, setting.coefficients, setting.conventions)
+    force = Evaluator(other, task, model).full(model, best.outputs["pressure"]).outputs.get("blocked_force")
+    return replace(done, free_closure_force=force)
+
+
+def _candidates(setting: Setting, task: DesignTask, workers: int) -> Iterator[Candidate]:
+    """Yield every candidate as it is done."""
+    workshop = Workshop(setting, task)
+    total = 1
+    for values in task.lists.values():
+        total *= len(values)
+    if total > MOST_ENUMERATED:
+        from softnlp.studies.design_search import searched
+
+        yield from searched(workshop)
+        return
+    every = list(enumerate(task.combinations(), start=1))
+    if workers > 1 and _can_be_sent(setting, task):
+        yield from _in_processes(setting, task, every, workers)
+        return
+    for number, combination in every:
+        yield workshop.candidate(number, combination)
+
+
+def _can_be_sent(setting: Setting, task: DesignTask) -> bool:
+    """Whether other processes can be given the task: a law of a person's own Python function may not."""
+    try:
+        pickle.dumps((setting, task))
+    except (pickle.PicklingError, AttributeError, TypeError):
+        return False
+    return True
+
+
+def _in_processes(
+    setting: Setting, task: DesignTask, every: Sequence[tuple[int, Mapping[str, Any]]], workers: int
+) -> Iterator[Candidate]:
+    """Yield candidates as processes finish them, those of one structure together."""
+    grouped = sorted(every, key=lambda pair: structure(*with_choices(setting, pair[1])))
+    chunks = [grouped[k : k + _CHUNK] for k in range(0, len(grouped), _CHUNK)]
+    pool = ProcessPoolExecutor(
+        min(workers, os.cpu_count() or 1), mp_context=get_context("spawn"), initializer=_leave_interrupts
+    )
+    try:
+        jobs = [pool.submit(_chunk, setting, task, chunk) for chunk in chunks]
+        for job in as_completed(jobs):
+            yield from job.result()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _chunk(setting: Setting, task: DesignTask, chunk: Sequence[tuple[int, Mapping[str, Any]]]) -> list[Candidate]:
+    """Return the candidates of a chunk."""
+    workshop = Workshop(setting, task)
+    return [workshop.candidate(number, combination) for number, combination in chunk]
+
+
+def _leave_interrupts() -> None:
+    """Leave Ctrl-C to the process that asked."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

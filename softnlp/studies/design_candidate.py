@@ -1,0 +1,199 @@
+"""One candidate of a design: checked, brought to its pressure or optimised, and judged."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from softnlp.materials import Material
+from softnlp.quantities import Model
+from softnlp.robot import Robot
+from softnlp.status import Status
+from softnlp.studies.design_evaluate import Evaluation, Evaluator, broken_rules, missed, unmet
+from softnlp.studies.design_optimise import Active, Optimised, Optimiser
+from softnlp.studies.design_task import SIZES, DesignTask, PressureSteps, Range, Setting, with_choices
+from softnlp.studies.step import Step
+
+_FAILED = (Status.DIVERGED, Status.INACCURATE)
+_LEVELS = 32  # pressures at which a free pressure is looked at before it is optimised
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One combination of the discrete choices, with the continuous ones and the pressure found for it; SI.
+
+    number : from 1. choices : by name; whole robots and silicones by their `Robot` and `Material`.
+    status : "feasible", "infeasible", or "failed" where a solver gave up. reasons : why it is not feasible.
+    outputs : by name, of the design chosen or, where none is feasible, of the one that misses least; may be empty.
+    objective : the output asked for, nan where there is none. active : limits that hold the objective back, of
+    continuous choices. agreeing, starts : how many of how many first guesses led here. step : of the free or blocked
+    shape.
+    """
+
+    number: int
+    choices: Mapping[str, Any]
+    robot: Robot
+    material: Material
+    status: Literal["feasible", "infeasible", "failed"]
+    reasons: tuple[str, ...]
+    outputs: Mapping[str, float]
+    objective: float
+    active: tuple[Active, ...] = ()
+    agreeing: int = 0
+    starts: int = 0
+    iterations: int = 0
+    intervals: int | None = None
+    warnings: tuple[str, ...] = ()
+    step: Step | None = None
+    solve_time: float = 0.0
+
+    @property
+    def is_feasible(self) -> bool:
+        """Whether it meets everything."""
+        return self.status == "feasible"
+
+
+class Workshop:
+    """Judges candidates one after another; what is compiled for one structure (chambers, law) is kept for the next."""
+
+    def __init__(self, setting: Setting, task: DesignTask) -> None:
+        self.setting = setting
+        self.task = task
+        self._made: dict[tuple[int, int, str], Optimiser] = {}
+
+    def optimiser(self, model: Model) -> Optimiser:
+        """Return what is compiled for the structure of a model."""
+        key = structure(model.robot, model.material)
+        if key not in self._made:
+            self._made[key] = Optimiser(Evaluator(self.setting, self.task, model))
+        return self._made[key]
+
+    def candidate(self, number: int, combination: Mapping[str, Any]) -> Candidate:
+        """Return a combination's candidate; never raises for one that cannot be made or solved."""
+        began = time.perf_counter()
+        robot, material = with_choices(self.setting, combination)
+        model = Model(robot, material, self.setting.coefficients, self.setting.conventions)
+        if self.task.ranges:
+            found = self._optimised(model)
+        elif reasons := broken_rules(robot, self.task):
+            found = Optimised(None, tuple(reasons))
+        elif isinstance(self.task.pressure, Range):
+            found = self._at_free_pressure(model, self.task.pressure)
+        else:
+            found = self._at_pressure(model)
+        made = _candidate(number, combination, model, found, self.task)
+        return replace(made, solve_time=time.perf_counter() - began)
+
+    def _at_pressure(self, model: Model) -> Optimised:
+        """Judge a candidate of numbers at its pressure, or at the lowest step that meets everything."""
+        evaluator = self.optimiser(model).evaluator
+        if not isinstance(self.task.pressure, PressureSteps):
+            found = evaluator.full(model, float(self.task.pressure))  # type: ignore[arg-type]
+            return Optimised(found, tuple(unmet(found, self.task)))
+        nearest: tuple[float, Evaluation] | None = None
+        ended = ""
+        for pressure in self.task.pressure.values():
+            found = evaluator.free(model, pressure)
+            if not found.outputs:
+                ended = f"; from {pressure / 1e5:.4g} bar {found.status.value}: {found.message}"
+                break
+            if not unmet(found, self.task):
+                found = evaluator.full(model, pressure)
+                if not (reasons := unmet(found, self.task)):
+                    return Optimised(found, ())
+                if not found.outputs:
+                    ended = f"; at {pressure / 1e5:.4g} bar {reasons[0]}"
+                    continue
+            off = sum(part for _, part in missed(found.outputs, self.task.requirements))
+            if nearest is None or off < nearest[0]:
+                nearest = off, found
+        if nearest is None:
+            return Optimised(None, (f"no step of the pressure has a solution{ended}",))
+        missing = "; ".join(unmet(nearest[1], self.task))
+        return Optimised(nearest[1], (f"no step of the pressure meets everything; nearest is {missing}{ended}",))
+
+    def _at_free_pressure(self, model: Model, pressure: Range) -> Optimised:
+        """Optimise the pressure alone, unless one requirement is missed at every pressure."""
+        optimiser = self.optimiser(model)
+        looked = [optimiser.evaluator.free(model, float(P)) for P in np.linspace(*_ends(pressure), _LEVELS)]
+        missing = [dict(missed_names(e, self.task)) for e in looked if e.outputs]
+        always = set.intersection(*(set(m) for m in missing)) if missing else set()
+        if always:
+            nearest = min(
+                (e for e in looked if e.outputs), key=lambda e: sum(dict(missed_names(e, self.task)).values())
+            )
+            reasons = "; ".join(unmet(nearest, self.task))
+            return Optimised(nearest, (f"no pressure meets everything; nearest is {reasons}",))
+        return optimiser.best(model, pressure)
+
+    def _optimised(self, model: Model) -> Optimised:
+        """Optimise the dimensions, at the lowest step of the pressure where it comes in steps."""
+        robot = model.robot
+        if (robot.chambers_per_set - 1) * float(robot.chamber_angle) >= 2 * np.pi / robot.chamber_sets:
+            return Optimised(None, ("sets that interleave cannot be optimised; choose a smaller chamber_angle",))
+        optimiser, pressure = self.optimiser(model), self.task.pressure
+        if not isinstance(pressure, PressureSteps):
+            return optimiser.best(model, pressure)
+        found = Optimised(None, ("there is no step of the pressure",))
+        for P in pressure.values():
+            found = optimiser.best(model, P)
+            if not found.reasons:
+                break
+        return found
+
+
+def _ends(pressure: Range) -> tuple[float, float]:
+    """Return the pressures between which to look; not zero, where nothing bends."""
+    return max(pressure.lower, pressure.upper / _LEVELS), pressure.upper
+
+
+def missed_names(found: Evaluation, task: DesignTask) -> list[tuple[str, float]]:
+    """Return the names of the requirements that known outputs miss, with the part of the limit."""
+    names = []
+    for name, limits in task.requirements.items():
+        names += [(name, part) for _, part in missed(found.outputs, {name: limits})]
+    return names
+
+
+def structure(robot: Robot, material: Material) -> tuple[int, int, str]:
+    """Return what candidates must share to share what is compiled."""
+    return robot.chamber_sets, robot.chambers_per_set, material.law.name
+
+
+def _candidate(
+    number: int, combination: Mapping[str, Any], model: Model, found: Optimised, task: DesignTask
+) -> Candidate:
+    """Put what was found of a combination together."""
+    evaluation = found.found
+    outputs = dict(evaluation.outputs) if evaluation else {}
+    choices = dict(combination)
+    robot = model.robot
+    if evaluation is not None and task.ranges:
+        robot = evaluation.model.robot
+        robot = replace(robot, name=robot.name if robot.name.endswith("(modified)") else f"{robot.name} (modified)")
+        choices |= {name: float(getattr(robot, name)) for name in SIZES if name in task.ranges}
+    if evaluation is not None and not isinstance(task.pressure, int | float):
+        choices["pressure"] = evaluation.pressure
+    failed = found.failed or (evaluation is not None and evaluation.status in _FAILED)
+    step = evaluation.step if evaluation else None
+    return Candidate(
+        number=number,
+        choices=choices,
+        robot=robot,
+        material=model.material,
+        status="feasible" if not found.reasons else "failed" if failed else "infeasible",
+        reasons=found.reasons,
+        outputs=outputs,
+        objective=outputs.get(task.objective.name, float("nan")),
+        active=found.active,
+        agreeing=found.agreeing,
+        starts=found.starts,
+        iterations=found.iterations,
+        intervals=found.intervals or (step.intervals if step else None),
+        warnings=step.warnings if step else (),
+        step=step,
+    )

@@ -1,0 +1,216 @@
+"""One design at one pressure, in numbers: its outputs, and which requirements and rules of manufacture it misses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.branch import stretch_on_branch
+from softnlp.errors import RobotError
+from softnlp.loadcase import RodFunctions
+from softnlp.quantities import Model
+from softnlp.robot import Robot, touching_stretch, violations
+from softnlp.status import Status
+from softnlp.studies.blocked import BlockedSolver
+from softnlp.studies.blocked_grid import Blocked
+from softnlp.studies.design_task import OUTPUTS, DesignTask, Limits, Output, Setting
+from softnlp.studies.pose_grid import Solved
+from softnlp.studies.statics import PoseSolver
+from softnlp.studies.step import Pose, Step
+from softnlp.studies.wall import Wall, standing_wall
+from softnlp.unloaded import unloaded_case
+
+Array = NDArray[np.float64]
+
+FEASIBLE = 1e-5
+"""A requirement counts as met where it is missed by no more than this part of its limit."""
+
+_TINY = 1e-24  # [m^2] under the root of the tip's deflection, whose slope has a limit nowhere at 0
+
+
+def robot_outputs(robot: Robot) -> dict[str, Any]:
+    """Return the outputs of kind "robot", SI; numbers or symbols as the dimensions are."""
+    r_cp, r_co = robot.chamber_circle_radius, robot.chamber_radius
+    walls = {
+        "outer_wall": robot.outer_radius - r_cp - r_co,
+        "inner_wall": r_cp - r_co - robot.lumen_radius,
+        "wall": robot.chamber_wall + robot.outer_wall,
+    }
+    names = [output.name for output in OUTPUTS.values() if output.kind == "robot" and output.name not in walls]
+    return {name: getattr(robot, name) for name in names} | walls
+
+
+def free_outputs(case: Mapping[str, Any], length: Any) -> dict[str, Any]:
+    """Return the outputs of kind "free", SI, from those of a load case (numbers or symbols) and L_0."""
+    x, y, z = (case["tip_position"][k] for k in range(3))
+    return {
+        "bending_angle": case["bending_angle"],
+        "stretch": case["stretch"],
+        "elongation": case["backbone_length"] - length,
+        "tip_x": x,
+        "tip_y": y,
+        "tip_z": z,
+        "tip_deflection": (x**2 + y**2 + _TINY) ** 0.5,
+    }
+
+
+def chamber_gaps(robot: Robot, stretch: Any) -> list[Any]:
+    """Return the gaps between neighbouring reinforced chambers at a stretch [m], numbers or symbols.
+
+    In a set neighbours are alpha_1 apart, from one set to the next 2 pi / n1 - (n2 - 1) alpha_1: the sets are taken not
+    to interleave. The circle shrinks as lambda^-1/2 (S2), r_co stays.
+    """
+    n1, n2 = robot.chamber_sets, robot.chambers_per_set
+    angles = [robot.chamber_angle] if n2 > 1 else []
+    if n1 > 1 or n2 > 2:
+        angles.append(2 * ca.pi / n1 - (n2 - 1) * robot.chamber_angle)
+    shrink = stretch**-0.5
+    return [2 * robot.chamber_circle_radius * shrink * ca.sin(a / 2) - 2 * robot.chamber_radius for a in angles]
+
+
+def pose_outputs(pose: Pose, length: float) -> dict[str, float]:
+    """Return the outputs of kind "free" of a solved pose."""
+    case = {key: getattr(pose, key) for key in ("bending_angle", "stretch", "backbone_length", "tip_position")}
+    return {name: float(value) for name, value in free_outputs(case, length).items()}
+
+
+def _smallest_gap(robot: Robot, stretch: float) -> float:
+    """Return the smallest gap between neighbouring reinforced chambers at a stretch [m]; inf for a single chamber."""
+    touching = touching_stretch(robot)
+    return 2 * float(robot.chamber_radius) * (float(np.sqrt(touching / stretch)) - 1)
+
+
+def shown(output: Output, value: float) -> str:
+    """Return a value in the unit of files."""
+    unit = "" if output.unit == "1" else f" {output.unit}"
+    return f"{value / output.scale:.5g}{unit}"
+
+
+def missed(outputs: Mapping[str, float], requirements: Mapping[str, Limits]) -> Iterator[tuple[str, float]]:
+    """Yield, for each requirement that known outputs miss: in words, and by which part of its limit."""
+    for name, limits in requirements.items():
+        if name not in outputs:
+            continue
+        output, value = OUTPUTS[name], outputs[name]
+        for limit, off, words in (
+            (limits.lower, limits.lower - value, "least"),
+            (limits.upper, value - limits.upper, "most"),
+        ):
+            size = max(abs(limit), 1e-3 * output.scale) if np.isfinite(limit) else np.inf
+            if not off <= FEASIBLE * size:
+                yield f"{output.file_key}: {shown(output, value)}, at {words} {shown(output, limit)} wanted", off / size
+
+
+def broken_rules(robot: Robot, task: DesignTask) -> list[str]:
+    """Return the rules of manufacture and the requirements on dimensions that a robot of numbers breaks."""
+    try:
+        found = violations(robot, task.minimum_wall)
+    except RobotError as error:
+        return [str(error)]
+    rules = [f"{v.rule}: {v.message}" for v in found if not (v.lowerable and v.rule in task.allow)]
+    return rules + [words for words, _ in missed(robot_outputs(robot), task.requirements)]
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """A design at one pressure [Pa].
+
+    outputs : every known output by name, SI; none where there is no solution. step : of the free or the blocked shape.
+    free, blocked : the solutions, where there are some. wall : where the blocked shape was pressed.
+    """
+
+    model: Model
+    pressure: float
+    status: Status
+    message: str
+    outputs: Mapping[str, float]
+    step: Step | None = None
+    free: Solved | None = None
+    blocked: Blocked | None = None
+    wall: Wall | None = None
+
+
+class Evaluator:
+    """Evaluates designs of one structure (chambers, law); what is compiled is kept between them.
+
+    model : any of that structure.
+    """
+
+    def __init__(self, setting: Setting, task: DesignTask, model: Model) -> None:
+        self.setting = setting
+        self.task = task
+        self.direction = np.zeros(model.robot.chamber_sets)
+        self.direction[list(task.sets)] = 1.0
+        self.is_loaded = bool(np.any([setting.loads.tip_force, setting.loads.tip_moment, setting.loads.gravity]))
+        self.solver = BlockedSolver(model, setting.numerics, setting.contact) if task.needs_force else None
+        self.poses = self.solver.poses if self.solver else PoseSolver(model, setting.numerics)
+        case = unloaded_case("free", self.functions, self.poses.quantities)
+        found = free_outputs(case.outputs, self.poses.quantities["robot.length"].symbol)
+        symbols = [q.symbol for q in self.poses.quantities.values()]
+        self._names = list(found)
+        self._arc = ca.Function("arc", [*symbols, case.symbols[0]], list(found.values()))
+
+    @property
+    def functions(self) -> RodFunctions:
+        """The rod's functions with the tip conditions of the shape that is solved last."""
+        return self.solver.functions if self.solver else self.poses.functions
+
+    def free(self, model: Model, pressure: float) -> Evaluation:
+        """Return the free shape at a pressure [Pa]: in closed form without loads, else solved."""
+        P = pressure * self.direction
+        poses = self.poses.with_model(model)
+        values = poses.values(P, self.setting.loads)
+        known = {**robot_outputs(model.robot), "pressure": pressure}
+        if self.is_loaded:
+            step, solved = poses.solve(P, self.setting.loads)
+            return self._of_pose(model, pressure, known, step, step.pose, solved)
+        branch = stretch_on_branch(poses.branch, poses.column(values), P)
+        if branch.status is not Status.SOLVED:
+            return Evaluation(model, pressure, branch.status, branch.message, {})
+        numbers = [values.get(name, q.nominal) for name, q in poses.quantities.items()]
+        found = zip(self._names, self._arc.call([*numbers, branch.stretch]), strict=True)
+        outputs = {**known, **{name: float(value) for name, value in found}}
+        outputs["chamber_gap"] = _smallest_gap(model.robot, branch.stretch)
+        return Evaluation(model, pressure, Status.SOLVED, branch.message, outputs)
+
+    def full(self, model: Model, pressure: float) -> Evaluation:
+        """Return everything that the task asks of a design at a pressure [Pa], to the accuracy of the setting."""
+        P, loads = pressure * self.direction, self.setting.loads
+        known = {**robot_outputs(model.robot), "pressure": pressure}
+        if self.solver is None:
+            step, free = self.poses.with_model(model).solve(P, loads)
+            return self._of_pose(model, pressure, known, step, step.pose, free)
+        solver = self.solver.with_model(model)
+        wall = standing_wall(solver.poses, self.setting.contact, P[None, :], loads)
+        step, blocked = solver.solve(P, loads, wall)
+        if step.contact is None:
+            return Evaluation(model, pressure, step.status, step.message, {}, step, wall=wall)
+        known["blocked_force"] = step.contact.force
+        free = blocked.free.solved if blocked else None
+        found = self._of_pose(model, pressure, known, step, step.contact.free, free)
+        return replace(found, blocked=blocked, wall=wall)
+
+    def _of_pose(
+        self, model: Model, pressure: float, known: dict[str, float], step: Step, pose: Pose | None, free: Solved | None
+    ) -> Evaluation:
+        if pose is None:
+            return Evaluation(model, pressure, step.status, step.message, {}, step)
+        outputs = {**known, **pose_outputs(pose, float(model.robot.length))}
+        outputs["chamber_gap"] = _smallest_gap(model.robot, pose.stretch)
+        return Evaluation(model, pressure, step.status, step.message, outputs, step, free)
+
+
+def unmet(found: Evaluation, task: DesignTask) -> list[str]:
+    """Return why a design at a pressure is not feasible, in words; nothing where it is."""
+    if not found.outputs:
+        return [f"{found.status.value}: {found.message}"]
+    reasons = [words for words, _ in missed(found.outputs, task.requirements)]
+    free = found.step and (found.step.contact.free if found.step.contact else found.step.pose)
+    if free and not free.stable:
+        reasons.append("the free shape is not stable: it buckles under its load")
+    return reasons

@@ -1,0 +1,292 @@
+"""What a design study is asked: choices, requirements and what is best, as data in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+from math import inf, isfinite, prod
+from numbers import Integral
+from typing import Any, Literal
+
+from softnlp.contact_settings import ContactSettings
+from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.errors import InputError, nearest
+from softnlp.materials import Material
+from softnlp.numerics import Numerics
+from softnlp.robot import DIMENSIONS, LOWERABLE_RULES, MINIMUM_WALL, Robot, is_number
+from softnlp.rod import Loads
+from softnlp.units import BAR, DEGREE, MILLIMETRE
+
+MOST_ENUMERATED = 5000  # combinations above which a search takes the place of enumeration
+COUNTS = tuple(d.field for d in DIMENSIONS if d.scale is None)
+SIZES = tuple(d.field for d in DIMENSIONS if d.scale is not None)
+
+
+@dataclass(frozen=True)
+class Output:
+    """A number of a design that may be required or optimised.
+
+    name : in SI. file_key : in files, with the unit. scale : SI value of a file unit. kind : "free" for the free shape,
+    "force" for the blocked one, "robot" for its dimensions, "pressure".
+    """
+
+    name: str
+    file_key: str
+    scale: float
+    kind: Literal["free", "force", "robot", "pressure"]
+
+    @property
+    def unit(self) -> str:
+        """The unit of files, "1" for a plain number."""
+        unit = self.file_key.rpartition("_")[2]
+        return unit if self.scale != 1.0 or unit == "N" else "1"
+
+
+OUTPUTS: Mapping[str, Output] = {
+    output.name: output
+    for output in (
+        Output("bending_angle", "bending_angle_deg", DEGREE, "free"),
+        Output("blocked_force", "blocked_force_N", 1.0, "force"),
+        Output("stretch", "stretch", 1.0, "free"),
+        Output("elongation", "elongation_mm", MILLIMETRE, "free"),
+        Output("tip_x", "tip_x_mm", MILLIMETRE, "free"),
+        Output("tip_y", "tip_y_mm", MILLIMETRE, "free"),
+        Output("tip_z", "tip_z_mm", MILLIMETRE, "free"),
+        Output("tip_deflection", "tip_deflection_mm", MILLIMETRE, "free"),
+        Output("chamber_gap", "chamber_gap_mm", MILLIMETRE, "free"),
+        Output("pressure", "pressure_bar", BAR, "pressure"),
+        Output("outer_diameter", "outer_diameter_mm", MILLIMETRE, "robot"),
+        Output("lumen_diameter", "lumen_diameter_mm", MILLIMETRE, "robot"),
+        Output("chamber_circle_diameter", "chamber_circle_diameter_mm", MILLIMETRE, "robot"),
+        Output("chamber_diameter", "chamber_diameter_mm", MILLIMETRE, "robot"),
+        Output("chamber_wall", "chamber_wall_mm", MILLIMETRE, "robot"),
+        Output("outer_wall", "outer_wall_mm", MILLIMETRE, "robot"),
+        Output("inner_wall", "inner_wall_mm", MILLIMETRE, "robot"),
+        Output("wall", "wall_mm", MILLIMETRE, "robot"),
+        Output("length", "length_mm", MILLIMETRE, "robot"),
+    )
+}
+"""By name: `tip_deflection` is the tip's distance from the z axis, `chamber_gap` the smallest one between neighbouring
+reinforced chambers under pressure, `outer_wall` and `inner_wall` what is left between their threads and the surface or
+the lumen, `wall` is delta_c + delta_r of Eq. (1), for which the chambers are taken to be in the middle."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """A continuous choice, chosen by optimisation: lower <= value <= upper, SI."""
+
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class PressureSteps:
+    """A pressure that is the lowest multiple of `step` up to `highest` at which every requirement holds [Pa]."""
+
+    step: float
+    highest: float
+
+    def values(self) -> list[float]:
+        """Return the pressures in order, `highest` among them only where it is a multiple."""
+        return [k * self.step for k in range(1, int(self.highest / self.step + 1e-9) + 1)]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """A requirement: lower <= output <= upper, SI."""
+
+    lower: float = -inf
+    upper: float = inf
+
+
+def at_least(value: float) -> Limits:
+    """Return the requirement that an output be at least a value, SI."""
+    return Limits(lower=value)
+
+
+def at_most(value: float) -> Limits:
+    """Return the requirement that an output be at most a value, SI."""
+    return Limits(upper=value)
+
+
+@dataclass(frozen=True, eq=False)
+class DesignTask:
+    """What may be chosen, what is required and what is best; SI.
+
+    choices : by name, a `Range` or a sequence of values. The names are those of the dimensions of `softnlp.Robot`,
+    "robot" for whole robots and "material" for silicones. Counts and whole things take sequences only.
+    pressure : in each of `sets` (counted from 0), the same [Pa]: a number, a `Range` or `PressureSteps`.
+    requirements : `Limits` by name of `OUTPUTS`. maximise, minimise : one of them, a name of `OUTPUTS`.
+    allow, minimum_wall : rules of manufacture that may be broken, and delta_s of Eq. (1) [m].
+    starts : first guesses of each optimisation; None is 4, and 2 where one number alone is free.
+    trials : of the search, where there are more than `MOST_ENUMERATED` combinations.
+    """
+
+    choices: Mapping[str, Range | Sequence[Any]]
+    pressure: float | Range | PressureSteps
+    sets: tuple[int, ...] = (0,)
+    requirements: Mapping[str, Limits] = field(default_factory=dict)
+    maximise: str | None = None
+    minimise: str | None = None
+    allow: tuple[str, ...] = ()
+    minimum_wall: float = MINIMUM_WALL
+    starts: int | None = None
+    trials: int = 500
+
+    @property
+    def objective(self) -> Output:
+        """The output that is maximised or minimised."""
+        return OUTPUTS[self.maximise or self.minimise or ""]
+
+    @property
+    def sign(self) -> float:
+        """1 where the objective is maximised, -1 where it is minimised."""
+        return 1.0 if self.maximise else -1.0
+
+    @property
+    def needs_force(self) -> bool:
+        """Whether the blocked shape has to be solved."""
+        return self.objective.kind == "force" or any(OUTPUTS[name].kind == "force" for name in self.requirements)
+
+    @property
+    def ranges(self) -> dict[str, Range]:
+        """The continuous choices of dimensions by name."""
+        return {name: values for name, values in self.choices.items() if isinstance(values, Range)}
+
+    @property
+    def lists(self) -> dict[str, Sequence[Any]]:
+        """The discrete choices by name."""
+        return {name: values for name, values in self.choices.items() if not isinstance(values, Range)}
+
+    @property
+    def is_continuous(self) -> bool:
+        """Whether anything is left to an optimisation."""
+        return bool(self.ranges) or isinstance(self.pressure, Range)
+
+    @property
+    def first_guesses(self) -> int:
+        """How many first guesses each optimisation has."""
+        return self.starts or (4 if len(self.ranges) + isinstance(self.pressure, Range) > 1 else 2)
+
+    def combinations(self) -> Iterator[dict[str, Any]]:
+        """Yield every combination of the discrete choices, the last one changing first."""
+        for values in product(*self.lists.values()):
+            yield dict(zip(self.lists, values, strict=True))
+
+    def step_count(self, pressures: int = 0) -> int:
+        """Return how many candidates there are."""
+        every = prod(len(values) for values in self.lists.values())
+        return every if every <= MOST_ENUMERATED else min(self.trials, every)
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """Everything that no choice changes, and what the choices start from."""
+
+    robot: Robot
+    material: Material
+    coefficients: Coefficients = Coefficients()
+    conventions: Conventions = REPRODUCTION
+    loads: Loads = Loads()
+    contact: ContactSettings = ContactSettings()
+    numerics: Numerics = Numerics()
+
+
+def with_choices(setting: Setting, combination: Mapping[str, Any]) -> tuple[Robot, Material]:
+    """Return the robot and the silicone of a combination; the robot is not checked."""
+    base = combination.get("robot", setting.robot)
+    changed = {name: value for name, value in combination.items() if name not in ("robot", "material")}
+    differs = any(getattr(base, name) != value for name, value in changed.items())
+    name = base.name if not differs or base.name.endswith("(modified)") else f"{base.name} (modified)"
+    return replace(base, **changed, name=name), combination.get("material", setting.material)
+
+
+def check_task(task: DesignTask, setting: Setting) -> None:
+    """Refuse a task that cannot be meant.
+
+    Raises
+    ------
+    InputError
+        With the key, for the first thing that is not right.
+    """
+    for name, values in task.choices.items():
+        _check_choice(name, values)
+    _check_pressure(task.pressure)
+    if not task.choices and not isinstance(task.pressure, Range):
+        raise InputError("expected something to choose", key="choices")
+    if (task.maximise is None) == (task.minimise is None):
+        raise InputError("expected one of maximise, minimise", key="objective")
+    way = "maximise" if task.maximise else "minimise"
+    _known(task.maximise or task.minimise or "", way)
+    if task.objective.name == "chamber_gap":
+        raise InputError("the gap may be required but not optimised: it is the smallest of several", key=way)
+    for name, limits in task.requirements.items():
+        _known(name, f"requirements.{name}")
+        if not limits.lower <= limits.upper or limits == Limits():
+            raise InputError("expected a least value, a largest one above it, or both", key=f"requirements.{name}")
+        if name == "chamber_gap" and limits.upper < inf:
+            raise InputError("expected a least value only", key=f"requirements.{name}")
+    counts = [*(r.chamber_sets for r in task.lists.get("robot", (setting.robot,))), *task.lists.get("chamber_sets", ())]
+    fewest = min(task.lists.get("chamber_sets", counts))
+    if not task.sets or any(not 0 <= k < fewest for k in task.sets) or len(set(task.sets)) < len(task.sets):
+        raise InputError(f"expected different sets of 0 to {fewest - 1}, got {list(task.sets)}", key="sets")
+    for rule in task.allow:
+        if rule not in LOWERABLE_RULES:
+            raise InputError(f"expected rules of {', '.join(LOWERABLE_RULES)}, got {rule!r}", key="allow")
+    for key, value in (("starts", task.starts), ("trials", task.trials)):
+        if value is not None and value < 1:
+            raise InputError(f"expected a number of at least 1, got {value}", key=key)
+    if task.needs_force and task.is_continuous and setting.contact.closure == "weighted":
+        raise InputError(
+            "expected 'free', 'compliant' or 'rigid' where something continuous is chosen by the force: 'weighted' "
+            "minimises something of its own",
+            key="closure",
+        )
+
+
+def _known(name: str, key: str) -> None:
+    if name not in OUTPUTS:
+        raise InputError(f"unknown output{nearest(name, OUTPUTS)}", key=key)
+
+
+def _check_choice(name: str, values: Any) -> None:
+    key = f"choices.{name}"
+    known = ("material", "robot", *COUNTS, *SIZES)
+    if name not in known:
+        raise InputError(f"cannot be chosen{nearest(name, known)}", key=key)
+    if isinstance(values, Range):
+        if name not in SIZES:
+            raise InputError("expected a list of values", key=key)
+        _check_range(values, key)
+        return
+    if not isinstance(values, Sequence) or isinstance(values, str) or not values:
+        raise InputError("expected a list of values" if name not in SIZES else "expected a list or a range", key=key)
+    kinds: dict[str, Any] = {"material": Material, "robot": Robot}
+    for value in values:
+        if name in kinds:
+            right = isinstance(value, kinds[name])
+        elif name in COUNTS:
+            right = isinstance(value, Integral) and not isinstance(value, bool) and int(value) >= 1
+        else:
+            right = is_number(value) and isfinite(value) and value > 0
+        if not right:
+            expected = (
+                kinds[name].__name__ if name in kinds else "whole number" if name in COUNTS else "positive number"
+            )
+            raise InputError(f"expected each value to be a {expected}, got {value!r}", key=key)
+
+
+def _check_range(values: Range, key: str) -> None:
+    if not 0 <= values.lower < values.upper < inf:
+        raise InputError(f"expected 0 <= from < to, got {values.lower:g} to {values.upper:g}", key=key)
+
+
+def _check_pressure(pressure: Any) -> None:
+    if isinstance(pressure, Range):
+        _check_range(pressure, "pressure")
+    elif isinstance(pressure, PressureSteps):
+        if not 0 < pressure.step <= pressure.highest < inf:
+            raise InputError("expected 0 < step <= highest", key="pressure")
+    elif not (is_number(pressure) and 0 < pressure < inf):
+        raise InputError(f"expected a pressure above 0, a range or steps, got {pressure!r}", key="pressure")
