@@ -110,7 +110,7 @@ def test_constants_come_back_from_poses_of_two_robots(free: tuple[str, ...]) -> 
 
 
 def test_constants_come_back_from_loaded_poses() -> None:
-    numerics = Numerics(intervals=10)
+    numerics = Numerics(intervals=40)
     data = forward_poses(robot("D15L60"), POSES[1:6:2], TRUE, loads=LOADED, numerics=numerics)
     found = identify(
         data,

@@ -52,7 +52,7 @@ def identify(scenario: Path, /, *, out: Path | None = None, json: bool = False) 
 
 def run_study(asked: Scenario, out: Path | None, json: bool) -> int:
     """Identify what a scenario asks for, print it and write the results; return the exit status."""
-    from softnlp.cli.run import require_writable
+    from softnlp.cli.folder import require_writable
     from softnlp.studies.identify_task import TensileTask
 
     folder = out if out is not None or json else Path("results") / asked.path.stem
