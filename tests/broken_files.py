@@ -106,7 +106,7 @@ TABLES = [
         Broken(
             f"study {name} of a later version", scenario(top=f"study = '{name}'\n"), ("study", name, "blocked-force")
         )
-        for name in ("workspace", "inverse", "identify", "design")
+        for name in ("workspace", "identify", "design")
     ),
     Broken("no robot", scenario(robot=""), ("[robot]", "missing")),
     Broken("no material", scenario(material=""), ("[material]", "missing")),
