@@ -146,23 +146,18 @@ def test_the_nonlinear_program_agrees(loads: Loads, asked: dict[str, object]) ->
 
 
 def test_a_direction_takes_the_smallest_pressures() -> None:
-    """With one pressure held at other values the others give the direction too, and more of them."""
+    """With one pressure held elsewhere the others give the direction too, and all are larger."""
     towards = [-1.0, 0.3, 0.5]
     best = inverse(D25, SILICONE, directions=towards, loads=LOADED, numerics=GRID).steps[0]
     assert best.status is Status.SOLVED
     assert best.aimed is not None
     assert best.aimed.angle == pytest.approx(0, abs=1e-7)
-    sizes = []
-    for k, held in ((1, 0.1), (0, best.pressure[0] / BAR + 0.03)):
-        lower, upper = np.zeros(3), np.full(3, HIGHEST)
-        lower[k] = upper[k] = held * BAR
-        step = inverse(
-            D25, SILICONE, directions=towards, bounds=(lower, upper), loads=LOADED, numerics=GRID
-        ).steps[0]  # fmt: skip
-        assert step.status is Status.SOLVED
-        assert step.pressure[k] == held * BAR
-        sizes.append(np.linalg.norm(step.pressure))
-    assert np.linalg.norm(best.pressure) < min(sizes)
+    lower, upper = np.zeros(3), np.full(3, HIGHEST)
+    lower[1] = upper[1] = 0.1 * BAR
+    held = inverse(D25, SILICONE, directions=towards, bounds=(lower, upper), loads=LOADED, numerics=GRID).steps[0]
+    assert held.status is Status.SOLVED
+    assert held.pressure[1] == 0.1 * BAR
+    assert np.linalg.norm(best.pressure) < np.linalg.norm(held.pressure)
 
 
 def test_four_sets_leave_a_choice_that_is_made_smallest() -> None:

@@ -48,7 +48,7 @@ def _tip_panel(figure: Figure, report: SensitivityReport) -> None:
 
     pose = report.pose
     assert pose is not None
-    axes: Any = figure.add_axes((0.0, 0.0, 0.52, 0.8), projection="3d", computed_zorder=False)
+    axes: Any = figure.add_axes((0.0, 0.12, 0.52, 0.7), projection="3d", computed_zorder=False)
     axes.patch.set_visible(False)
     azimuth = side_azimuth(pose.tip_position[:2], 0.02 * report.robot.length)
     axes.view_init(elev=ELEVATION, azim=azimuth)
