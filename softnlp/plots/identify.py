@@ -23,7 +23,7 @@ _LABELS = {
     "elongation": "elongation [mm]",
     "blocked_force": "blocked force [N]",
 }
-_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")  # one more than colours, so that pairs repeat late
 
 
 def tensile_figure(fit: TensileFit, name: str, before: Any = None) -> Figure:
@@ -68,6 +68,8 @@ def identified_figure(found: Identified, title: str) -> Figure:
     constants = ", ".join(f"{n} = {v:.4g}" for n, v in zip(found.free.names, found.constants, strict=True))
     figure = new_figure(max(width, 6.5), 5.0, title, constants)
     step = 1.0 / len(shown)
+    robots = [sum(bool(np.any(np.isfinite(d.of(key)))) for d in found.data) for key in shown]
+    named = int(np.argmax(robots))
     for k, key in enumerate(shown):
         axes = figure.add_axes((step * k + 0.16 * step, 0.12, 0.78 * step, 0.71))
         unit = UNITS[key][1]
@@ -90,6 +92,6 @@ def identified_figure(found: Identified, title: str) -> Figure:
         axes.set_title(
             f"rmse {before.rmse / unit:.3g} before (grey), {after.rmse / unit:.3g} after", size=TEXT, color=INK
         )
-        if k == 0:
+        if k == named:
             axes.legend(fontsize=SMALL, frameon=False, labelcolor=INK)
     return figure
