@@ -9,7 +9,8 @@ penalties, around the forward solve, begun again from its best design until it i
 solved 400 designs: "as run" calls `softnlp.forward` or `softnlp.blocked_force` for each design, as a
 script would; "kept" keeps one solver with everything compiled. Seconds of processor time, in one run.
 
-"random": 2,000 random designs that meet every requirement, judged by the same forward solve, against the optimum.
+"random": 2,000 random designs that meet every requirement, judged by the same forward solve, against the optimum. The
+force asked for is lowered to 0.2 N there: a random design hardly ever pushes with 1 N. The optimum is the same.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import minimize
 
-from softnlp import DesignTask, Numerics, design, forward, load_scenario
+from softnlp import DesignTask, Numerics, at_least, design, forward, load_scenario
 from softnlp.quantities import Model
 from softnlp.robot import Robot
 from softnlp.scenario import Scenario
@@ -35,6 +36,7 @@ from softnlp.studies.design_task import OUTPUTS, Setting
 FILE = Path(__file__).parents[1] / "scenarios" / "design" / "D25L60_dimensions.toml"
 PENALTY = 20.0  # objective units for missing a requirement by all of its limit, or a wall by a millimetre
 RANDOM = 2000
+RANDOM_FORCE = 0.2  # [N]
 MOST_EVALUATIONS = 400
 REACHED = 1e-3
 
@@ -52,7 +54,8 @@ def main() -> None:
         compare("without a force", scenario, replace(task, requirements=angle))
         compare("with a force", scenario, task)
     if "random" in asked:
-        compare_random(scenario, task)
+        lowered = {**task.requirements, "blocked_force": at_least(RANDOM_FORCE)}
+        compare_random(scenario, replace(task, requirements=lowered))
 
 
 def compare(title: str, scenario: Scenario, task: DesignTask) -> None:

@@ -82,7 +82,7 @@ def test_the_optimum_agrees_with_dense_enumeration(names: tuple[str, ...]) -> No
     best = design(D25, SOFT, task).best
     assert best is not None
     evaluator = evaluator_of(task, Model(D25, SOFT))
-    points = 21 if len(names) == 2 else 101
+    points = 16 if len(names) == 2 else 61
     axes = [np.linspace(task.ranges[name].lower, task.ranges[name].upper, points) for name in names]
     met = []
     for values in np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(names)):
@@ -117,7 +117,7 @@ def test_a_multiplier_is_what_loosening_its_limit_gains() -> None:
                 assert again is not None
                 gained.append(again.objective)
             assert rate == pytest.approx((gained[0] - gained[1]) / (2 * h), rel=1e-2)
-    assert set(rates) & set(STRETCHED)
+    assert set(STRETCHED) & set(rates)
 
 
 @cache
@@ -127,7 +127,8 @@ def forced() -> tuple[DesignTask, Optimiser]:
         "chamber_diameter": Range(3.0 * MILLIMETRE, 5.5 * MILLIMETRE),
         "lumen_diameter": Range(6.0 * MILLIMETRE, 11.0 * MILLIMETRE),
     }
-    task = DesignTask(choices, Range(0.0, 1.0 * BAR), requirements={"stretch": at_most(1.1)}, maximise="blocked_force")
+    task = DesignTask(choices, Range(0.0, 1.0 * BAR), requirements={"stretch": at_most(1.1)}, maximise="blocked_force",
+                      starts=2)  # fmt: skip
     return task, Optimiser(evaluator_of(task, Model(D25, SOFT)))
 
 
@@ -163,13 +164,13 @@ def test_the_largest_force_is_on_the_branch_and_cannot_be_beaten_nearby() -> Non
     found = optimiser.best(Model(D25, SOFT), task.pressure)  # type: ignore[arg-type]
     assert not found.reasons
     assert found.found is not None
-    assert found.agreeing == found.starts == 4
+    assert found.agreeing == found.starts == 2
     best = found.found.outputs["blocked_force"]
     assert found.found.step is not None
     assert found.found.step.residual <= 1e-8
     rng = np.random.default_rng(5)
     feasible = 0
-    for _ in range(12):
+    for _ in range(8):
         changed = {
             name: float(np.clip(found.found.outputs[name] * rng.uniform(0.94, 1.03), r.lower, r.upper))
             for name, r in task.ranges.items()
@@ -180,25 +181,9 @@ def test_the_largest_force_is_on_the_branch_and_cannot_be_beaten_nearby() -> Non
             if not unmet(near, task):
                 feasible += 1
                 assert near.outputs["blocked_force"] < best * (1 + 1e-5)
-    assert feasible > 2
+    assert feasible > 1
     names = {active.name for active in found.active}
     assert "stretch" in names
-
-
-def test_a_force_that_ends_in_a_fold_stays_on_its_branch() -> None:
-    """With the pressure free the program would go on behind the fold; along the branch the force rises up to it."""
-    task = DesignTask({}, Range(0.0, 3.0 * BAR), maximise="blocked_force", starts=1)
-    laparoscope = robot("laparoscope-6")
-    best = design(laparoscope, material("Ecoflex 00-30"), task, numerics=Numerics(accuracy=1e-4)).best
-    assert best is not None
-    assert [active.name for active in best.active] == ["fold of the blocked shape"]
-    solver = BlockedSolver(Model(laparoscope, material("Ecoflex 00-30")), Numerics(), ContactSettings())
-    P = best.outputs["pressure"] * np.array([1.0, 0.0, 0.0])
-    wall = standing_wall(solver.poses, solver.contact, P[None, :], Loads())
-    forces = [solver.solve(part * P, Loads(), wall)[0].contact for part in (0.8, 0.95)]
-    assert 0 < forces[0].force < forces[1].force < best.objective  # type: ignore[union-attr]
-    beyond = solver.solve(1.05 * P, Loads(), wall)[0]
-    assert beyond.contact is None or beyond.contact.force < best.objective
 
 
 def test_a_solver_takes_another_model_without_compiling() -> None:
@@ -307,10 +292,11 @@ def test_loads_are_part_of_the_program() -> None:
 
 
 def test_processes_find_what_one_finds() -> None:
-    task = DesignTask({"chambers_per_set": [1, 2], "material": [SOFT, material("Dragon Skin 10")]}, 1.0 * BAR,
-                      requirements={"stretch": at_most(1.2)}, maximise="bending_angle")  # fmt: skip
+    silicones = [SOFT, material("Dragon Skin 10"), material("Ecoflex 00-30")]
+    task = DesignTask({"material": silicones}, 1.0 * BAR, requirements={"stretch": at_most(1.2)},
+                      maximise="bending_angle")  # fmt: skip
     one, two = (design(D25, SOFT, task, workers=workers) for workers in (1, 2))
-    assert [c.number for c in two.candidates] == [1, 2, 3, 4]
+    assert [c.number for c in two.candidates] == [1, 2, 3]
     assert [c.objective for c in one.candidates] == [c.objective for c in two.candidates]
     assert [c.material.name for c in one.candidates] == [c.material.name for c in two.candidates]
 
@@ -425,13 +411,25 @@ def test_a_free_pressure_pushes_harder_than_the_lowest(tmp_path: Path) -> None:
     assert best.objective > 2 * lowest.objective
     assert best.objective > paper().best.objective  # type: ignore[union-attr]
     assert best.outputs["stretch"] <= 1.5
+    # The program would go on behind the fold of the blocked shape; along the branch the force rises up to there.
+    assert [active.name for active in best.active] == ["fold of the blocked shape"]
+    solver = BlockedSolver(Model(best.robot, best.material), Numerics(accuracy=1e-4), ContactSettings())
+    P = best.outputs["pressure"] * np.array([1.0, 0.0, 0.0])
+    wall = standing_wall(solver.poses, solver.contact, P[None, :], Loads())
+    below = solver.solve(0.95 * P, Loads(), wall)[0].contact
+    beyond = solver.solve(1.05 * P, Loads(), wall)[0].contact
+    assert below is not None
+    assert 0 < below.force < best.objective
+    assert beyond is None or beyond.force < best.objective
 
 
 def test_the_command_leaves_results_and_a_scenario_of_the_best(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with chdir(tmp_path):
-        assert main(["design", str(FOLDER / "D25L60_dimensions.toml")]) == 0
+        asked = Path("D25L60_dimensions.toml")
+        asked.write_text((FOLDER / asked).read_text() + "starts = 1\n")
+        assert main(["design", str(asked)]) == 0
         folder = Path("results") / "D25L60_dimensions"
         names = {"best.toml", "design.json", "figure.png", "scenario.toml", "table.csv", "versions.json"}
         assert {path.name for path in folder.iterdir()} == names
