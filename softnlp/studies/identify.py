@@ -94,32 +94,36 @@ def identify(
     loads, contact = checked_loads(loads), checked_contact(contact)
     if contact.closure == "weighted" and any(np.any(d.measured[:, -1]) for d in data):
         raise InputError("expected a closure that has a definite force; 'weighted' depends on weights", key="closure")
-    kinds: dict[tuple[int, int], TrialBlocked] = {}
+    poses: dict[tuple[int, int], TrialPoses] = {}
+    forces: dict[tuple[int, int], TrialBlocked] = {}
     models = []
     for d in data:
         kind = (d.robot.chamber_sets, d.robot.chambers_per_set)
-        if kind not in kinds:
-            model = Model(d.robot, material, coefficients, conventions)
-            kinds[kind] = TrialBlocked(TrialPoses(model, numerics), contact)
-        models.append(_Predicted(d, kinds[kind].of(d.robot), chosen, loads))
+        if kind not in poses:
+            poses[kind] = TrialPoses(Model(d.robot, material, coefficients, conventions), numerics)
+        if kind not in forces and np.any(d.measured[:, -1]):
+            forces[kind] = TrialBlocked(poses[kind], contact)
+        models.append(_Predicted(d, poses[kind].of(d.robot), forces.get(kind), chosen, loads))
     return _Fit(data, models, chosen, material, coefficients, progress).solve()
 
 
 class _Predicted:
     """Everything measured of one robot, as the model predicts it."""
 
-    def __init__(self, data: Data, solver: TrialBlocked, free: FreeConstants, loads: Loads) -> None:
+    def __init__(
+        self, data: Data, poses: TrialPoses, blocked: TrialBlocked | None, free: FreeConstants, loads: Loads
+    ) -> None:
         self._data = data
         unloaded = not np.any([loads.tip_force, loads.tip_moment, loads.gravity])
         self._poses: FreePoses = (
-            ArcPoses(solver.poses, data.pressure, free.quantities)
+            ArcPoses(poses, data.pressure, free.quantities)
             if unloaded
-            else LoadedPoses(solver.poses, data.pressure, loads, free.quantities)
+            else LoadedPoses(poses, data.pressure, loads, free.quantities)
         )
         self._rows = np.flatnonzero(data.measured[:, -1])
         self._forces: BlockedForces | None = None
-        if self._rows.size:
-            self._forces = BlockedForces(solver, data.pressure[self._rows], loads, free.quantities)
+        if self._rows.size and blocked is not None:
+            self._forces = BlockedForces(blocked.of(data.robot), data.pressure[self._rows], loads, free.quantities)
 
     def evaluate(self, constants: Mapping[str, float], anew: bool) -> Prediction:
         """Return the values in the order of `COLUMNS`, and their derivatives."""
