@@ -199,7 +199,8 @@ class InverseSolver:
             if isinstance(judged, Step) or solved is None:
                 return best or judged
             settled = isinstance(best, Reached) and judged.cost >= best.cost * (1 - 1e-9)
-            if not isinstance(best, Reached) or judged.cost < best.cost:
+            # A later one is of the pose's own grid; among answers as near it has the smaller pressures.
+            if not isinstance(best, Reached) or judged.cost <= best.cost * (1 + 1e-6) + exact:
                 best = judged
             found_already = isinstance(self._coarse, ArcMap) and judged.cost <= aim_cost(found) + exact
             if settled or (found_already and self._method == "newton"):
