@@ -82,6 +82,7 @@ class InverseSolver:
         self._maps: dict[int, GridMap] = {}
         self._nlps: dict[tuple[int, bool, bool, bool], InverseProblem] = {}
         self._table: Table | None = None
+        self._arcs: Table | None = None
         self._intervals: int | None = None
         loaded = bool(np.any([loads.tip_force, loads.tip_moment, loads.gravity]))
         self._coarse: TipMap = ArcMap(self.poses)
@@ -122,8 +123,8 @@ class InverseSolver:
         return step, best
 
     def forget_table(self) -> None:
-        """Drop the table of starts, for timing what it costs."""
-        self._table = None
+        """Drop the tables of starts, for timing what they cost."""
+        self._table = self._arcs = None
 
     def _candidates(self, aim: Aim, near: Reached | None) -> Iterator[Found]:
         """Yield where coarse searches end, best first; the first that meets the target at once if no choice is left.
@@ -151,8 +152,14 @@ class InverseSolver:
             point = point or self._coarse.at(near.pressure, None)
             if point is not None:
                 yield point
+        loaded = isinstance(self._coarse, GridMap)
+        if loaded:  # an arc is near enough to begin with, and costs nothing; most targets need no other start
+            if self._arcs is None:
+                self._arcs = tabulated(ArcMap(self.poses), spread(self.limits, _ARCS) * BAR)
+            for k in self._arcs.starts(aim, self.limits, 1):
+                if (point := self._coarse.at(self._arcs.pressures[k], None)) is not None:
+                    yield point
         if self._table is None:
-            loaded = isinstance(self._coarse, GridMap)
             self._table = tabulated(self._coarse, spread(self.limits, _POSES if loaded else _ARCS) * BAR)
         for k in self._table.starts(aim, self.limits, _STARTS):
             point = self._table.points[k]
@@ -193,7 +200,7 @@ class InverseSolver:
             refined = self._refined(aim, found, self._intervals, self._coarse.solved(found.point.memo))
             pressure = pressure if refined is None else refined
         best: Reached | Step | None = None
-        for _ in range(_ROUNDS):
+        for k in range(_ROUNDS):
             step, solved = self.poses.solve(pressure, self.loads)
             judged = self._judged(aim, pressure, step, solved)
             if isinstance(judged, Step) or solved is None:
@@ -203,13 +210,18 @@ class InverseSolver:
             if not isinstance(best, Reached) or judged.cost <= best.cost * (1 + 1e-6) + exact:
                 best = judged
             found_already = isinstance(self._coarse, ArcMap) and judged.cost <= aim_cost(found) + exact
-            if settled or (found_already and self._method == "newton"):
+            unasked = k == 0 and self._method == "nlp"  # the program has not been solved yet
+            if not unasked and (settled or found_already):
                 break
-            if judged.cost <= exact and (self._intervals == solved.intervals or not self._redundant(aim)):
+            if (
+                not unasked
+                and judged.cost <= exact
+                and (self._intervals == solved.intervals or not self._redundant(aim))
+            ):
                 break
             self._intervals = solved.intervals
             refined = self._refined(aim, found, solved.intervals, solved)
-            if refined is None or float(np.max(np.abs(refined - pressure))) < 1e-9 * BAR:
+            if refined is None or (not unasked and float(np.max(np.abs(refined - pressure))) < 1e-9 * BAR):
                 break
             pressure = refined
         assert best is not None
