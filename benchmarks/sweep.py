@@ -141,24 +141,23 @@ def print_rates() -> None:
 
 
 def print_workers() -> None:
-    """Print what a second worker brings, and a cluster of two."""
-    asked = plan(47)
-    serial, digest, _ = swept(asked, 1)
-    double, same, _ = swept(asked, 2)
-    print(f"  {asked.poses} poses: 1 worker {serial:.2f} s, 2 workers {double:.2f} s: {serial / double:.2f} times")
-    print(f"  identical data: {digest == same}")
-    with suppress(ImportError):
-        from distributed import Client, LocalCluster
+    """Print what a second worker brings, and a cluster of two, for cheap poses and for dearer ones."""
+    print(f"  {'':28s} {'poses':>8s} {'1 worker':>10s} {'2 workers':>10s} {'':7s} {'Dask, 2':>9s}   same data")
+    for what, asked in (("poses", plan(80)), ("blocked forces, compliant", blocked_plan(60_000, "compliant"))):
+        serial, digest, _ = swept(asked, 1)
+        double, same, _ = swept(asked, 2)
+        line = f"  {what:28s} {asked.poses:8d} {serial:8.2f} s {double:8.2f} s {serial / double:5.2f}x "
+        identical = digest == same
+        with suppress(ImportError):
+            from distributed import Client, LocalCluster
 
-        with (
-            LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
-            Client(cluster) as client,
-        ):
-            swept(plan(13), 2, client.get_executor())  # workers import on their first chunk
-            dask, same, _ = swept(asked, 2, client.get_executor())
-        print(
-            f"  Dask, 2 workers of a local cluster {dask:.2f} s: {serial / dask:.2f} times; identical: {digest == same}"
-        )
+            local = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+            with LocalCluster(**local) as cluster, Client(cluster) as client:
+                swept(plan(13), 2, client.get_executor())  # workers import on their first chunk
+                dask, same, _ = swept(asked, 2, client.get_executor())
+            line += f" {dask:6.2f} s {serial / dask:5.2f}x"
+            identical = identical and digest == same
+        print(f"{line}  {'yes' if identical else 'NO'}")
     print()
 
 
