@@ -143,7 +143,7 @@ def print_rates() -> None:
 def print_workers() -> None:
     """Print what a second worker brings, and a cluster of two, for cheap poses and for dearer ones."""
     print(f"  {'':28s} {'poses':>8s} {'1 worker':>10s} {'2 workers':>10s} {'':7s} {'Dask, 2':>9s}   same data")
-    asked = {"poses": plan(80), "blocked forces, compliant": blocked_plan(40_000, "compliant")}
+    asked = {"poses": plan(80), "blocked forces, compliant": blocked_plan(100_000, "compliant")}
     found = {what: (swept(one, 1), swept(one, 2)) for what, one in asked.items()}
     clustered = {}
     with suppress(ImportError):  # last, since its threads would keep the others from forking their workers
