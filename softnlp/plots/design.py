@@ -122,10 +122,11 @@ def _scatter(axes: Axes, done: Design) -> None:
         known = [c for c in members if across.name in c.outputs]
         # Where the objective was not worked out any more the cross stands at the foot.
         y = [c.outputs.get(objective.name, np.nan) / objective.scale for c in known]
+        shown = name if np.all(np.isfinite(y)) else f"{name} (at 0: not worked out)"
         y = [0.0 if not np.isfinite(v) else v for v in y]
         if known:
             x = [c.outputs[across.name] / across.scale for c in known]
-            axes.scatter(x, y, s=size, c=colour, marker=marker, label=name, zorder=3, clip_on=False)
+            axes.scatter(x, y, s=size, c=colour, marker=marker, label=shown, zorder=3, clip_on=False)
     limits = done.task.requirements.get(across.name)
     if limits is not None:
         for value, words in ((limits.lower, "at least"), (limits.upper, "at most")):
