@@ -24,6 +24,7 @@ import sys
 import tempfile
 import time
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from unittest.mock import patch
@@ -141,9 +142,14 @@ def print_rates() -> None:
 
 
 def print_workers() -> None:
-    """Print what a second worker brings, and a cluster of two, for cheap poses and for dearer ones."""
-    print(f"  {'':28s} {'poses':>8s} {'1 worker':>10s} {'2 workers':>10s} {'':7s} {'Dask, 2':>9s}   same data")
-    asked = {"poses": plan(80), "blocked forces, compliant": blocked_plan(100_000, "compliant")}
+    """Print what a second worker brings, and a cluster of two, for poses of 20 microseconds, 200, and 20 milliseconds."""
+    print(f"  {'':30s} {'poses':>8s} {'1 worker':>10s} {'2 workers':>10s} {'':7s} {'Dask, 2':>9s}   same data")
+    one_by_one = replace(plan(10, chunk=20), numerics=Numerics(transcription="collocation"))
+    asked = {
+        "poses": plan(80),
+        "blocked forces, compliant": blocked_plan(40_000, "compliant"),
+        "poses one by one, collocation": one_by_one,
+    }
     found = {what: (swept(one, 1), swept(one, 2)) for what, one in asked.items()}
     clustered = {}
     with suppress(ImportError):  # last, since its threads would keep the others from forking their workers
@@ -154,7 +160,7 @@ def print_workers() -> None:
             swept(plan(13), 2, client.get_executor())  # workers import on their first chunk
             clustered = {what: swept(one, 2, client.get_executor()) for what, one in asked.items()}
     for what, (one, two) in found.items():
-        line = f"  {what:28s} {asked[what].poses:8d} {one[0]:8.2f} s {two[0]:8.2f} s {one[0] / two[0]:5.2f}x "
+        line = f"  {what:30s} {asked[what].poses:8d} {one[0]:8.2f} s {two[0]:8.2f} s {one[0] / two[0]:5.2f}x "
         identical = one[1] == two[1]
         if what in clustered:
             line += f" {clustered[what][0]:6.2f} s {one[0] / clustered[what][0]:5.2f}x"
