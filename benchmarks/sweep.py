@@ -142,7 +142,7 @@ def print_rates() -> None:
 
 
 def print_workers() -> None:
-    """Print what a second worker brings, and a cluster of two, for poses of 20 microseconds, 200, and 20 milliseconds."""
+    """Print what a second worker and a cluster of two bring, for poses of 20 us, of 200 us and of 20 ms."""
     print(f"  {'':30s} {'poses':>8s} {'1 worker':>10s} {'2 workers':>10s} {'':7s} {'Dask, 2':>9s}   same data")
     one_by_one = replace(plan(10, chunk=20), numerics=Numerics(transcription="collocation"))
     asked = {
