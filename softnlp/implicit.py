@@ -13,10 +13,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.condensed import CondensedSolver
 from softnlp.errors import IllPosedError, nearest
 from softnlp.problem import CompiledProblem
 from softnlp.quantities import Quantity
+from softnlp.solver import LinearSolver, ManySidedSolver, SparseSolver
 
 Array = NDArray[np.float64]
 
@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 class ImplicitDerivatives:
     """d x / d theta and d outputs / d theta of a square problem, for chosen fixed quantities; compiled once.
 
-    names : of fixed quantities of the problem; theta stacks their entries, in this order, SI. linear : the condensed
-    solver of a problem that has one; others factorise the sparse Jacobian.
+    names : of fixed quantities of the problem; theta stacks their entries, in this order, SI. linear : what the
+    problem is solved with, where its structure allows better than a sparse factorisation.
 
     Raises
     ------
@@ -34,7 +34,7 @@ class ImplicitDerivatives:
 
     """
 
-    def __init__(self, problem: CompiledProblem, names: Sequence[str], linear: CondensedSolver | None = None) -> None:
+    def __init__(self, problem: CompiledProblem, names: Sequence[str], linear: LinearSolver | None = None) -> None:
         if not problem.is_square:
             raise IllPosedError("a problem with an objective or an inequality is not differentiated; fix what is free")
         start, columns = {}, 0
@@ -47,7 +47,7 @@ class ImplicitDerivatives:
                 raise IllPosedError(f"'{name}' is not a fixed quantity of this problem{nearest(name, by_name)}")
         self.problem = problem
         self.quantities: tuple[Quantity, ...] = tuple(by_name[name] for name in dict.fromkeys(names))
-        self._linear = linear
+        self._linear = linear if isinstance(linear, ManySidedSolver) else SparseSolver(problem)
         chosen = [start[q.name] + k for q in self.quantities for k in range(q.size)]
         self.columns = np.array(chosen, dtype=int)
         x, p, g = (problem.nlp[name] for name in "xpg")
@@ -79,18 +79,7 @@ class ImplicitDerivatives:
 
     def _solved(self, x: Array, p: Array, G: Array) -> Array:
         """Return -J^-1 G."""
-        if not G.size:
-            return G
-        if self._linear is not None:
-            return self._linear.solve_many(x, p, G)
-        from scipy.sparse.linalg import splu
-
-        try:
-            factors = splu(self.problem.jacobian(x, p).sparse().tocsc())
-        except RuntimeError as error:
-            raise np.linalg.LinAlgError(str(error)) from None
-        solved: Array = factors.solve(-G)
-        return solved
+        return self._linear.solve_many(x, p, G) if G.size else G
 
     def outputs(self, x: Array, p: Array, moves: Array | None = None) -> dict[str, Array]:
         """Return d output / d theta (size, k) by the name of the output; matrices column by column.

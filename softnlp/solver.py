@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import casadi as ca
 import numpy as np
@@ -62,6 +62,15 @@ class LinearSolver(Protocol):
         ...
 
 
+@runtime_checkable
+class ManySidedSolver(Protocol):
+    """A linear solver that takes many right sides for the cost of one factorisation or sweep."""
+
+    def solve_many(self, x: Array, p: Array, G: Array) -> Array:
+        """Return the columns dx for as many right sides G (n, r). Raises as `LinearSolver.solve`."""
+        ...
+
+
 class SparseSolver:
     """Solves J dx = -g of any square problem by sparse LU factorisation."""
 
@@ -70,6 +79,10 @@ class SparseSolver:
 
     def solve(self, x: Array, p: Array, g: Array) -> Array:
         """Return dx. Raises `numpy.linalg.LinAlgError` where J is singular or not finite."""
+        return self.solve_many(x, p, g)
+
+    def solve_many(self, x: Array, p: Array, G: Array) -> Array:
+        """Return the columns dx for as many right sides G (n, r), of one factorisation. Raises as `solve`."""
         from scipy.sparse import csc_matrix
         from scipy.sparse.linalg import splu
 
@@ -81,7 +94,7 @@ class SparseSolver:
             factors = splu(csc_matrix((entries, J.row(), J.colind()), shape=J.shape))
         except RuntimeError as error:
             raise np.linalg.LinAlgError(str(error)) from error
-        return np.asarray(factors.solve(-np.asarray(g, dtype=float)))
+        return np.asarray(factors.solve(-np.asarray(G, dtype=float)))
 
 
 class Engine:

@@ -33,14 +33,12 @@ class ReducedRod:
     point. check : [p, R, m, gap, chamber lengths (N), bending angle, backbone length]; gap is the largest so far of the
     full equations between two nodes.
     ends : [state, data] -> [the state p, R, n, m at the tip (18), its six residuals].
-    data_size : entries of data.
     """
 
     value: ca.Function
     directions: ca.Function
     check: ca.Function
     ends: ca.Function
-    data_size: int
 
 
 def reduced_rod(functions: RodFunctions) -> ReducedRod:
@@ -81,7 +79,6 @@ def reduced_rod(functions: RodFunctions) -> ReducedRod:
             [ca.vertcat(full(state, 1), rod.tip_balance(full(state, 1), section, force, moment))],
             {"cse": True},
         ),
-        data_size=nc + 6,
     )
 
 

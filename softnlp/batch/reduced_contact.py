@@ -29,14 +29,13 @@ class ReducedContact:
     bending angle, backbone length]; gap is the largest so far of the full equations between two nodes.
     tip : [state, derivatives, data, tip force, tip moment, y, a, units] -> [residual (6 + ny), its derivatives by N_0,
     m(0) and y, column by column]; a is what the conditions take (`softnlp.loadcase.RodFunctions`).
-    ends : [state, data] -> the full state [p, R, n, m] at the tip. arc : [quantities, stretch] -> the unloaded state.
+    arc : [quantities, stretch] -> the unloaded state.
     """
 
     value: ca.Function
     directions: ca.Function
     check: ca.Function
     tip: ca.Function
-    ends: ca.Function
     arc: ca.Function
 
 
@@ -102,6 +101,5 @@ def reduced_contact(functions: RodFunctions) -> ReducedContact:
             [ca.densify(every)],
             options,
         ),
-        ends=ca.Function("contact_ends", [ca.vertcat(state, data)], [at_tip[: rod.STATE_SIZE]], options),
         arc=ca.Function("arc", [ca.vertcat(column, stretch)], [ca.densify(arc)], options),
     )

@@ -33,7 +33,7 @@ from softnlp.transcription import MultipleShooting, method_named
 
 Array = NDArray[np.float64]
 
-_TOUCHING = 1e-9  # of the length: a free contact point nearer to the wall than this touches it
+TOUCHING = 1e-9  # of the length: a free contact point nearer to the wall than this touches it
 _NEAR_FOLD = 0.2  # of the largest in-plane determinant on the way: below it a branch that ends has turned
 _LARGEST_JUMP = 0.3
 
@@ -134,7 +134,7 @@ class BlockedSolver:
         free = free_shape(self.poses, situation.pressure, free_loads, self.contact.tip_cap, near.free if near else None)
         if isinstance(free, Step):
             return replace(free, solve_time=time.perf_counter() - began), None
-        touch = _TOUCHING + 3 * free.error if situation.is_loaded else _TOUCHING
+        touch = TOUCHING + 3 * free.error if situation.is_loaded else TOUCHING
         if wall is not None:
             ahead = wall.gap(free.contact_point)
             if ahead > -touch * float(self.model.robot.length):
@@ -288,7 +288,7 @@ class BlockedSolver:
             on_grid = solved is not None and solved.intervals == intervals
             shapes.begin(near.free.stretch, solved.solution.x if solved is not None and on_grid else None)
         else:
-            begin, t_0 = from_zero(end, shapes, _TOUCHING * float(self.model.robot.length))
+            begin, t_0 = from_zero(end, shapes, TOUCHING * float(self.model.robot.length))
 
         def free_situation(situation: Situation) -> Situation:
             return Situation(situation.pressure, Loads(), None) if unloaded else situation

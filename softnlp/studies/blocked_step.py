@@ -22,7 +22,7 @@ from softnlp.units import BAR
 
 Array = NDArray[np.float64]
 
-_PULL = 1e-6  # of EI / L_0^2: what rounding and the grid leave of no force; below minus this the wall would pull
+PULL = 1e-6  # of EI / L_0^2: what rounding and the grid leave of no force; below minus this the wall would pull
 
 
 def touching_step(free: Step, contact: ContactSettings, wall: Wall, gap: float, touch: float) -> Step:
@@ -76,7 +76,7 @@ def solved_step(
     problem, situation = grid.problem, found.situation
     L_0, F_0 = (float(v) for v in np.asarray(problem.units(solution.x, solution.p)).ravel())
     y = grid.tip_forces(solution.x)
-    if situation.wall is not None and y[0] < -_PULL - 10 * found.refinement_error:
+    if situation.wall is not None and y[0] < -PULL - 10 * found.refinement_error:
         message = (
             f"{Status.DIVERGED.advice}; on the branch followed the wall would have to pull with {-y[0] * F_0:.3g} N"
         )

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.condensed import CondensedSolver
 from softnlp.errors import InputError, nearest
 from softnlp.implicit import ImplicitDerivatives
 from softnlp.problem import CompiledProblem, compile_problem
@@ -193,10 +192,7 @@ class PoseDerivatives:
         key = (intervals, names)
         if key not in self._compiled:
             grid = self.poses.grid(intervals)
-            linear = grid.engine.linear
-            self._compiled[key] = ImplicitDerivatives(
-                grid.problem, names, linear if isinstance(linear, CondensedSolver) else None
-            )
+            self._compiled[key] = ImplicitDerivatives(grid.problem, names, grid.engine.linear)
         return self._compiled[key]
 
     def at(self, solved: Solved, names: Sequence[str]) -> LinearPoint:

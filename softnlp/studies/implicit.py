@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.problem import CompiledProblem
-from softnlp.solver import LinearSolver
+from softnlp.solver import LinearSolver, ManySidedSolver, SparseSolver
 
 Array = NDArray[np.float64]
 
@@ -21,8 +21,7 @@ class SolutionDerivatives:
     """
 
     def __init__(self, problem: CompiledProblem, linear: LinearSolver | None, observed: ca.MX, directions: int) -> None:
-        self._problem = problem
-        self._linear = linear
+        self._linear = linear if isinstance(linear, ManySidedSolver) else SparseSolver(problem)
         x, p, g = (problem.nlp[name] for name in "xpg")
         dx, dp = ca.MX.sym("dx", x.numel(), directions), ca.MX.sym("dp", p.numel(), directions)
         moved = ca.jtimes(observed, x, dx) + ca.jtimes(observed, p, dp)
@@ -31,11 +30,7 @@ class SolutionDerivatives:
 
     def __call__(self, x: Array, p: Array, dp: Array) -> tuple[Array, Array]:
         """Return the observed values (m,) at a solution and their derivatives (m, directions)."""
-        right = np.asarray(self._equations(x, p, dp))
-        if self._linear is not None:
-            dx = np.column_stack([self._linear.solve(x, p, column) for column in right.T])
-        else:
-            dx = np.asarray(ca.solve(self._problem.jacobian(x, p), ca.DM(-right), "qr"))
+        dx = self._linear.solve_many(x, p, np.asarray(self._equations(x, p, dp)))
         values, slopes = self._observed(x, p, dx, dp)
         return np.asarray(values).ravel(), np.asarray(slopes)
 

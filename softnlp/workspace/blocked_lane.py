@@ -16,6 +16,8 @@ from softnlp.batch.shooting import shooting
 from softnlp.contact_settings import ContactSettings
 from softnlp.loadcase import rod_functions
 from softnlp.rod import Loads
+from softnlp.studies.blocked import TOUCHING
+from softnlp.studies.blocked_step import PULL
 from softnlp.studies.statics import PoseSolver
 from softnlp.studies.wall import Wall, standing_wall
 from softnlp.tip import tip_conditions
@@ -27,9 +29,6 @@ Mask = NDArray[np.bool_]
 
 CLOSURES = ("free", "compliant", "rigid")
 """Closures that are solved together; `weighted` is a minimum, not a root."""
-
-_TOUCHING = 1e-9  # of the length: a free contact point nearer to the wall than this touches it
-_PULL = 1e-6  # of EI / L_0^2: what rounding leaves of no force
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +65,7 @@ class BlockedLane:
                 "contact_directions": reduced.directions,
                 "contact_check": reduced.check,
             },
-            {"contact_tip": reduced.tip, "contact_ends": reduced.ends, "arc": reduced.arc},
+            {"contact_tip": reduced.tip, "arc": reduced.arc},
         )
         self._kernels = shooting(kernels, build=plan.poses >= WORTH_COMPILING)
         self._flat = ContactBatch(functions, self._kernels, wall.plane)
@@ -84,7 +83,7 @@ class BlockedLane:
 
     def touching(self, poses: Poses) -> Array:
         """Return below which distance a free contact point touches the wall [m]."""
-        return (_TOUCHING + 3 * poses.shot.error) * poses.sections.length_unit
+        return (TOUCHING + 3 * poses.shot.error) * poses.sections.length_unit
 
     def solve(self, columns: Array, features: Array, free: Poses) -> BlockedPoses | None:
         """Solve the poses of `free`, whose free shapes are beyond the wall; None where none is solved.
@@ -133,7 +132,7 @@ class BlockedLane:
             y = shot.unknowns[6]
             accurate = shot.worst_error <= self._plan.numerics.accuracy
             good = held & accurate & (residual <= self._plan.numerics.tolerance)
-            good &= y >= -(_PULL + 10 * shot.worst_error)
+            good &= y >= -(PULL + 10 * shot.worst_error)
             kept = np.flatnonzero(good)
             force = np.maximum(y * sections.force_unit, 0.0)[kept]
             parts.append((chosen[kept], some(sections, kept), some(shot, kept), residual[kept], force))
