@@ -23,7 +23,6 @@ from softnlp.workspace.pose_lane import PoseLane, Poses
 from softnlp.workspace.poses import STATUSES, Block, Lane, Rows, unsolved_rows
 
 Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 
 class ChunkSolver:
@@ -108,39 +107,36 @@ def some_poses(poses: Poses, mask: NDArray[np.bool_]) -> Poses:
 
 def _fill_free(rows: Rows, poses: Poses) -> None:
     """Put solved poses without a wall into their rows."""
-    shot, where = poses.shot, poses.numbers
-    lengths, angle, backbone = shot.integrals[:-2], shot.integrals[-2], shot.integrals[-1]
-    _fill_together(rows, where, shot.tip, lengths, poses.sections.length_unit)
-    rows["bending_angle"][where] = angle
-    rows["backbone_length"][where] = backbone * poses.sections.length_unit
-    rows["stretch"][where] = poses.sections.stretch
-    for name, values in (("intervals", shot.intervals), ("iterations", shot.iterations), ("error", shot.error)):
-        rows[name][where] = values
-    rows["residual"][where] = poses.residual
+    lengths, angle, backbone = poses.shot.integrals[:-2], poses.shot.integrals[-2], poses.shot.integrals[-1]
+    _fill_together(rows, poses, poses.shot.tip, lengths, angle, backbone)
 
 
 def _fill_blocked(rows: Rows, poses: BlockedPoses, gap: Array) -> None:
     """Put solved blocked poses into their rows."""
-    shot, where = poses.shot, poses.numbers
-    _fill_together(rows, where, shot.state, shot.state[STATE:], poses.sections.length_unit)
-    rows["bending_angle"][where] = shot.integrals[0]
-    rows["backbone_length"][where] = shot.integrals[1] * poses.sections.length_unit
-    rows["stretch"][where] = poses.sections.stretch
-    for name, values in (("intervals", shot.intervals), ("iterations", shot.iterations), ("error", shot.error)):
-        rows[name][where] = values
-    rows["residual"][where] = poses.residual
-    rows["blocked_force"][where] = poses.force
-    rows["gap"][where] = gap
+    angle, backbone = poses.shot.integrals
+    _fill_together(rows, poses, poses.shot.state, poses.shot.state[STATE:], angle, backbone)
+    rows["blocked_force"][poses.numbers] = poses.force
+    rows["gap"][poses.numbers] = gap
 
 
-def _fill_together(rows: Rows, where: Index, tip: Array, lengths: Array, L_0: Array) -> None:
-    """Put what poses with and without a wall share into their rows; both are stable for certain."""
+def _fill_together(
+    rows: Rows, poses: Poses | BlockedPoses, tip: Array, lengths: Array, angle: Array, backbone: Array
+) -> None:
+    """Put what poses with and without a wall share into their rows; both are stable for certain. tip : [p, R, ...]."""
+    where, shot, L_0 = poses.numbers, poses.shot, poses.sections.length_unit
     rows["status"][where] = STATUSES.index(Status.SOLVED)
     rows["lane"][where] = Lane.BATCH
     rows["stable"][where] = 1
+    rows["intervals"][where] = shot.intervals
+    rows["iterations"][where] = shot.iterations
+    rows["stretch"][where] = poses.sections.stretch
     rows["tip_position"][where] = (tip[POSITION] * L_0).T
     rows["tip_rotation"][where] = tip[ROTATION].T.reshape(-1, 3, 3).transpose(0, 2, 1)
+    rows["bending_angle"][where] = angle
+    rows["backbone_length"][where] = backbone * L_0
     rows["chamber_length"][where] = (lengths * L_0).T
+    rows["residual"][where] = poses.residual
+    rows["error"][where] = shot.error
 
 
 def _fill(rows: Rows, k: int, step: Step) -> None:
