@@ -27,7 +27,7 @@ class Session:
     """The state of one tab. Controls call `change`, `set_pressure`, `open`; panels listen and draw what is there.
 
     document : what is on the screen, also where it does not make sense yet. scenario : what the last text that did
-    says, SI. problem : why the text does not, or None; it names table and key. pressure : (sets,) of the pose shown [Pa].
+    says, SI. problem : why the text does not, or None; it names table and key. pressure : (sets,) shown [Pa].
     follows_file : whether a saved file has the pressures of the opened one, or else the pose shown as its only step.
     """
 
