@@ -46,9 +46,7 @@ STUDIES: Mapping[str, Study] = {
 _TAB_OF = {study.study: name for name, study in STUDIES.items()}
 SCENARIO = "scenario"
 _LINE = "border-neutral-300 dark:border-neutral-700"
-_HEADER = (
-    f"h-12 px-3 items-center no-wrap gap-2 bg-white text-black dark:bg-neutral-900 dark:text-white border-b {_LINE}"
-)
+_HEADER = f"h-12 px-3 py-0 items-center no-wrap gap-2 bg-white text-black dark:bg-neutral-900 dark:text-white border-b {_LINE}"
 _MESSAGE = "absolute bottom-2 left-2 right-2 text-sm rounded px-3 py-2 bg-orange-100 text-orange-950"
 _NOT_USED = "Not used:"
 
@@ -62,10 +60,11 @@ def build_page(session: Session) -> None:
     chosen = _TAB_OF.get(session.document.study, SCENARIO)
     with ui.header(elevated=False).classes(_HEADER):
         ui.label("softnlp").classes("text-lg font-semibold mr-2")
-        with ui.tabs(value=chosen).props("dense no-caps inline-label shrink").classes("min-w-0") as tabs:
+        with ui.tabs().props("dense no-caps inline-label shrink").classes("min-w-0") as tabs:
             for name, study in STUDIES.items():
                 ui.tab(name, label=study.label).props(f"data-testid=tab-{name}")
             ui.tab(SCENARIO, label="Scenario").props("data-testid=tab-scenario")
+        tabs.set_value(chosen)
         ui.space()
         exports = _files(session, dark)
     with ui.row().classes("w-full no-wrap gap-0").style("height: calc(100vh - 48px)"):

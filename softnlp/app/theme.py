@@ -6,7 +6,7 @@ from typing import Any
 
 
 def figure_layout(dark: bool) -> dict[str, Any]:
-    """Return the layout that plotly figures start from: no box, a pale grid, texts that the page's background lets read."""
+    """Return the layout that plotly figures start from: no box, a pale grid, texts for the page's background."""
     ink, grid = ("#E6E6E6", "#4A4A4A") if dark else ("#222222", "#DDDDDD")
     axis = {"gridcolor": grid, "zerolinecolor": grid, "linecolor": grid, "automargin": True}
     return {

@@ -30,11 +30,11 @@ def coefficients_panel(session: Session) -> None:
     ).props("data-testid=stiffening-set")
 
     def standard(name: str) -> Callable[[], float | None]:
-        return lambda: float(
-            getattr(
-                COEFFICIENT_SETS.get(session.document.get("stiffening", "set"), COEFFICIENT_SETS["reproduction"]), name
-            )
-        )
+        def of_set() -> float | None:
+            chosen = COEFFICIENT_SETS.get(session.document.get("stiffening", "set", "reproduction"))
+            return None if chosen is None else float(getattr(chosen, name))
+
+        return of_set
 
     for table, key, label, step in _FIELDS:
         field = number_field(session, table, key, label, default=standard(key), step=step)

@@ -87,11 +87,8 @@ def _row(session: Session, state: _Shown, k: int) -> Any:
 
     def entered(event: Any) -> None:
         value = event.value
-        if (
-            not isinstance(value, int | float)
-            or not isfinite(value)
-            or not 0 <= value * unit.pascal <= HIGHEST_BAR * BAR
-        ):
+        is_number = isinstance(value, int | float) and isfinite(value)
+        if not is_number or not 0 <= value * unit.pascal <= HIGHEST_BAR * BAR:
             most = _round(HIGHEST_BAR * BAR / unit.pascal, unit)
             field.props(f'error error-message="expected a pressure from 0 to {most:g} {unit.name}"')
             return

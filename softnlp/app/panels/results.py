@@ -5,10 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from nicegui import ui
+from numpy.typing import NDArray
 
 from softnlp.app.numbers import Line, certificate_words, chamber_lines, step_lines
 from softnlp.app.theme import figure_layout
@@ -17,13 +18,23 @@ from softnlp.results import table_text, to_json
 from softnlp.studies.step import Run, Shape
 from softnlp.units import MILLIMETRE, NEWTON_MILLIMETRE
 
-_ALONG = {
+Array = NDArray[np.float64]
+
+_ALONG: Mapping[str, tuple[str, str, str, Callable[[Shape], Array]]] = {
     "curvature": ("Curvature u", "1/m", "body", lambda s: s.curvature),
     "strain": ("Shear and extension v", "–", "body", lambda s: s.shear_extension),
     "force": ("Internal force n", "N", "world", lambda s: s.force),
     "moment": ("Internal moment m", "N mm", "world", lambda s: s.moment / NEWTON_MILLIMETRE),
     "position": ("Position p", "mm", "world", lambda s: s.position / MILLIMETRE),
 }
+
+
+_ENDS = {
+    "well": ("check_circle", "text-green-700 dark:text-green-400"),
+    "warned": ("warning", "text-orange-700 dark:text-orange-300"),
+    "failed": ("error", "text-red-700 dark:text-red-300"),
+}
+_CONFIG = {"displaylogo": False, "responsive": True}
 
 
 class ResultsPanel:
@@ -63,7 +74,7 @@ class ResultsPanel:
                 on_change=lambda: self._draw(force=True),
             ).props("dense outlined options-dense data-testid=along-quantity")
             self._quantity.classes("w-full")
-            self._plot = ui.plotly({"data": [], "layout": {}, "config": {"displaylogo": False}}).classes("w-full h-56")
+            self._plot = ui.plotly({"data": [], "layout": {}, "config": _CONFIG}).classes("w-full h-56")
             ui.button("CSV along the rod", icon="download", on_click=self._download_along).props(
                 "flat dense no-caps size=sm data-testid=along-csv"
             )
@@ -83,10 +94,9 @@ class ResultsPanel:
         step = run.steps[0]
         solved = step.status.has_solution
         _set(self._certificate, certificate_words(run))
-        self._icon.name = "check_circle" if solved and not step.warnings else "warning" if solved else "error"
-        self._icon.classes(
-            replace=f"text-xl shrink-0 {'text-green-700 dark:text-green-400' if solved and not step.warnings else 'text-orange-700 dark:text-orange-300' if solved else 'text-red-700 dark:text-red-300'}"
-        )
+        icon, tint = _ENDS["failed" if not solved else "warned" if step.warnings else "well"]
+        self._icon.name = icon
+        self._icon.classes(replace=f"text-xl shrink-0 {tint}")
         _set(self._warnings, "\n".join((*run.warnings, *step.warnings)))
         self._warnings.set_visibility(bool(self._warnings.text))
         self._fill(self._numbers, "numbers", step_lines(run))
@@ -135,9 +145,7 @@ class ResultsPanel:
         layout = figure_layout(self._dark()) | {"height": 224, "margin": {"l": 48, "r": 8, "t": 8, "b": 36}}
         layout["xaxis"] = layout.get("xaxis", {}) | {"title": {"text": "s [mm]"}}
         layout["yaxis"] = layout.get("yaxis", {}) | {"title": {"text": f"{label.split()[-1]} [{unit}], {frame} frame"}}
-        self._plot.update_figure(
-            {"data": traces, "layout": layout, "config": {"displaylogo": False, "responsive": True}}
-        )
+        self._plot.update_figure({"data": traces, "layout": layout, "config": _CONFIG})
 
     def _copy(self) -> None:
         if self._run is None:

@@ -89,7 +89,7 @@ def scenario_tab(stage: Stage) -> None:
         drawing = out / "figure.png"
         figure.set_visibility(drawing.exists())
         if drawing.exists():
-            figure.set_source(drawing.read_bytes())
+            figure.set_source(_data_url(drawing))
         result.set_visibility(out.exists() and any(out.iterdir()))
 
     def stop() -> None:
