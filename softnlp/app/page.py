@@ -24,6 +24,7 @@ from softnlp.app.tabs.inverse import inverse_tab
 from softnlp.app.tabs.scenario import scenario_tab
 from softnlp.app.tabs.sequence import sequence_tab
 from softnlp.app.tabs.workspace import workspace_tab
+from softnlp.app.theme import style_page
 from softnlp.app.view import RobotView
 
 
@@ -46,7 +47,8 @@ STUDIES: Mapping[str, Study] = {
 _TAB_OF = {study.study: name for name, study in STUDIES.items()}
 SCENARIO = "scenario"
 _LINE = "border-neutral-300 dark:border-neutral-700"
-_HEADER = f"h-12 px-3 py-0 items-center no-wrap gap-2 bg-white text-black dark:bg-neutral-900 dark:text-white border-b {_LINE}"
+_HEADER = f"h-12 px-3 py-0 items-center no-wrap gap-2 border-b softnlp-surface {_LINE}"
+_COLUMN = "shrink-0 h-full overflow-y-auto overflow-x-hidden p-3"
 _MESSAGE = "absolute bottom-2 left-2 right-2 text-sm rounded px-3 py-2 bg-orange-100 text-orange-950"
 _NOT_USED = "Not used:"
 
@@ -54,9 +56,7 @@ _NOT_USED = "Not used:"
 def build_page(session: Session) -> None:
     """Build one browser tab for a session."""
     dark = ui.dark_mode()
-    ui.colors(primary="#0072B2", secondary="#D55E00", accent="#009E73", warning="#E69F00", negative="#C1121F")
-    ui.query(".nicegui-content").classes("p-0 gap-0")
-    ui.query("body").classes("overflow-hidden")
+    style_page()
     chosen = _TAB_OF.get(session.document.study, SCENARIO)
     with ui.header(elevated=False).classes(_HEADER):
         ui.label("softnlp").classes("text-lg font-semibold mr-2")
@@ -68,7 +68,7 @@ def build_page(session: Session) -> None:
         ui.space()
         exports = _files(session, dark)
     with ui.row().classes("w-full no-wrap gap-0").style("height: calc(100vh - 48px)"):
-        with ui.scroll_area().classes(f"w-[330px] shrink-0 h-full border-r {_LINE}"):
+        with ui.element("div").classes(f"w-[330px] border-r {_COLUMN} {_LINE}"):
             _panels(session, lambda: bool(dark.value))
         with ui.column().classes("grow min-w-0 h-full gap-0 relative"):
             view = RobotView().classes("w-full grow min-h-0").props("data-testid=view")
@@ -76,7 +76,7 @@ def build_page(session: Session) -> None:
             message = ui.label().classes(_MESSAGE).props("data-testid=message role=status").mark("message")
             message.set_visibility(False)
         stage = Stage(session, view)
-        with ui.scroll_area().classes(f"w-[390px] shrink-0 h-full border-l {_LINE}"):
+        with ui.element("div").classes(f"w-[390px] border-l {_COLUMN} {_LINE}"):
             results = ResultsPanel(lambda: bool(dark.value))
             ui.separator()
             _studies(stage, tabs, chosen)
@@ -118,22 +118,18 @@ def _files(session: Session, dark: ui.dark_mode) -> ui.menu:
 
 def _panels(session: Session, dark: Callable[[], bool]) -> None:
     """Build what describes the robot, its silicone, its loads and the equations."""
-    with ui.column().classes("w-full gap-0 p-2"):
-        for name, label, opened, build in (
-            ("pressures", "Pressures", True, pressure_panel),
-            ("robot", "Robot", True, lambda s: robot_panel(s)),
-            ("material", "Silicone", False, lambda s: material_panel(s, dark)),
-            ("loads", "Gravity and tip load", False, loads_panel),
-            ("coefficients", "Coefficients", False, coefficients_panel),
-            ("solver", "Solver", False, solver_panel),
-        ):
-            with (
-                ui.expansion(label, value=opened)
-                .classes("w-full")
-                .props(f"dense header-class=font-semibold data-testid=panel-{name}"),
-                ui.column().classes("w-full gap-2 pb-2"),
-            ):
-                build(session)
+    for name, label, opened, build in (
+        ("pressures", "Pressures", True, pressure_panel),
+        ("robot", "Robot", True, lambda s: robot_panel(s)),
+        ("material", "Silicone", False, lambda s: material_panel(s, dark)),
+        ("loads", "Gravity and tip load", False, loads_panel),
+        ("coefficients", "Coefficients", False, coefficients_panel),
+        ("solver", "Solver", False, solver_panel),
+    ):
+        panel = ui.expansion(label, value=opened).classes("w-full softnlp-panel")
+        panel.props(f"dense header-class=font-semibold data-testid=panel-{name}")
+        with panel, ui.column().classes("w-full gap-2 pb-3"):
+            build(session)
 
 
 def _view_buttons(view: RobotView) -> None:

@@ -4,6 +4,28 @@ from __future__ import annotations
 
 from typing import Any
 
+from nicegui import ui
+
+from softnlp.plots.style import COLOURS, WRONG
+
+_BLUE, _VERMILION, _GREEN, _, _ORANGE, _SKY, _ = COLOURS
+_STYLE = f"""
+body {{ overflow: hidden; }}
+.nicegui-content {{ padding: 0; gap: 0; }}
+.softnlp-surface {{ background: white !important; color: #222 !important; }}
+.body--dark .softnlp-surface {{ background: #1d1d1d !important; color: #e6e6e6 !important; }}
+.body--dark {{ --q-primary: {_SKY}; }}
+.body--dark .bg-primary {{ color: #111 !important; }}
+.softnlp-panel .q-item {{ padding: 2px 0; min-height: 32px; }}
+.softnlp-panel .nicegui-expansion-content {{ padding: 0; }}
+"""
+
+
+def style_page() -> None:
+    """Give the page its colours and spacing; the accents are those of the figures."""
+    ui.colors(primary=_BLUE, secondary=_VERMILION, accent=_GREEN, warning=_ORANGE, negative=WRONG)
+    ui.add_css(_STYLE)
+
 
 def figure_layout(dark: bool) -> dict[str, Any]:
     """Return the layout that plotly figures start from: no box, a pale grid, texts for the page's background."""

@@ -100,14 +100,14 @@ def _row(session: Session, state: _Shown, k: int) -> Any:
 
     with ui.row().classes("w-full items-center no-wrap gap-2"):
         ui.element("div").classes("shrink-0 rounded-full").style(f"width:12px;height:12px;background:{colour(k)}")
-        ui.label(f"Set {k + 1}").classes("text-sm shrink-0 w-10")
+        ui.label(f"Set {k + 1}").classes("text-sm shrink-0 w-9")
         slider = ui.slider(min=0, max=_ceil(state.limit, unit), step=unit.step, value=shown(), on_change=entered)
         slider.props(f'dense data-testid=pressure-slider-{k + 1} aria-label="pressure of set {k + 1}"')
-        slider.classes("grow min-w-0").style(f"color:{colour(k)} !important").mark(f"pressure.slider.{k + 1}")
+        slider.classes("grow min-w-0").style(f"--q-primary: {colour(k)}").mark(f"pressure.slider.{k + 1}")
         field = ui.number(value=shown(), step=unit.step, on_change=entered, min=0)
         field.props(f'dense outlined hide-bottom-space debounce=250 suffix="{unit.name}"')
         field.props(f"data-testid=pressure-number-{k + 1}")
-        field.classes("w-28 shrink-0").mark(f"pressure.number.{k + 1}")
+        field.classes("w-24 shrink-0").mark(f"pressure.number.{k + 1}")
 
     def refresh() -> None:
         value = shown()

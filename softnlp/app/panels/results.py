@@ -63,9 +63,9 @@ class ResultsPanel:
             ui.button("JSON", icon="download", on_click=self._download_json).props(
                 "flat dense no-caps size=sm data-testid=results-json"
             )
-        with ui.expansion("Chambers").classes("w-full").props("dense data-testid=chambers"):
+        with ui.expansion("Chambers").classes("w-full softnlp-panel").props("dense data-testid=chambers"):
             self._chambers = ui.grid(columns="1fr auto 52px").classes("w-full gap-x-2 gap-y-0 text-sm")
-        self._along = ui.expansion("Strains and internal force along the rod").classes("w-full")
+        self._along = ui.expansion("Strains and internal force along the rod").classes("w-full softnlp-panel")
         self._along.props("dense data-testid=along")
         with self._along:
             self._quantity = ui.select(
@@ -79,7 +79,7 @@ class ResultsPanel:
                 "flat dense no-caps size=sm data-testid=along-csv"
             )
         self._along.on_value_change(lambda: self._draw(force=True))
-        with ui.expansion("Equations").classes("w-full").props("dense data-testid=equations"):
+        with ui.expansion("Equations").classes("w-full softnlp-panel").props("dense data-testid=equations"):
             self._equations = ui.grid(columns="1fr auto 52px").classes("w-full gap-x-2 gap-y-0 text-xs")
         ui.timer(0.3, self._draw)
 
