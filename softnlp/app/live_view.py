@@ -21,6 +21,10 @@ from softnlp.units import BAR
 Array = NDArray[np.float64]
 
 
+_PATIENCE_S = 0.6  # of a person, before the page says that it works
+_SOLVING = "Solving …"
+
+
 class LiveView:
     """Solves the pose of the session in a thread whenever it changes, and hands it to the view and the panels.
 
@@ -58,12 +62,13 @@ class LiveView:
         scenario, pressure = session.scenario, session.pressure.copy()
         if scenario is None or len(pressure) != scenario.robot.chamber_sets:
             return
+        solve = session.live.blocked if session.document.study == "blocked-force" else session.live.pose
+        task = asyncio.create_task(asyncio.to_thread(solve, scenario, pressure))
+        if not (await asyncio.wait({task}, timeout=_PATIENCE_S))[0]:
+            with self._client:
+                self._say(_SOLVING)
         try:
-            if session.document.study == "blocked-force" and scenario.contact is not None:
-                run = await asyncio.to_thread(session.live.blocked, scenario, pressure)
-                ghost = None if run.steps[0].contact is None else run.steps[0].contact.free
-            else:
-                run, ghost = await asyncio.to_thread(session.live.pose, scenario, pressure)
+            run, ghost = await task
         except InputError as error:
             with self._client:
                 self._say(str(error))
