@@ -92,7 +92,7 @@ class RobotState:
             fields = RULE_FIELDS[violation.rule]
             key = latest if latest in fields else fields[0]
             message = f"{violation.message[0].upper()}{violation.message[1:]}."
-            messages[key] = f"{messages[key]} {message}" if key in messages else message
+            messages[key] = f"{messages[key]}\n{message}" if key in messages else message
         return messages
 
 

@@ -58,7 +58,7 @@ class _RobotPanel:
         self.latest: str | None = None
         self.fields: dict[str, ui.number] = {}
         self.lines: dict[str, ui.label] = {}
-        with ui.column().classes("w-full gap-2").props("data-testid=robot.panel") as self.root:
+        with ui.column().classes("w-full gap-2").props("data-testid=robot-panel") as self.root:
             self._choice()
             self._drawing()
             with ui.element("div").classes("grid grid-cols-2 gap-x-2 gap-y-2 w-full items-start"):
@@ -75,22 +75,22 @@ class _RobotPanel:
     def _choice(self) -> None:
         options = {name: name for name in ROBOTS} | {OWN: "Own dimensions"}
         self.choice = ui.select(options, label="Robot", on_change=self._chosen)
-        self.choice.props("dense outlined options-dense hide-bottom-space data-testid=robot.name")
-        self.choice.classes("w-full").mark("robot.name")
+        self.choice.props("dense outlined options-dense hide-bottom-space data-testid=robot-name")
+        self.choice.without_auto_validation().classes("w-full").mark("robot.name")
         self.own_name = ui.input("Name", on_change=self._named)
-        self.own_name.props("dense outlined debounce=250 hide-bottom-space maxlength=200 data-testid=robot.own_name")
-        self.own_name.classes("w-full").mark("robot.own_name")
+        self.own_name.props("dense outlined debounce=250 hide-bottom-space maxlength=200 data-testid=robot-own_name")
+        self.own_name.without_auto_validation().classes("w-full").mark("robot.own_name")
         with ui.row().classes("w-full items-center justify-between no-wrap gap-2") as self.changed_row:
-            self.changed_text = ui.label().classes("text-xs opacity-80").props("data-testid=robot.changed")
+            self.changed_text = ui.label().classes("text-xs opacity-80").props("data-testid=robot-changed")
             reset = ui.button("Library values", icon="restart_alt", on_click=self._reset)
-            reset.props("flat dense no-caps size=sm data-testid=robot.reset").mark("robot.reset")
+            reset.props("flat dense no-caps size=sm data-testid=robot-reset").mark("robot.reset")
 
     def _drawing(self) -> None:
-        self.picture = ui.html(sanitize=False).classes("w-full").props("data-testid=robot.section")
+        self.picture = ui.html(sanitize=False).classes("w-full").props("data-testid=robot-section")
         self.picture.mark("robot.section")
-        self.caption = ui.label().classes("text-xs opacity-80 w-full").props("data-testid=robot.caption")
+        self.caption = ui.label().classes("text-xs opacity-80 w-full").props("data-testid=robot-caption")
         self.stretched = ui.switch("At the stretch of the pose", on_change=lambda: self._draw())
-        self.stretched.props("dense size=sm data-testid=robot.stretched").classes("text-xs").mark("robot.stretched")
+        self.stretched.props("dense size=sm data-testid=robot-stretched").classes("text-xs").mark("robot.stretched")
 
     def _dimensions(self) -> None:
         rows: list[list[Dimension]] = [list(DIMENSIONS[i : i + 2]) for i in range(0, len(DIMENSIONS), 2)]
@@ -136,21 +136,25 @@ class _RobotPanel:
         self._keep(_WALL, field)
 
     def _keep(self, key: str, field: ui.number) -> None:
-        field.props(f"data-testid=robot.{key} no-error-icon")
+        field.props(f"data-testid=robot-{key} no-error-icon")
         self.fields[key] = field
 
     def _line(self, key: str) -> None:
-        line = ui.label().classes("col-span-2 text-xs text-negative leading-tight -mt-1").mark(f"robot.{key}.said")
-        line.props(f"data-testid=robot.{key}.said role=alert")
+        line = (
+            ui.label()
+            .classes("col-span-2 text-xs text-negative leading-tight whitespace-pre-line -mt-1")
+            .mark(f"robot.{key}.said")
+        )
+        line.props(f"data-testid=robot-{key}-said role=alert")
         self.lines[key] = line
 
     def _allowed(self) -> None:
         self.rules = {}
         for rule in LOWERABLE_RULES:
             switch = ui.switch(_RULES[rule], on_change=lambda event, rule=rule: self._allow(rule, event.value))
-            switch.props(f"dense size=sm data-testid=robot.allow.{rule}").classes("text-xs")
+            switch.props(f"dense size=sm data-testid=robot-allow-{rule}").classes("text-xs")
             self.rules[rule] = switch.mark(f"robot.allow.{rule}")
-        self.warning = ui.label().classes("text-xs text-warning leading-tight").props("data-testid=robot.warning")
+        self.warning = ui.label().classes("text-xs text-warning leading-tight").props("data-testid=robot-warning")
         self.warning.mark("robot.warning")
 
     # --- what a person does -------------------------------------------------------------------------------------------
@@ -243,7 +247,7 @@ class _RobotPanel:
             return
         self.picture.set_content(drawing)
         wall = (state.robot.chamber_wall + state.robot.outer_wall) / MILLIMETRE
-        words = ["As made" if stretch == 1.0 else f"Stretch {stretch:.3g}", f"wall {wall:.3g} mm as made"]
+        words = ["As made" if stretch == 1.0 else f"Stretch {stretch:.3g}", f"wall {wall:.3g} mm"]
         if 1.0 <= state.touching < inf:
             words.append(f"chambers touch above stretch {state.touching:.3g}")
         self.caption.set_text(" · ".join(words))
