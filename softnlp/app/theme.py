@@ -1,4 +1,4 @@
-"""How plotly figures look on the page, light and dark."""
+"""How the page and its plots look, light and dark."""
 
 from __future__ import annotations
 
@@ -7,43 +7,39 @@ from typing import Any
 
 from nicegui import ElementFilter, ui
 
-from softnlp.plots.style import COLOURS
+from softnlp.plots.style import COLOURS, WRONG
 
-_INK = {False: "#333333", True: "#E0E0E0", None: "#808080"}
-"""Of text; where it is not known how the page looks, a grey that reads on both."""
-_GRID = {False: "#E3E3E3", True: "#3C3C3C", None: "rgba(128,128,128,0.25)"}
-_BEHIND = {False: "#FFFFFF", True: "#262626", None: "#808080"}
+_BLUE, _VERMILION, _GREEN, _, _ORANGE, _SKY, _ = COLOURS
+_STYLE = f"""
+body {{ overflow: hidden; }}
+.nicegui-content {{ padding: 0; gap: 0; }}
+.softnlp-surface {{ background: white !important; color: #222 !important; }}
+.body--dark .softnlp-surface {{ background: #1d1d1d !important; color: #e6e6e6 !important; }}
+.body--dark {{ --q-primary: {_SKY}; }}
+.body--dark .bg-primary {{ color: #111 !important; }}
+.softnlp-panel .q-item {{ padding: 2px 0; min-height: 32px; }}
+.softnlp-panel .nicegui-expansion-content {{ padding: 0; }}
+"""
 
 
-def figure_layout(dark: bool | None) -> dict[str, Any]:
-    """Return what the layouts of all plotly figures share; merge titles and ranges of axes into it.
+def style_page() -> None:
+    """Give the page its colours and spacing; the accents are those of the figures."""
+    ui.colors(primary=_BLUE, secondary=_VERMILION, accent=_GREEN, warning=_ORANGE, negative=WRONG)
+    ui.add_css(_STYLE)
 
-    dark : whether the page is dark, None where only the browser knows.
-    """
-    ink, grid = _INK[dark], _GRID[dark]
-    axis = {
-        "gridcolor": grid,
-        "zerolinecolor": grid,
-        "linecolor": ink,
-        "tickcolor": ink,
-        "ticks": "outside",
-        "ticklen": 3,
-        "showline": True,
-        "automargin": True,
-        "title": {"font": {"size": 12}, "standoff": 6},
-    }
+
+def figure_layout(dark: bool) -> dict[str, Any]:
+    """Return the layout that plotly figures start from: no box, a pale grid, texts for the page's background."""
+    ink, grid = ("#E6E6E6", "#4A4A4A") if dark else ("#222222", "#DDDDDD")
+    axis = {"gridcolor": grid, "zerolinecolor": grid, "linecolor": grid, "automargin": True}
     return {
-        "font": {"family": "Roboto, Helvetica, Arial, sans-serif", "size": 11, "color": ink},
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
-        "colorway": list(COLOURS),
-        "margin": {"l": 8, "r": 8, "t": 8, "b": 8},
+        "font": {"color": ink, "size": 11},
         "xaxis": dict(axis),
         "yaxis": dict(axis),
-        "legend": {"orientation": "h", "x": 0, "y": -0.28, "yanchor": "top", "font": {"size": 11}},
-        "hoverlabel": {"bgcolor": _BEHIND[dark], "font": {"color": "#FFFFFF" if dark is None else ink}},
-        "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": ink, "activecolor": COLOURS[0]},
-        "uirevision": "kept",  # a zoom stays as a figure is drawn again
+        "legend": {"orientation": "h", "y": 1.12},
+        "margin": {"l": 48, "r": 8, "t": 8, "b": 40},
     }
 
 
@@ -58,18 +54,7 @@ def figure_config() -> dict[str, Any]:
     }
 
 
-def page_dark() -> bool | None:
-    """Return whether the page of the current slot is dark; None where it follows the browser."""
-    mode = _dark_mode()
-    return mode.value if mode is not None else None
-
-
 def on_dark(redraw: Callable[[], None]) -> None:
     """Call a function after each turn of the page of the current slot from light to dark or back."""
-    mode = _dark_mode()
-    if mode is not None:
+    for mode in ElementFilter(kind=ui.dark_mode):
         mode.on_value_change(lambda: redraw())
-
-
-def _dark_mode() -> ui.dark_mode | None:
-    return next(iter(ElementFilter(kind=ui.dark_mode)), None)

@@ -1,1 +1,1 @@
-"""Panels of the page: each builds its controls in the current slot and follows the session."""
+"""The controls beside the robot, one module a group of scenario tables, and the results."""
