@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
-from nicegui import ui
+from nicegui import ElementFilter, ui
 
 from softnlp.plots.style import COLOURS, WRONG
 
@@ -40,3 +41,20 @@ def figure_layout(dark: bool) -> dict[str, Any]:
         "legend": {"orientation": "h", "y": 1.12},
         "margin": {"l": 48, "r": 8, "t": 8, "b": 40},
     }
+
+
+def figure_config() -> dict[str, Any]:
+    """Return plotly's settings: tools while the pointer is over the figure, nothing that leads out of the page."""
+    return {
+        "displaylogo": False,
+        "showLink": False,
+        "plotlyServerURL": "",
+        "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"],
+        "toImageButtonOptions": {"format": "png", "scale": 3},
+    }
+
+
+def on_dark(redraw: Callable[[], None]) -> None:
+    """Call a function after each turn of the page of the current slot from light to dark or back."""
+    for mode in ElementFilter(kind=ui.dark_mode):
+        mode.on_value_change(lambda: redraw())
