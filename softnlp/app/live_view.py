@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from softnlp.app.stage import Stage
 from softnlp.app.view import frame_of
+from softnlp.app.view.frame import Wall
 from softnlp.errors import InputError
 from softnlp.results import Body
 from softnlp.scenario import Scenario
 from softnlp.studies.step import Pose, Run
-from softnlp.studies.wall import Wall
 from softnlp.units import BAR
 
 Array = NDArray[np.float64]
@@ -100,7 +100,9 @@ class LiveView:
                 tip_force=scenario.loads.tip_force,
                 tip_moment=scenario.loads.tip_moment,
                 gravity=scenario.loads.gravity,
-                wall=None if contact is None or not contact.normal.any() else Wall(contact.wall_point, contact.normal),
+                wall=None
+                if contact is None or not contact.normal.any()
+                else Wall(contact.wall_point, contact.normal, contact.force),
             )
         )
 
