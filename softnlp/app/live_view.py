@@ -15,7 +15,7 @@ from softnlp.app.view.frame import Wall
 from softnlp.errors import InputError
 from softnlp.results import Body
 from softnlp.scenario import Scenario
-from softnlp.studies.step import Pose, Run
+from softnlp.studies.step import Contact, Pose, Run
 from softnlp.units import BAR
 
 Array = NDArray[np.float64]
@@ -90,7 +90,6 @@ class LiveView:
         if self._last is None or not np.array_equal(self._last[1], pressure) or self._last[0] is not scenario:
             self._say("")
         self._last = (scenario, pressure)
-        contact = step.contact
         self._stage.view.show(
             frame_of(
                 scenario.robot,
@@ -113,6 +112,12 @@ class LiveView:
 
 def _body(pose: Pose) -> Body:
     return Body(pose.shape.position, pose.shape.rotation, pose.radii)
+
+
+def _wall(contact: Contact | None) -> Wall | None:
+    if contact is None or not contact.normal.any():
+        return None
+    return Wall(contact.wall_point, contact.normal, contact.force)
 
 
 def _listed(pressure: Array) -> str:
