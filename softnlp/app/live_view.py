@@ -99,9 +99,7 @@ class LiveView:
                 tip_force=scenario.loads.tip_force,
                 tip_moment=scenario.loads.tip_moment,
                 gravity=scenario.loads.gravity,
-                wall=None
-                if contact is None or not contact.normal.any()
-                else Wall(contact.wall_point, contact.normal, contact.force),
+                wall=_wall(step.contact),
             )
         )
 
