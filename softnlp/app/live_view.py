@@ -99,7 +99,7 @@ class LiveView:
                 tip_force=scenario.loads.tip_force,
                 tip_moment=scenario.loads.tip_moment,
                 gravity=scenario.loads.gravity,
-                wall=_wall(step.contact),
+                wall=_wall(step.contact, step.pose),
             )
         )
 
@@ -112,10 +112,13 @@ def _body(pose: Pose) -> Body:
     return Body(pose.shape.position, pose.shape.rotation, pose.radii)
 
 
-def _wall(contact: Contact | None) -> Wall | None:
+def _wall(contact: Contact | None, pose: Pose) -> Wall | None:
+    """Return the wall where it is touched, or in front of the tip; None where the chambers alone are held."""
     if contact is None or not contact.normal.any():
         return None
-    return Wall(contact.wall_point, contact.normal, contact.force)
+    tip = pose.tip_position + contact.tip_cap * pose.tip_rotation[:, 2]
+    ahead = contact.normal @ (tip - contact.wall_point)
+    return Wall(tip - ahead * contact.normal, contact.normal, contact.force)
 
 
 def _listed(pressure: Array) -> str:
