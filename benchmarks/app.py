@@ -1,6 +1,6 @@
 """How quickly the app answers: `python -m benchmarks.app`. Needs the extra gui, playwright and a Chromium.
 
-Times the start of `softnlp gui` until its page answers, and from a key press on a pressure slider until the 3-D view has
+Times the start of `softnlp gui` until its page answers, and from a key press on a slider until the 3-D view has
 drawn the new shape, as the browser sees both: the press travels to the server, the pose is solved, the frame travels
 back and is drawn. Beside it stands the same way without solving: a frame that is drawn again.
 """
