@@ -9,6 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+pytest.importorskip("nicegui", reason="the extra gui is not installed")
+
 from app_stage import done, enter, field, opened, ran, until
 
 from softnlp import blocked_force

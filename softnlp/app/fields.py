@@ -41,6 +41,7 @@ def number_field(
 
     field = ui.number(label, value=shown(), step=step, on_change=entered)
     field.props("dense outlined debounce=250 hide-bottom-space").classes("w-full").mark(f"{table}.{key}")
+    field.without_auto_validation()  # it would take away what `tell_problem` says
     if unit:
         field.props(f'suffix="{unit}"')
 
@@ -78,6 +79,7 @@ def choice_field(
     field = ui.select(dict(options) if isinstance(options, Mapping) else known, label=label, value=shown())
     field.on_value_change(entered)
     field.props("dense outlined options-dense hide-bottom-space").classes("w-full").mark(f"{table}.{key}")
+    field.without_auto_validation()
 
     def refresh() -> None:
         if field.value != shown():

@@ -8,12 +8,12 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from math import isfinite
 from typing import Any, TypeVar
 
-from nicegui import events, ui
+from nicegui import ElementFilter, events, ui
 
 from softnlp.app.fields import tell_problem
 from softnlp.app.job import Progress, Stopped, in_background
 from softnlp.app.session import LARGEST_FILE, Session
-from softnlp.app.theme import dark_page, figure_layout
+from softnlp.app.theme import figure_config, figure_layout, on_dark
 from softnlp.errors import InputError, SoftnlpError
 
 T = TypeVar("T")
@@ -203,7 +203,8 @@ class Chart:
         self._place.set_visibility(False)
         self._plot: ui.plotly | None = None
         ui.add_body_html(_QUIET_RESIZE)
-        self._is_dark = dark_page(self._draw)
+        self._modes = list(ElementFilter(kind=ui.dark_mode))
+        on_dark(self._draw)
 
     def show(
         self, traces: Sequence[Mapping[str, Any]], *, x_label: str | None = None, y_label: str | None = None
@@ -221,12 +222,11 @@ class Chart:
     def _draw(self) -> None:
         if self._plot is None:
             return
-        layout = figure_layout(self._is_dark())
+        layout = figure_layout(any(bool(mode.value) for mode in self._modes))
         for axis, label in zip(("xaxis", "yaxis"), self._labels, strict=True):
-            layout[axis]["title"] = {**layout[axis]["title"], "text": label}
+            layout[axis]["title"] = {"text": label, "standoff": 6}
         layout["showlegend"] = len([t for t in self._traces if t.get("name")]) > 1
-        config = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": ["select2d", "lasso2d"]}
-        self._plot.update_figure({"data": self._traces, "layout": layout, "config": config})
+        self._plot.update_figure({"data": self._traces, "layout": layout, "config": figure_config()})
 
 
 def line(x: Sequence[float], y: Sequence[float], colour: str, name: str = "", **more: Any) -> dict[str, Any]:
@@ -298,6 +298,7 @@ def vector_field(
             field = ui.number(label, value=value()[k], on_change=lambda event, k=k: entered(k, event.value))
             field.props(f'dense outlined debounce=250 hide-bottom-space suffix="{unit}"').classes("grow")
             field.mark(f"{table}.{key}.{k}").props(f"data-testid={table}.{key}.{k}")
+            field.without_auto_validation()  # it would take away what `tell_problem` says
             fields.append(field)
 
     def refresh() -> None:

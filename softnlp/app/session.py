@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
@@ -138,6 +139,23 @@ class Session:
             return document.text()
         document.replace("pressure", {"sequence_bar": [[float(f"{p / BAR:.12g}") for p in self.pressure]]})
         return document.text()
+
+    def kept(self) -> str:
+        """Return all that is on the screen as text, for `recall`."""
+        kept = {"name": self.name, "source": self.document.source(), "study": self.document.study}
+        return json.dumps(kept | {"pressure": None if self.follows_file else self.pressure.tolist()})
+
+    def recall(self, text: str) -> None:
+        """Show again what `kept` returned; raises `InputError` where that cannot be read."""
+        try:
+            kept = json.loads(text)
+            name, source, study, pressure = (kept[key] for key in ("name", "source", "study", "pressure"))
+        except (ValueError, KeyError, TypeError):
+            raise InputError("expected what a tab of this app had kept") from None
+        self.open(str(source), str(name))
+        self.choose(str(study))
+        if pressure is not None and len(pressure) == len(self.pressure):
+            self.set_pressure(np.asarray(pressure, dtype=float))
 
     def asked(self) -> Scenario:
         """Return the scenario of `text`, as a run of the saved file would have it; raises `InputError`."""

@@ -1,1 +1,1 @@
-"""The tabs of the page, one a study: each edits its tables of the scenario and runs the package's own study."""
+"""What each study shows beside the robot, one module a study."""

@@ -66,6 +66,7 @@ def _contact_fields(session: Session) -> None:
     options = {key: f"{key.capitalize()}: {use}" for key, use in CLOSURES.items()}
     select = ui.select(options, label="Closure").classes("w-full").mark("contact.closure")
     select.props("dense outlined options-dense hide-bottom-space data-testid=contact.closure")
+    select.without_auto_validation()
     good_for = ui.label("").classes("text-xs opacity-70 -mt-2")
     reaction = number_field(
         session,

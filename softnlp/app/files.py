@@ -1,0 +1,102 @@
+"""Opening scenario files, saving what is on the screen, and bodies as meshes."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Sequence
+from typing import Any
+
+from nicegui import events, ui
+
+from softnlp.app.session import LARGEST_FILE, Session
+from softnlp.errors import InputError, SoftnlpError
+
+
+def saved(session: Session) -> tuple[str, bytes]:
+    """Return the name and content of what a person saves: the scenario, zipped with the files that it names."""
+    text = session.text().encode()
+    stem = session.name.removesuffix(".toml") or "scenario"
+    files = session.document.files()
+    if not files:
+        return f"{stem}.toml", text
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(f"{stem}.toml", text)
+        for name in files:
+            archive.writestr(name, (session.folder / name).read_bytes())
+    return f"{stem}.zip", packed.getvalue()
+
+
+def save(session: Session) -> None:
+    """Offer the scenario on the screen as a download; what is wrong with it is said instead."""
+    if session.problem is not None:
+        ui.notify(f"not saved: {session.problem}", type="negative", close_button="Close", timeout=0)
+        return
+    name, content = saved(session)
+    ui.download.content(content, name)
+
+
+def open_dialog(session: Session) -> ui.dialog:
+    """Return a dialog that takes a scenario and the files that it names."""
+    with ui.dialog() as dialog, ui.card().classes("w-96"):
+        ui.label("Open a scenario").classes("text-lg")
+        ui.label("A .toml file; drop the CSV and material files that it names together with it.").classes("text-sm")
+        upload = ui.upload(multiple=True, auto_upload=True, max_file_size=LARGEST_FILE)
+        upload.props('flat bordered accept=".toml,.csv,.txt" data-testid=open-upload').classes("w-full")
+        ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
+
+    async def taken(event: events.MultiUploadEventArguments) -> None:
+        upload.reset()
+        try:
+            open_files(session, [(file.name, await file.read()) for file in event.files])
+        except SoftnlpError as error:
+            ui.notify(f"not opened: {error}", type="negative", close_button="Close", timeout=0)
+            return
+        dialog.close()
+        ui.notify(f"opened {session.name}", type="positive")
+
+    upload.on_multi_upload(taken)
+    upload.on_rejected(lambda: ui.notify(f"expected files of at most {LARGEST_FILE / 1e6:.0f} MB", type="negative"))
+    return dialog
+
+
+def open_files(session: Session, files: Sequence[tuple[str, bytes]]) -> None:
+    """Show the one scenario among some files.
+
+    Raises
+    ------
+    InputError
+        Where there is not exactly one, or it cannot be read.
+    """
+    scenarios = [(name, content) for name, content in files if name.lower().endswith(".toml") and b"study" in content]
+    if len(scenarios) != 1:
+        raise InputError(f"expected one scenario (.toml with study = …), got {len(scenarios)}")
+    name, content = scenarios[0]
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError("expected text in UTF-8", source=name) from None
+    session.open(text, name, {other: data for other, data in files if other != name})
+
+
+def mesh_menu(session: Session, pose: Any) -> None:
+    """Build menu entries that offer the body as a mesh. pose : a function that gives the pose shown, or None."""
+    from softnlp.mesh import body_solid, mesh_bytes, undeformed_solid
+
+    def offer(kind: str, deformed: bool) -> None:
+        shown = pose()
+        scenario = session.scenario
+        if scenario is None or (deformed and shown is None):
+            ui.notify("no solved pose to export", type="warning")
+            return
+        try:
+            solid = body_solid(scenario.robot, shown) if deformed else undeformed_solid(scenario.robot)
+            ui.download.content(mesh_bytes(solid, kind), f"{'deformed' if deformed else 'undeformed'}.{kind}")
+        except SoftnlpError as error:
+            ui.notify(str(error), type="negative")
+
+    for deformed, words in ((True, "Deformed body"), (False, "Undeformed body for the mould")):
+        for kind in ("stl", "glb"):
+            item = ui.menu_item(f"{words}, {kind.upper()}", on_click=lambda k=kind, d=deformed: offer(k, d))
+            item.props(f"data-testid=mesh-{'deformed' if deformed else 'undeformed'}-{kind}")
