@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from softnlp.app.view.frame import Arrow, Frame, Tube, Wall, frame_of, wall_of
+from softnlp.app.view.frame import Arrow, Frame, Tube, frame_of
 
 if TYPE_CHECKING:
     from softnlp.app.view.robot_view import RobotView
 
-__all__ = ["Arrow", "Frame", "RobotView", "Tube", "Wall", "frame_of", "wall_of"]
+__all__ = ["Arrow", "Frame", "RobotView", "Tube", "frame_of"]
 
 
 def __getattr__(name: str) -> Any:

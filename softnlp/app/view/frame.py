@@ -10,34 +10,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from softnlp.mesh import resampled
 from softnlp.mesh.display import STATIONS
-from softnlp.results import Body, ContactView
+from softnlp.results import Body
 from softnlp.robot import Robot
 from softnlp.studies.step import SectionRadii
+from softnlp.studies.wall import Wall
 from softnlp.units import BAR, MILLIMETRE, NEWTON_MILLIMETRE
 
 Array = NDArray[np.float64]
 
 ARROW = 0.3  # length of every arrow, of L_0; its label says how much
 _NOTHING = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class Wall:
-    """The wall of a blocked force, SI units.
-
-    point : (3,) of its surface, where it is touched [m]. normal : (3,) unit vector along which it pushes. force : [N].
-    """
-
-    point: Array
-    normal: Array
-    force: float
-
-
-def wall_of(contact: ContactView, step: int) -> Wall | None:
-    """Return the wall of one step (from 0) of a blocked force; None where it has none."""
-    if not np.isfinite(contact.normal[step]).all() or not np.isfinite(contact.force[step]):
-        return None
-    return Wall(contact.wall_point[step], contact.normal[step], float(contact.force[step]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +39,14 @@ class Arrow:
     """A load.
 
     kind : "force", "moment", "wall" or "gravity". start, vector : (3,) [mm]. label : with its size and unit.
+    inwards : whether it ends where it acts, so that there is room for the label at its start.
     """
 
     kind: str
     start: Array
     vector: Array
     label: str
+    inwards: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +54,8 @@ class Frame:
     """What a `RobotView` shows at one time, lengths in mm.
 
     robot : gives the layout of the chambers and the natural length. body : the shape. ghost : another, drawn faint.
-    pressure_bar : (sets,). arrows : the loads that are not zero. wall : (point [mm], normal), or None.
+    pressure_bar : (sets,). arrows : the loads that are not zero. wall : its point nearest to the contact [mm] and its
+    unit normal, or None. tip_cap : L_t [mm].
     """
 
     robot: Robot
@@ -79,6 +64,7 @@ class Frame:
     ghost: Tube | None = None
     arrows: tuple[Arrow, ...] = ()
     wall: tuple[Array, Array] | None = None
+    tip_cap: float = 0.0
 
 
 def frame_of(
@@ -91,6 +77,8 @@ def frame_of(
     tip_moment: Sequence[float] = _NOTHING,
     gravity: Sequence[float] = _NOTHING,
     wall: Wall | None = None,
+    wall_force: float = 0.0,
+    tip_cap: float = 0.0,
 ) -> Frame:
     """Return the frame of a shape.
 
@@ -99,7 +87,8 @@ def frame_of(
     pressure : (sets,) gauge [Pa].
     ghost : another shape, that without loads for instance.
     tip_force, tip_moment, gravity : as in `softnlp.rod.Loads`, world frame [N], [N m], [m/s^2].
-    wall : where it is and how hard it pushes.
+    wall : a plane, drawn where the tip is nearest to it. wall_force : how hard it pushes the tip [N].
+    tip_cap : L_t, from the tip to where it touches [m].
 
     Raises
     ------
@@ -109,14 +98,16 @@ def frame_of(
     bar = np.asarray(pressure, dtype=float) / BAR
     if bar.shape != (robot.chamber_sets,):
         raise ValueError(f"expected {robot.chamber_sets} pressures, one a chamber set, got shape {bar.shape}")
-    tube = _tube(body)
+    contact = body.position[-1] + tip_cap * body.rotation[-1, :, 2]
+    push = np.zeros(3) if wall is None else wall_force * np.asarray(wall.normal, dtype=float)
     return Frame(
         robot,
-        tube,
+        _tube(body),
         bar,
         None if ghost is None else _tube(ghost),
-        _arrows(robot, body, tip_force, tip_moment, gravity, wall),
-        None if wall is None else (np.asarray(wall.point) / MILLIMETRE, np.asarray(wall.normal, dtype=float)),
+        _arrows(robot, body, (tip_force, tip_moment, gravity), contact, push),
+        None if wall is None else ((contact - wall.gap(contact) * wall.normal) / MILLIMETRE, wall.normal),
+        tip_cap / MILLIMETRE,
     )
 
 
@@ -129,33 +120,33 @@ def _tube(body: Body) -> Tube:
 
 
 def _arrows(
-    robot: Robot,
-    body: Body,
-    tip_force: Sequence[float],
-    tip_moment: Sequence[float],
-    gravity: Sequence[float],
-    wall: Wall | None,
+    robot: Robot, body: Body, loads: tuple[Sequence[float], ...], contact: Array, push: Array
 ) -> tuple[Arrow, ...]:
-    """Return an arrow for each load; one that pushes into the body ends where it acts, others start there."""
-    size = ARROW * robot.length / MILLIMETRE
-    tip, outwards = body.position[-1] / MILLIMETRE, body.rotation[-1, :, 2]
-    force, moment, weight = (np.asarray(x, dtype=float) for x in (tip_force, tip_moment, gravity))
+    """Return an arrow for each load that is not zero; one that pushes into the body ends where it acts.
+
+    loads : tip force [N], tip moment [N m], gravity [m/s^2]. contact : where the wall pushes [m]. push : its force [N].
+    """
+    force, moment, gravity = (np.asarray(load, dtype=float) for load in loads)
+    tip = body.position[-1]
+    aside = np.array([0.75, 0.0, 0.5]) * robot.length - ARROW / 2 * robot.length * _unit(gravity)
+    into_body = bool(force @ body.rotation[-1, :, 2] < 0)
     found = []
-    if (F := float(np.linalg.norm(force))) > 0:
-        vector = size * force / F
-        start = tip - vector if vector @ outwards < 0 else tip
-        found.append(Arrow("force", start, vector, f"F {F:.3g} N"))
-    if (M := float(np.linalg.norm(moment))) > 0:
-        found.append(Arrow("moment", tip, size * moment / M, f"M {M / NEWTON_MILLIMETRE:.3g} N mm"))
-    if (g := float(np.linalg.norm(weight))) > 0:
-        aside = np.array([0.75, 0.0, 0.5]) * robot.length / MILLIMETRE
-        vector = size * weight / g
-        found.append(Arrow("gravity", aside - vector / 2, vector, f"g {g:.3g} m/s²"))
-    if wall is not None and wall.force > 0:
-        vector = size * np.asarray(wall.normal, dtype=float)
-        label = f"F_b {wall.force:.3g} N"
-        found.append(Arrow("wall", np.asarray(wall.point) / MILLIMETRE - vector, vector, label))
+    for kind, vector, unit, text, at, inwards in (
+        ("force", force, 1.0, "F {:.3g} N", tip, into_body),
+        ("moment", moment, NEWTON_MILLIMETRE, "M {:.3g} N mm", tip, False),
+        ("gravity", gravity, 1.0, "g {:.3g} m/s²", aside, False),
+        ("wall", push, 1.0, "wall {:.3g} N", contact, True),
+    ):
+        if vector.any():
+            step = ARROW * robot.length / MILLIMETRE * _unit(vector)
+            start = at / MILLIMETRE - (step if inwards else 0)
+            found.append(Arrow(kind, start, step, text.format(np.linalg.norm(vector) / unit), inwards))
     return tuple(found)
+
+
+def _unit(vector: Array) -> Array:
+    size = float(np.linalg.norm(vector))
+    return vector / size if size > 0 else vector
 
 
 def quaternions(rotation: Array) -> Array:

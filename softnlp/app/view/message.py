@@ -60,9 +60,16 @@ def frame_message(frame: Frame, number: int, full_bar: float) -> dict[str, Any]:
         "ghost": None if frame.ghost is None else _tube(frame.ghost),
         "level": np.clip(frame.pressure_bar / full_bar, 0, 1).round(4).tolist(),
         "arrows": [
-            {"kind": a.kind, "start": _rounded(a.start), "vector": _rounded(a.vector), "label": a.label}
+            {
+                "kind": a.kind,
+                "start": _rounded(a.start),
+                "vector": _rounded(a.vector),
+                "label": a.label,
+                "inwards": a.inwards,
+            }
             for a in frame.arrows
         ],
+        "cap": round(frame.tip_cap, 3),
         "wall": None
         if frame.wall is None
         else {"point": _rounded(frame.wall[0]), "normal": _rounded(frame.wall[1], digits=6)},

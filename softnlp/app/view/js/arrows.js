@@ -18,7 +18,7 @@ class Arrow {
     this.label = new Label({ size: 13, weight: 600, inFront: true });
   }
 
-  place({ start, vector, label }, colour, halo) {
+  place({ start, vector, label, inwards }, colour, halo) {
     const along = new THREE.Vector3(...vector);
     const length = along.length();
     this.group.position.set(...start);
@@ -29,7 +29,7 @@ class Arrow {
     this.heads.forEach((head, k) => (head.position.y = 0.88 - 0.18 * k));
     this.material.color.set(colour);
     this.label.write(label, colour, halo);
-    this.label.sprite.position.copy(along.multiplyScalar(1.12)).add(this.group.position);
+    this.label.sprite.position.copy(along.multiplyScalar(inwards ? -0.12 : 1.12)).add(this.group.position);
   }
 
   show(visible) {

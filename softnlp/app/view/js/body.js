@@ -27,7 +27,7 @@ const FRAGMENT = `
     #include <colorspace_fragment>
   }`;
 
-export function clear(alphaFacing, alphaEdge, side) {
+function silicone(alphaFacing, alphaEdge, side) {
   return new THREE.ShaderMaterial({
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
@@ -63,9 +63,9 @@ export class Body {
     this.position = new THREE.BufferAttribute(new Float32Array(3 * count), 3).setUsage(THREE.DynamicDrawUsage);
     this.normal = new THREE.BufferAttribute(new Float32Array(3 * count), 3).setUsage(THREE.DynamicDrawUsage);
     this.silicone = {
-      back: clear(0.3, 0.62, THREE.BackSide),
-      front: clear(0.1, 0.72, THREE.FrontSide),
-      lumen: clear(0.06, 0.4, THREE.DoubleSide),
+      back: silicone(0.26, 0.62, THREE.BackSide),
+      front: silicone(0.07, 0.72, THREE.FrontSide),
+      lumen: silicone(0.06, 0.4, THREE.DoubleSide),
     };
     this.sets = robot.sets.map(
       () =>
@@ -138,7 +138,7 @@ export class Ghost {
     this.robot = robot;
     this.position = new THREE.BufferAttribute(new Float32Array(3 * robot.mesh.station.length), 3);
     this.normal = new THREE.BufferAttribute(new Float32Array(3 * robot.mesh.station.length), 3);
-    this.material = clear(0.05, 0.5, THREE.FrontSide);
+    this.material = silicone(0.1, 0.6, THREE.FrontSide);
     this.group = new THREE.Group();
     for (const part of robot.parts.filter((p) => p.kind === "outer" || p.kind === "end")) {
       const geometry = new THREE.BufferGeometry();

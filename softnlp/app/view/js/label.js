@@ -14,6 +14,7 @@ export class Label {
       sizeAttenuation: false,
       depthWrite: false,
       depthTest: !inFront,
+      premultipliedAlpha: true, // else the clear pixels around the letters darken their edges
     });
     this.sprite = new THREE.Sprite(this.material);
     this.sprite.renderOrder = 20;
@@ -44,6 +45,7 @@ export class Label {
     this.material.map?.dispose();
     this.material.map = new THREE.CanvasTexture(this.canvas);
     this.material.map.colorSpace = THREE.SRGBColorSpace;
+    this.material.map.premultiplyAlpha = true;
     this.material.needsUpdate = true;
     this.scale(this.unit);
   }

@@ -33,12 +33,15 @@ export class Marks {
     this.wall = this.makeWall();
     this.cloud = new THREE.Points(
       new THREE.BufferGeometry(),
-      new THREE.PointsMaterial({ size: 4, sizeAttenuation: false, vertexColors: true, map: disc(), alphaTest: 0.5 }),
+      new THREE.PointsMaterial({ size: 5, sizeAttenuation: false, vertexColors: true, map: disc(), alphaTest: 0.5 }),
     );
     this.cloud.visible = false;
     this.targetMaterial = new THREE.MeshBasicMaterial();
     this.targets = new THREE.Group();
-    this.group.add(this.trail, this.wall, this.cloud, this.targets);
+    this.cap = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 24), new THREE.MeshPhongMaterial());
+    this.cap.geometry.translate(0, 0.5, 0);
+    this.cap.visible = false;
+    this.group.add(this.trail, this.wall, this.cloud, this.targets, this.cap);
   }
 
   makeWall() {
@@ -66,10 +69,14 @@ export class Marks {
     return wall;
   }
 
+  // tip: twelve numbers of a station, see stationFrames.
   update(frame, tip, palette, theme) {
     this.length = frame.length;
+    this.cap.visible = frame.cap > 0;
+    this.cap.position.set(...tip.subarray(0, 3));
+    this.cap.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), new THREE.Vector3(...tip.subarray(9, 12)));
+    this.cap.scale.set(0.1 * frame.width, Math.max(frame.cap, 1e-6), 0.1 * frame.width);
     this.palette = palette;
-    this.addToTrail(tip);
     this.wall.visible = frame.wall !== null;
     if (frame.wall !== null) {
       this.wall.position.set(...frame.wall.point);
@@ -86,18 +93,19 @@ export class Marks {
   paint(theme) {
     this.trail.material.color.set(this.palette?.[3] ?? theme.ink);
     this.targetMaterial.color.set(this.palette?.[4] ?? theme.ink);
+    this.cap.material.color.set(theme.plate);
     this.wallFace.color.set(theme.grey);
     this.wallEdge.color.set(theme.grey);
     this.wallHatch.color.set(theme.grey);
   }
 
-  addToTrail(tip) {
+  addToTrail(tip, length) {
     const { position } = this.trail.geometry.attributes;
     const places = position.array;
     if (this.count > 0) {
       const last = 3 * (this.count - 1);
       const moved = Math.hypot(tip[0] - places[last], tip[1] - places[last + 1], tip[2] - places[last + 2]);
-      if (moved < TRAIL_STEP * this.length) return;
+      if (moved < TRAIL_STEP * length) return;
     }
     if (this.count === TRAIL) {
       places.copyWithin(0, 3 * (TRAIL / 4)); // the oldest quarter goes

@@ -64,21 +64,21 @@ export class Stage {
     this.scene.add(this.body.group, this.ghost.group);
   }
 
-  // Only kept here: of several that come before the next animation frame the last is drawn.
+  // Only kept here: of several that come before the next animation frame the last is drawn, and the tip of each.
   show(frame) {
-    this.next = frame;
+    this.next = { ...frame, body: readTube(frame.body), ghost: readTube(frame.ghost) };
+    this.marks.addToTrail(this.next.body.axis.subarray(-7, -4), frame.length);
     this.request();
   }
 
   apply(frame) {
-    const tube = readTube(frame.body);
-    const tip = stationFrames(tube.axis.subarray(-7));
-    this.body.update(tube, frame.level);
-    this.ghost.update(readTube(frame.ghost));
+    const tip = stationFrames(frame.body.axis.subarray(-7));
+    this.body.update(frame.body, frame.level);
+    this.ghost.update(frame.ghost);
     this.tipFrame.group.visible = true;
     this.tipFrame.update(tip, 0.16 * frame.length, this.theme);
     this.arrows.update(frame.arrows, this.theme);
-    this.marks.update(frame, tip.subarray(0, 3), this.palette, this.theme);
+    this.marks.update(frame, tip, this.palette, this.theme);
     this.surroundings.build(frame.length, frame.width, this.robot.sets, this.theme);
     const first = this.frame === undefined || this.frame.length !== frame.length;
     this.frame = frame;
@@ -92,8 +92,8 @@ export class Stage {
     const size = this.frame.length;
     const [a, e] = [radians(AZIMUTH), radians(ELEVATION)];
     const narrow = Math.max(1, 1.25 / this.camera.aspect);
-    const away = 4.3 * size * narrow;
-    this.controls.target.set(0, 0, 0.5 * size);
+    const away = 4.6 * size * narrow;
+    this.controls.target.set(0, 0, 0.42 * size);
     this.camera.position.set(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e));
     this.camera.position.multiplyScalar(away).add(this.controls.target);
     this.camera.near = size / 50;

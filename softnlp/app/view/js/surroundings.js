@@ -2,7 +2,8 @@
 import { THREE } from "nicegui-scene";
 import { Label } from "./label.js";
 
-const TICKS = 5; // lines of the grid that carry a number, about, across the natural length
+const TICKS = 5; // numbers across the ground, about
+const PLATE = 0.1; // thickness of the base plate, of D_r; it stands on the ground, so that the base is at z = 0
 
 // The nearest of 1, 2, 5 times a power of ten.
 export function roundStep(length) {
@@ -25,8 +26,8 @@ export class Surroundings {
     this.clear();
     this.theme = theme;
     const step = roundStep((2 * length) / TICKS / 2);
-    const half = step * Math.ceil((1.25 * length) / step);
-    this.half = half;
+    const half = step * Math.ceil((0.95 * length) / step);
+    this.floor = -PLATE * width;
     this.grid(step, half);
     this.ticks(step, half, length);
     this.plate(width);
@@ -39,38 +40,40 @@ export class Surroundings {
 
   grid(step, half) {
     const [faint, strong] = [[], []];
+    const z = this.floor;
     for (let at = -half; at <= half + step / 4; at += step / 2) {
       const lines = Math.abs(at / step - Math.round(at / step)) < 1e-6 ? strong : faint;
-      lines.push(at, -half, 0, at, half, 0, -half, at, 0, half, at, 0);
+      lines.push(at, -half, z, at, half, z, -half, at, z, half, at, z);
     }
     this.lines(faint, this.theme.grid, 0.55);
     this.lines(strong, this.theme.grid, 1);
-    this.lines([-half, 0, 0, half, 0, 0, 0, -half, 0, 0, half, 0], this.theme.gridStrong, 1);
+    this.lines([-half, 0, z, half, 0, z, 0, -half, z, 0, half, z], this.theme.gridStrong, 1);
   }
 
   ticks(step, half, length) {
-    const grey = { colour: this.theme.grey, size: 11 };
-    const out = 0.09 * length;
+    const grey = { colour: this.theme.grey, size: 12 };
+    const out = 0.08 * length;
+    const z = this.floor;
     for (let at = -half; at <= half + step / 4; at += step) {
       const text = `${Number(at.toPrecision(6))}`;
-      this.write(text, [at, -half - out, 0], grey);
-      if (at > -half) this.write(text, [half + out, at, 0], grey);
+      this.write(text, [at, -half - out, z], grey);
+      if (at > -half) this.write(text, [half + out, at, z], grey);
     }
-    this.write("x [mm]", [0, -half - 2.6 * out, 0], grey);
-    this.write("y [mm]", [half + 3 * out, 0, 0], grey);
+    this.write("x [mm]", [0, -half - 2.8 * out, z], grey);
+    this.write("y [mm]", [half + 3.2 * out, 0, z], grey);
     // A ruler upright in the far corner.
     const top = step * Math.ceil((1.2 * length) / step);
-    const ruler = [-half, half, 0, -half, half, top];
+    const ruler = [-half, half, z, -half, half, top];
     for (let at = 0; at <= top + step / 4; at += step) {
       ruler.push(-half, half, at, -half - 0.4 * out, half, at);
-      if (at > 0) this.write(`${Number(at.toPrecision(6))}`, [-half - out, half, at], grey);
+      this.write(`${Number(at.toPrecision(6))}`, [-half - out, half, at], grey);
     }
     this.write("z [mm]", [-half, half, top + out], grey);
     this.lines(ruler, this.theme.gridStrong, 1);
   }
 
   plate(width) {
-    const thickness = 0.16 * width;
+    const thickness = PLATE * width;
     const geometry = new THREE.CylinderGeometry(0.72 * width, 0.72 * width, thickness, 64);
     const material = new THREE.MeshPhongMaterial({ color: this.theme.plate, shininess: 12 });
     const mesh = new THREE.Mesh(geometry, material);

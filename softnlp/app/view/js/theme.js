@@ -2,7 +2,7 @@
 export const LIGHT = {
   background: "#f6f7f9",
   ink: "#222222",
-  grey: "#767676",
+  grey: "#5d646e",
   grid: "#d3d7dd",
   gridStrong: "#b3b9c2",
   plate: "#aeb4bd",
