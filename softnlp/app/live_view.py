@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from softnlp.app.stage import Stage
 from softnlp.app.view import frame_of
-from softnlp.app.view.frame import Wall
 from softnlp.errors import InputError
 from softnlp.results import Body
 from softnlp.scenario import Scenario
 from softnlp.studies.step import Contact, Pose, Run
+from softnlp.studies.wall import Wall
 from softnlp.units import BAR
 
 Array = NDArray[np.float64]
@@ -99,7 +99,9 @@ class LiveView:
                 tip_force=scenario.loads.tip_force,
                 tip_moment=scenario.loads.tip_moment,
                 gravity=scenario.loads.gravity,
-                wall=_wall(step.contact, step.pose),
+                wall=_wall(step.contact),
+                wall_force=0.0 if step.contact is None else step.contact.force,
+                tip_cap=0.0 if step.contact is None else step.contact.tip_cap,
             )
         )
 
@@ -112,13 +114,9 @@ def _body(pose: Pose) -> Body:
     return Body(pose.shape.position, pose.shape.rotation, pose.radii)
 
 
-def _wall(contact: Contact | None, pose: Pose) -> Wall | None:
-    """Return the wall where it is touched, or in front of the tip; None where the chambers alone are held."""
-    if contact is None or not contact.normal.any():
-        return None
-    tip = pose.tip_position + contact.tip_cap * pose.tip_rotation[:, 2]
-    ahead = contact.normal @ (tip - contact.wall_point)
-    return Wall(tip - ahead * contact.normal, contact.normal, contact.force)
+def _wall(contact: Contact | None) -> Wall | None:
+    """Return the wall of a step; None where the chambers alone are held."""
+    return Wall(contact.wall_point, contact.normal) if contact is not None and contact.normal.any() else None
 
 
 def _listed(pressure: Array) -> str:
