@@ -1,0 +1,5 @@
+from nicegui import ui
+
+
+def workspace_tab(stage):
+    ui.label("x")
