@@ -1,5 +1,0 @@
-from nicegui import ui
-
-
-def identify_tab(stage):
-    ui.label("x")

@@ -1,5 +1,0 @@
-from nicegui import ui
-
-
-def inverse_tab(stage):
-    ui.label("x")

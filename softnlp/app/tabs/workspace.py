@@ -1,5 +1,0 @@
-from nicegui import ui
-
-
-def workspace_tab(stage):
-    ui.label("x")
