@@ -120,7 +120,9 @@ def inline(values: Mapping[str, Any]) -> InlineTable:
     """Return constants as a table on one line, which may stand anywhere in [material]."""
     table = tomlkit.inline_table()
     table.update(dict(values))
-    return table
+    written = tomlkit.value(table.as_string())  # what was read keeps its spaces in a copy of the document
+    assert isinstance(written, InlineTable)
+    return written
 
 
 def constants_of_rows(rows: Sequence[tuple[str, float | None]]) -> tuple[dict[str, float], str]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
-from softnlp.app.fields import number_field, say_beside
+from softnlp.app.fields import number_field, say_beside, typed
 from softnlp.app.material_figure import LAW_NAMES, MEASURES, law_name, mark_pose, material_figure
 from softnlp.app.material_state import (
     Form,
@@ -98,9 +98,8 @@ class _MaterialPanel:
             self.formula = ui.textarea(
                 "Engineering stress [MPa] =", on_change=lambda event: self._text("formula", event.value)
             )
-            self.formula.props(
-                f"{_LOOK} autogrow debounce=300 maxlength={MAX_LENGTH} spellcheck=false input-class=font-mono data-testid=material-formula"
-            )
+            look = f"{_LOOK} autogrow debounce=300 maxlength={MAX_LENGTH} spellcheck=false input-class=font-mono"
+            self.formula.props(f"{look} data-testid=material-formula")
             self.formula.classes("w-full").without_auto_validation().mark("material.formula")
             ui.label("Of stretch and the constants below; 0 at stretch 1, rising.").classes(_SMALL)
             self.rows = ConstantRows(self._rows_changed)
@@ -171,7 +170,7 @@ class _MaterialPanel:
             self.session.change("material", "model", event.value)
 
     def _text(self, key: str, value: Any) -> None:
-        text = str(value or "").encode("utf-8", "replace").decode()
+        text = typed(value)
         form = form_of(self._table)
         if (form == "library") or (form == "constants" and key != "name") or text == self._table.get(key, ""):
             return

@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
-from softnlp.app.fields import number_field, say_beside, tell_problem
+from softnlp.app.fields import number_field, say_beside, tell_problem, typed
 from softnlp.app.redraw import Redraw
 from softnlp.app.robot_state import (
     OWN,
@@ -88,7 +88,9 @@ class _RobotPanel:
     def _drawing(self) -> None:
         self.picture = ui.html(sanitize=False).classes("w-full").props("data-testid=robot-section")
         self.picture.mark("robot.section")
-        self.caption = ui.label().classes("text-xs opacity-80 w-full").props("data-testid=robot-caption")
+        self.caption = (
+            ui.label().classes("text-xs opacity-80 w-full").props("data-testid=robot-caption").mark("robot.caption")
+        )
         self.stretched = ui.switch("At the stretch of the pose", on_change=lambda: self._draw())
         self.stretched.props("dense size=sm data-testid=robot-stretched").classes("text-xs").mark("robot.stretched")
 
@@ -174,7 +176,7 @@ class _RobotPanel:
         self.session.change_all("robot", table)
 
     def _named(self, event: Any) -> None:
-        name = str(event.value or "").encode("utf-8", "replace").decode()
+        name = typed(event.value)
         if self._shown_choice() == OWN and name != self._table.get("name", ""):
             self.session.change("robot", "name", name or None)
 
