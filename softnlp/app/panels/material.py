@@ -70,7 +70,7 @@ class _MaterialPanel:
         session.on_scenario(self._changed)
         session.on_pressure(self.move)
         on_dark(self._draw)
-        self._changed()
+        self._show()
         self._draw()
 
     # --- controls -----------------------------------------------------------------------------------------------------
@@ -214,6 +214,10 @@ class _MaterialPanel:
 
     def _changed(self) -> None:
         """Show the document; the curves follow a moment later."""
+        self._show()
+        self.redraw()
+
+    def _show(self) -> None:
         table = self._table
         if table.get("file") != self.file:
             self.file = table.get("file")
@@ -240,7 +244,6 @@ class _MaterialPanel:
         for field, value in zip(self.fitted, self._fitted_shown(), strict=True):
             _put(field, value)
         self._say()
-        self.redraw()
 
     def _show_names(self, table: Mapping[str, Any], form: Form) -> None:
         name, model = table.get("name"), table.get("model")

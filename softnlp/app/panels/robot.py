@@ -67,7 +67,7 @@ class _RobotPanel:
         self.redraw = Redraw(self.root, self._draw)
         session.on_scenario(self._changed)
         session.on_pressure(self._pose_changed)
-        self._changed()
+        self._show()
         self._draw()
 
     # --- controls -----------------------------------------------------------------------------------------------------
@@ -197,6 +197,10 @@ class _RobotPanel:
 
     def _changed(self) -> None:
         """Show the document; the drawing follows a moment later."""
+        self._show()
+        self.redraw()
+
+    def _show(self) -> None:
         state, chosen, changed = robot_state(self.session.document), self._shown_choice(), changed_keys(self._table)
         self.choice.set_value(chosen)
         self.own_name.set_visibility(chosen == OWN)
@@ -209,7 +213,6 @@ class _RobotPanel:
             switch.set_value(rule in state.allowed)
         self._note_latest()
         self._say(state)
-        self.redraw()
 
     def _note_latest(self) -> None:
         """Find out which one value changed since the last time."""
