@@ -127,7 +127,7 @@ class Document:
             for name in [key for key in wanted if key in every and key not in schema.model_fields]:
                 wanted.remove(name)
             for name, values in _NEEDED.get(study, {}).items():
-                if name not in wanted:
+                if name not in wanted and not (name == "workspace" and "pressure" in wanted):
                     wanted[name] = _new_table(values)
             _without_second_source(study, wanted)
         if wanted.get("study") != study:

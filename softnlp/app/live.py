@@ -8,13 +8,12 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.contact_settings import ContactSettings
+from softnlp.contact_settings import ContactSettings, ContactTask
 from softnlp.quantities import Model
 from softnlp.rod import Loads
 from softnlp.scenario import Scenario
 from softnlp.studies.arc import arc_pose, unloaded_arc
 from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.blocked_grid import Blocked
 from softnlp.studies.pose_grid import Solved
 from softnlp.studies.statics import PoseSolver
 from softnlp.studies.step import Pose, Run, Step
@@ -39,7 +38,6 @@ class LivePoses:
         self._poses: dict[Hashable, PoseSolver] = {}
         self._blocked: dict[Hashable, BlockedSolver] = {}
         self._near: Solved | None = None
-        self._near_blocked: Blocked | None = None
         self._near_kind: Hashable = None
 
     def pose(self, scenario: Scenario, pressure: Array) -> tuple[Run, Pose | None]:
@@ -53,8 +51,10 @@ class LivePoses:
             self._near, self._near_kind = solved or self._near, _kind(scenario)
             return _run("forward", scenario, step), self._ghost(solver, scenario, step)
 
-    def blocked(self, scenario: Scenario, pressure: Array) -> Run:
-        """Return a run of one step of the blocked force at a pressure (sets,) [Pa], with the wall of the scenario.
+    def blocked(self, scenario: Scenario, pressure: Array) -> tuple[Run, Pose | None]:
+        """Return a run of one step of the blocked force at a pressure (sets,) [Pa], and the free shape there.
+
+        The step is that of `softnlp.blocked_force`, or of `softnlp.constrained_pose` where there is no wall.
 
         Raises
         ------
@@ -62,11 +62,15 @@ class LivePoses:
             Where the wall does not fit the pressures.
         """
         assert scenario.contact is not None
+        constrained = isinstance(scenario.task, ContactTask) and scenario.task.constrained
         with self._lock:
-            solver = self._blocked_solver(scenario, scenario.contact)
-            wall = standing_wall(solver.poses, scenario.contact, np.atleast_2d(pressure), scenario.loads)
-            step, self._near_blocked = solver.solve(pressure, scenario.loads, wall, None)
-            return _run("blocked-force", scenario, step)
+            solver = self._blocked_solver(scenario, scenario.contact, not constrained)
+            wall = None
+            if not constrained:
+                wall = standing_wall(solver.poses, scenario.contact, np.atleast_2d(pressure), scenario.loads)
+            step, _ = solver.solve(pressure, scenario.loads, wall)
+        free = None if step.contact is None else step.contact.free
+        return _run("blocked-force", scenario, step), free
 
     def _start(self, scenario: Scenario) -> Solved | None:
         """Return the last pose, where it is one of the same kind of problem."""
@@ -79,11 +83,11 @@ class LivePoses:
             self._poses[kind] = PoseSolver(model_of(scenario), scenario.numerics)
         return self._poses[kind].with_model(model_of(scenario))
 
-    def _blocked_solver(self, scenario: Scenario, contact: ContactSettings) -> BlockedSolver:
-        kind = (_kind(scenario), contact.closure)
+    def _blocked_solver(self, scenario: Scenario, contact: ContactSettings, wall: bool) -> BlockedSolver:
+        kind = (_kind(scenario), contact.closure, wall)
         if kind not in self._blocked:
             self._blocked.clear()
-            self._blocked[kind] = BlockedSolver(model_of(scenario), scenario.numerics, contact)
+            self._blocked[kind] = BlockedSolver(model_of(scenario), scenario.numerics, contact, wall=wall)
         return self._blocked[kind].with_contact(contact).with_model(model_of(scenario))
 
     def _ghost(self, solver: PoseSolver, scenario: Scenario, step: Step) -> Pose | None:

@@ -14,11 +14,15 @@ from softnlp.app.view import frame_of
 from softnlp.errors import InputError
 from softnlp.results import Body
 from softnlp.scenario import Scenario
-from softnlp.studies.step import Pose, Run
+from softnlp.studies.step import Contact, Pose, Run
 from softnlp.studies.wall import Wall
 from softnlp.units import BAR
 
 Array = NDArray[np.float64]
+
+
+_PATIENCE_S = 0.6  # of a person, before the page says that it works
+_SOLVING = "Solving …"
 
 
 class LiveView:
@@ -58,12 +62,13 @@ class LiveView:
         scenario, pressure = session.scenario, session.pressure.copy()
         if scenario is None or len(pressure) != scenario.robot.chamber_sets:
             return
+        solve = session.live.blocked if session.document.study == "blocked-force" else session.live.pose
+        task = asyncio.create_task(asyncio.to_thread(solve, scenario, pressure))
+        if not (await asyncio.wait({task}, timeout=_PATIENCE_S))[0]:
+            with self._client:
+                self._say(_SOLVING)
         try:
-            if session.document.study == "blocked-force" and scenario.contact is not None:
-                run = await asyncio.to_thread(session.live.blocked, scenario, pressure)
-                ghost = None if run.steps[0].contact is None else run.steps[0].contact.free
-            else:
-                run, ghost = await asyncio.to_thread(session.live.pose, scenario, pressure)
+            run, ghost = await task
         except InputError as error:
             with self._client:
                 self._say(str(error))
@@ -85,7 +90,6 @@ class LiveView:
         if self._last is None or not np.array_equal(self._last[1], pressure) or self._last[0] is not scenario:
             self._say("")
         self._last = (scenario, pressure)
-        contact = step.contact
         self._stage.view.show(
             frame_of(
                 scenario.robot,
@@ -95,7 +99,9 @@ class LiveView:
                 tip_force=scenario.loads.tip_force,
                 tip_moment=scenario.loads.tip_moment,
                 gravity=scenario.loads.gravity,
-                wall=None if contact is None or not contact.normal.any() else Wall(contact.wall_point, contact.normal),
+                wall=_wall(step.contact),
+                wall_force=0.0 if step.contact is None else step.contact.force,
+                tip_cap=0.0 if step.contact is None else step.contact.tip_cap,
             )
         )
 
@@ -106,6 +112,11 @@ class LiveView:
 
 def _body(pose: Pose) -> Body:
     return Body(pose.shape.position, pose.shape.rotation, pose.radii)
+
+
+def _wall(contact: Contact | None) -> Wall | None:
+    """Return the wall of a step; None where the chambers alone are held."""
+    return Wall(contact.wall_point, contact.normal) if contact is not None and contact.normal.any() else None
 
 
 def _listed(pressure: Array) -> str:

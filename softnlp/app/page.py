@@ -80,6 +80,8 @@ def build_page(session: Session) -> None:
             results = ResultsPanel(lambda: bool(dark.value))
             ui.separator()
             _studies(stage, tabs, chosen)
+            ui.separator()
+            results.details()
 
     def say(words: str) -> None:
         message.set_text(words)
