@@ -240,6 +240,17 @@ def test_forms_are_changed_on_the_page_and_nothing_typed_is_lost() -> None:
     use(material_panel, person)
 
 
+def test_a_silicone_is_said_to_be_wrong_while_the_robot_is_too() -> None:
+    async def person(user: User, session: Session) -> None:
+        session.change("robot", "length_mm", -1.0)
+        put(user, "material.density_kg_m3", -5.0)
+        assert session.problem is not None
+        assert session.problem.table == "robot"
+        assert "positive" in control(user, "material.density_kg_m3").props["error-message"]
+
+    use(material_panel, person)
+
+
 def test_a_formula_that_is_no_formula_leaves_the_page_alive() -> None:
     async def person(user: User, session: Session) -> None:
         put(user, "material.form", "formula")

@@ -48,6 +48,7 @@ class _MaterialPanel:
         self.session = session
         self.dark = dark
         self.stretch = PoseStretch(session)
+        self.seen = session.document
         self.left: dict[Form, dict[str, Any]] = {}
         self.measure = "engineering_stress"
         self.constants: dict[str, ui.number] = {}
@@ -105,10 +106,10 @@ class _MaterialPanel:
             self.rows = ConstantRows(self._rows_changed)
 
     def _numbers(self) -> None:
-        field = number_field(
+        self.density = number_field(
             self.session, "material", "density_kg_m3", "Density", "kg/m³", default=lambda: self._density(), step=10
         )
-        field.props("data-testid=material-density_kg_m3")
+        self.density.props("data-testid=material-density_kg_m3")
         with ui.row().classes("w-full no-wrap gap-2") as self.fitted_box:
             self.fitted: list[ui.number] = []
             for k, label in enumerate(("Fitted from stretch", "to stretch")):
@@ -219,6 +220,9 @@ class _MaterialPanel:
 
     def _show(self) -> None:
         table = self._table
+        if self.session.document is not self.seen:  # another scenario was opened
+            self.seen = self.session.document
+            self.left.clear()
         if table.get("file") != self.file:
             self.file = table.get("file")
             self.entries = known_silicones(self.session.document, self.session.folder)
@@ -289,13 +293,14 @@ class _MaterialPanel:
             (self.own_name if own else self.silicone, "name"),
             (self.own_law if self.state.form == "formula" else self.law, "model"),
             (self.formula, "formula"),
+            (self.density, "density_kg_m3"),
         )
         for element, key in beside:
             say_beside(element, said.pop(key, "") if element.visible else "")
         left = []
         for key, message in said.items():
             name = key.removeprefix("constants.")
-            left.append(f"{name}: {message}" if name not in ("", "constants", "density_kg_m3") else message)
+            left.append(f"{name}: {message}" if name not in ("", "constants") else message)
         if self.state.form == "constants":
             for key, field in self.constants.items():
                 field.props.set_bool("error", f"constants.{key}" in said)
@@ -305,7 +310,6 @@ class _MaterialPanel:
                 self.rows.say(key.removeprefix("constants."), message)
         for end in self.fitted:
             end.props.set_bool("error", "fitted_stretch" in said)
-        left = [] if list(said) == ["density_kg_m3"] else left  # its own field says it
         self.error.set_text(" ".join(left))
         self.error.set_visibility(bool(left))
 

@@ -40,6 +40,7 @@ _LABELS = {
 """Label and step of each dimension."""
 _WALL = "minimum_wall_mm"
 _RULES = {"wall_thickness": "Allow thin walls", "chamber_overlap": "Allow chambers that overlap"}
+_STRETCHED = "At the stretch of the pose"
 _RESTING = 1.0 + 1e-9  # below it a section looks as made
 
 
@@ -91,7 +92,7 @@ class _RobotPanel:
         self.caption = (
             ui.label().classes("text-xs opacity-80 w-full").props("data-testid=robot-caption").mark("robot.caption")
         )
-        self.stretched = ui.switch("At the stretch of the pose", on_change=lambda: self._draw())
+        self.stretched = ui.switch(_STRETCHED, on_change=lambda: self._draw())
         self.stretched.props("dense size=sm data-testid=robot-stretched").classes("text-xs").mark("robot.stretched")
 
     def _dimensions(self) -> None:
@@ -245,6 +246,7 @@ class _RobotPanel:
     def _draw(self) -> None:
         state = robot_state(self.session.document)
         stretch = self._drawn_stretch()
+        self.stretched.set_text(_STRETCHED if stretch == 1.0 else f"{_STRETCHED}, {stretch:.3g}")
         if state.robot is None:
             self._no_drawing("")
             return
@@ -255,10 +257,8 @@ class _RobotPanel:
             return
         self.picture.set_content(drawing)
         wall = (state.robot.chamber_wall + state.robot.outer_wall) / MILLIMETRE
-        words = ["As made" if stretch == 1.0 else f"Stretch {stretch:.3g}", f"wall {wall:.3g} mm"]
-        if 1.0 <= state.touching < inf:
-            words.append(f"chambers touch above stretch {state.touching:.3g}")
-        self.caption.set_text(" · ".join(words))
+        touch = f" · chambers touch from stretch {state.touching:.3g}" if 1.0 <= state.touching < inf else ""
+        self.caption.set_text(f"Wall {wall:.3g} mm{touch}")
 
     def _no_drawing(self, why: str) -> None:
         self.picture.set_content('<div class="text-center text-xs opacity-70 py-8">No section to draw</div>')
