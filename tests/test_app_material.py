@@ -321,5 +321,11 @@ def test_a_materials_file_beside_the_scenario_is_the_choice() -> None:
         put(user, "material.density_kg_m3", 1000.0)
         assert session.document.get("material", "file") == "my_silicone.toml"
         assert session.scenario.material.density == 1000.0
+        put(user, "material.form", "formula")
+        session.open((SCENARIOS / "D25L60_one_set.toml").read_text(), "another.toml")
+        put(user, "material.form", "formula")
+        put(user, "material.form", "library")
+        assert session.document.table("material")["name"] == "Ecoflex 00-50"  # nothing of the first scenario is left
+        assert control(user, "material.name").options == list(LIBRARY)
 
     use(material_panel, person)

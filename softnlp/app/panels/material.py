@@ -54,6 +54,7 @@ class _MaterialPanel:
         self.constants: dict[str, ui.number] = {}
         self.entries: Mapping[str, MaterialEntry] = known_silicones(session.document, session.folder)
         self.file = session.document.get("material", "file")
+        self.read_from: Any = None
         self.state = self._read()
         with ui.column().classes("w-full gap-2").props("data-testid=material-panel") as self.root:
             self.form = ui.toggle(dict(_FORMS), on_change=self._form_chosen)
@@ -203,7 +204,13 @@ class _MaterialPanel:
     # --- what is shown ------------------------------------------------------------------------------------------------
 
     def _read(self) -> MaterialState:
-        return material_state(self.session.document, self.entries, self.session.folder, self.session.problem)
+        """Read the silicone again where something about it changed; most changes are of other tables."""
+        problem = self.session.problem
+        read_from = (self._table, str(problem) if problem is not None and problem.table == "material" else "")
+        if read_from == self.read_from:
+            return self.state
+        self.read_from = read_from
+        return material_state(self.session.document, self.entries, self.session.folder, problem)
 
     def _density(self) -> float:
         models = getattr(self._entry(), "models", {}) if form_of(self._table) == "library" else {}
@@ -223,7 +230,8 @@ class _MaterialPanel:
         if self.session.document is not self.seen:  # another scenario was opened
             self.seen = self.session.document
             self.left.clear()
-        if table.get("file") != self.file:
+            self.read_from = None
+        if table.get("file") != self.file or self.read_from is None:
             self.file = table.get("file")
             self.entries = known_silicones(self.session.document, self.session.folder)
         self.state = self._read()
