@@ -69,7 +69,7 @@ def material_figure(
     layout["annotations"] = [
         {
             "text": f"fitted {fitted[0]:.3g} to {fitted[1]:.3g}",
-            "x": fitted[1], "y": 1, "yref": "paper", "xanchor": "right", "yanchor": "top", "showarrow": False,
+            "x": fitted[1], "y": 0, "yref": "paper", "xanchor": "right", "yanchor": "bottom", "showarrow": False,
             "font": {"size": 10}, "opacity": 0.8,
         }
     ]  # fmt: skip

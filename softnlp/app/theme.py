@@ -17,7 +17,7 @@ body {{ overflow: hidden; }}
 .body--dark .softnlp-surface {{ background: #1d1d1d !important; color: #e6e6e6 !important; }}
 .body--dark {{ --q-primary: {_SKY} !important; }}
 .body--dark {{ --q-negative: #FF8A80 !important; }}
-.body--dark .bg-primary {{ color: #111 !important; }}
+@layer overrides {{ .body--dark .bg-primary {{ color: #111 !important; }} }}
 .softnlp-panel .q-item {{ padding: 2px 0; min-height: 32px; }}
 .softnlp-panel .nicegui-expansion-content {{ padding: 0; }}
 """
