@@ -16,7 +16,8 @@ body {{ overflow: hidden; }}
 .softnlp-surface {{ background: white !important; color: #222 !important; }}
 .body--dark .softnlp-surface {{ background: #1d1d1d !important; color: #e6e6e6 !important; }}
 .body--dark {{ --q-primary: {_SKY} !important; }}
-.body--dark .bg-primary {{ color: #111 !important; }}
+.body--dark {{ --q-negative: #FF8A80 !important; }}
+@layer overrides {{ .body--dark .bg-primary {{ color: #111 !important; }} }}
 .softnlp-panel .q-item {{ padding: 2px 0; min-height: 32px; }}
 .softnlp-panel .nicegui-expansion-content {{ padding: 0; }}
 """
