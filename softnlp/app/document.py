@@ -33,7 +33,7 @@ sequence_bar = [[0.8, 0.0, 0.0]]
 
 _NEEDED: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "workspace": {"workspace": {"levels": 8, "to_bar": 1.2}},
-    "inverse": {"target": {"tip_position_mm": [[-20.0, 0.0, 55.0]]}, "bounds": {"pressure_bar": [0.0, 1.5]}},
+    "inverse": {"target": {"tip_position_mm": [[-20.0, 0.0, 62.0]]}, "bounds": {"pressure_bar": [0.0, 1.5]}},
 }
 """Tables without which a study cannot start, as the app first shows them."""
 _TOP = ""

@@ -18,7 +18,7 @@ from softnlp.errors import InputError, SoftnlpError
 
 T = TypeVar("T")
 
-MOST_ROWS = 2000
+MOST_ROWS = 400
 """Rows of a table on the page; the CSV has all."""
 
 
@@ -129,7 +129,7 @@ class NumberTable:
         with ui.column().classes("w-full gap-1") as self._box:
             self._table = ui.table(columns=[], rows=[], row_key="row").props("dense flat bordered wrap-cells")
             self._table.classes("w-full softnlp-numbers").style(f"max-height: {height}").mark(marker)
-            self._table.props(f"data-testid={marker} hide-bottom :rows-per-page-options=[0] virtual-scroll")
+            self._table.props(f"data-testid={marker} hide-bottom :rows-per-page-options=[0]")
             self._table.add_slot(
                 "body-cell",
                 "<q-td :props=\"props\" :class=\"props.row.failed ? 'text-negative' : ''\">{{ props.value }}</q-td>",
