@@ -59,7 +59,7 @@ class RunRow:
             return None
         self.running, self.progress, self._watch = True, Progress(), watch
         self._show(True)
-        self.say("")
+        self.say("Starting…")
         try:
             return await in_background(work, self.progress)
         except Stopped:
@@ -95,8 +95,10 @@ class RunRow:
         self._timer.active = running
 
     def _look(self) -> None:
+        begun = self.progress.fraction > 0
+        self._bar.props(remove="indeterminate") if begun else self._bar.props("indeterminate")
         self._bar.set_value(self.progress.fraction)
-        self.say("Stopping after this step…" if self.progress.stopping else self.progress.text)
+        self.say("Stopping after this step…" if self.progress.stopping else self.progress.text or "Working…")
         if self._watch is not None:
             self._watch()
 
@@ -225,6 +227,7 @@ class Chart:
         layout = figure_layout(any(bool(mode.value) for mode in self._modes))
         for axis, label in zip(("xaxis", "yaxis"), self._labels, strict=True):
             layout[axis]["title"] = {"text": label, "standoff": 6}
+        layout["legend"] = {"orientation": "h", "yanchor": "bottom", "y": 1.02, "xanchor": "left", "x": 0.0}
         layout["showlegend"] = len([t for t in self._traces if t.get("name")]) > 1
         self._plot.update_figure({"data": self._traces, "layout": layout, "config": figure_config()})
 
@@ -261,18 +264,24 @@ def csv_drop(marker: str, label: str, take: Callable[[str, bytes], None]) -> ui.
         except SoftnlpError as error:
             ui.notify(plain_words(error), type="warning", multi_line=True)
 
+    ui.add_css(_DROP)
     box = ui.upload(
         label=label,
         on_upload=arrived,
-        on_rejected=lambda: ui.notify(_too_large("this file"), type="warning"),
+        on_rejected=lambda: ui.notify(_too_large("This file"), type="warning"),
         max_file_size=LARGEST_FILE,
         auto_upload=True,
     )
-    return (
-        box.props(f"accept=.csv,text/csv flat bordered hide-upload-btn data-testid={marker}")
-        .classes("w-full")
-        .mark(marker)
-    )
+    box.props(f"accept=.csv,text/csv flat bordered color=transparent text-color=primary data-testid={marker}")
+    return box.classes("w-full softnlp-drop").mark(marker)
+
+
+# The list of files is empty at once: a dropped one is named by the tab.
+_DROP = """
+.softnlp-drop .q-uploader__list, .softnlp-drop .q-uploader__subtitle { display: none }
+.softnlp-drop .q-uploader__header { background: transparent !important; color: inherit !important }
+.softnlp-drop .q-uploader__title { font-size: 0.85rem; font-weight: 400; line-height: 1.3 }
+"""
 
 
 def _too_large(name: str) -> str:
