@@ -74,9 +74,11 @@ LAYERS = (
     *("workspace.columns", "workspace.sink", "workspace.dataset", "workspace.run"),
     *("workspace.read", "workspace.boundary", "workspace.dexterity", "workspace.summary", "workspace.export"),
     *("workspace.measured", "workspace.again", "workspace.comparison"),
+    "palette",
+    "mesh",
     *("plots", "cli", "__main__"),
 )
-MIXED = ("results", "plots", "cli")
+MIXED = ("results", "mesh", "plots", "cli")
 LONGEST_FILE = 400
 HEAVY = ("casadi", "numpy", "scipy", "matplotlib", "pydantic", "cyclopts", "rich", "xarray", "h5netcdf", "h5py")
 

@@ -93,8 +93,11 @@ def choice_field(
 def tell_problem(session: Session, field: ui.element, table: str, *keys: str) -> None:
     """Put what is wrong with a key beside its field, or take it away."""
     problem = session.problem
-    if problem is not None and problem.table == table and (problem.key or "").split(".")[0] in keys:
-        words = " ".join(problem.message.split()).replace('"', "'")
-        field.props(f'error error-message="{words}"')
-    else:
-        field.props(remove="error error-message")
+    about = problem is not None and problem.table == table and (problem.key or "").split(".")[0] in keys
+    say_beside(field, problem.message if about and problem is not None else "")
+
+
+def say_beside(field: ui.element, message: str) -> None:
+    """Put a message beside a field, or take away the one there for ""; a person's text in it is shown as it is."""
+    field.props.set_bool("error", bool(message))
+    field.props.set_optional("error-message", message or None)

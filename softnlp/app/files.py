@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from nicegui import events, ui
 
 from softnlp.app.session import LARGEST_FILE, Session
 from softnlp.errors import InputError, SoftnlpError
+from softnlp.results import Body
+from softnlp.robot import Robot
+from softnlp.studies.step import Pose
 
 
 def saved(session: Session) -> tuple[str, bytes]:
@@ -80,9 +83,8 @@ def open_files(session: Session, files: Sequence[tuple[str, bytes]]) -> None:
     session.open(text, name, {other: data for other, data in files if other != name})
 
 
-def mesh_menu(session: Session, pose: Any) -> None:
+def mesh_menu(session: Session, pose: Callable[[], Pose | None]) -> None:
     """Build menu entries that offer the body as a mesh. pose : a function that gives the pose shown, or None."""
-    from softnlp.mesh import body_solid, mesh_bytes, undeformed_solid
 
     def offer(kind: str, deformed: bool) -> None:
         shown = pose()
@@ -91,8 +93,8 @@ def mesh_menu(session: Session, pose: Any) -> None:
             ui.notify("no solved pose to export", type="warning")
             return
         try:
-            solid = body_solid(scenario.robot, shown) if deformed else undeformed_solid(scenario.robot)
-            ui.download.content(mesh_bytes(solid, kind), f"{'deformed' if deformed else 'undeformed'}.{kind}")
+            name = f"{'deformed' if deformed else 'undeformed'}.{kind}"
+            ui.download.content(mesh_bytes(scenario.robot, shown if deformed else None, session.folder / name), name)
         except SoftnlpError as error:
             ui.notify(str(error), type="negative")
 
@@ -100,3 +102,20 @@ def mesh_menu(session: Session, pose: Any) -> None:
         for kind in ("stl", "glb"):
             item = ui.menu_item(f"{words}, {kind.upper()}", on_click=lambda k=kind, d=deformed: offer(k, d))
             item.props(f"data-testid=mesh-{'deformed' if deformed else 'undeformed'}-{kind}")
+
+
+def mesh_bytes(robot: Robot, pose: Pose | None, file: Path) -> bytes:
+    """Return the body of a pose, or the body as it is moulded for None, in the format of a file's suffix.
+
+    Raises
+    ------
+    InputError
+        Where the extra mesh is not installed, or the body passes through itself so that it cannot be made solid.
+    """
+    from softnlp.mesh import body_solid, mould_body, write_solids
+
+    if pose is None:
+        solid = mould_body(robot)
+    else:
+        solid = body_solid(robot, Body(pose.shape.position, pose.shape.rotation, pose.radii))
+    return write_solids([solid], robot, file).read_bytes()

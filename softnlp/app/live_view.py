@@ -14,7 +14,7 @@ from softnlp.app.view import frame_of
 from softnlp.errors import InputError
 from softnlp.results import Body
 from softnlp.scenario import Scenario
-from softnlp.studies.step import Pose, Run
+from softnlp.studies.step import Contact, Pose, Run
 from softnlp.studies.wall import Wall
 from softnlp.units import BAR
 
@@ -90,7 +90,6 @@ class LiveView:
         if self._last is None or not np.array_equal(self._last[1], pressure) or self._last[0] is not scenario:
             self._say("")
         self._last = (scenario, pressure)
-        contact = step.contact
         self._stage.view.show(
             frame_of(
                 scenario.robot,
@@ -100,7 +99,9 @@ class LiveView:
                 tip_force=scenario.loads.tip_force,
                 tip_moment=scenario.loads.tip_moment,
                 gravity=scenario.loads.gravity,
-                wall=None if contact is None or not contact.normal.any() else Wall(contact.wall_point, contact.normal),
+                wall=_wall(step.contact),
+                wall_force=0.0 if step.contact is None else step.contact.force,
+                tip_cap=0.0 if step.contact is None else step.contact.tip_cap,
             )
         )
 
@@ -111,6 +112,11 @@ class LiveView:
 
 def _body(pose: Pose) -> Body:
     return Body(pose.shape.position, pose.shape.rotation, pose.radii)
+
+
+def _wall(contact: Contact | None) -> Wall | None:
+    """Return the wall of a step; None where the chambers alone are held."""
+    return Wall(contact.wall_point, contact.normal) if contact is not None and contact.normal.any() else None
 
 
 def _listed(pressure: Array) -> str:

@@ -32,6 +32,7 @@ WIDTH, HEIGHT = 306, 300
 _DASHES = {"linear": "dot", "neo-hookean": "dash", "mooney-rivlin": "solid", "yeoh": "dashdot", "ogden": "longdash"}
 _COLOURS = {law: colour(k) for k, law in enumerate(("mooney-rivlin", "neo-hookean", "yeoh", "ogden", "linear"))}
 _OWN = colour(5)
+_LEGEND = {"orientation": "h", "x": 0, "y": -0.24, "yanchor": "top", "font": {"size": 11}}
 _CLIP = 1.25  # the figure reaches this far beyond the values in the fitted range
 _LARGEST = 1e12  # kPa; beyond it nothing is drawn
 
@@ -42,7 +43,7 @@ def law_name(law: str) -> str:
 
 
 def material_figure(
-    chosen: Material | None, others: Mapping[str, Material], measure: str, stretch: float | None, dark: bool | None
+    chosen: Material | None, others: Mapping[str, Material], measure: str, stretch: float | None, dark: bool
 ) -> dict[str, Any]:
     """Return a plotly figure of a silicone's laws, the chosen one bold, and where a pose stands on it.
 
@@ -58,10 +59,11 @@ def material_figure(
         own = f"{law_name(chosen.law.name)}, own" if chosen.law.name in others and chosen.law.name in thin else ""
         curves.append(_curve(chosen, own or law_name(chosen.law.name), x, measure, bold=True))
     layout = figure_layout(dark)
+    layout |= {"margin": {"l": 8, "r": 8, "t": 8, "b": 8}, "legend": dict(_LEGEND)}
     layout |= {"width": WIDTH, "height": HEIGHT, "shapes": _fit(fitted), "showlegend": True, "hovermode": "closest"}
-    layout["xaxis"] |= {"title": layout["xaxis"]["title"] | {"text": "stretch [-]"}, "range": [x[0], x[-1]]}
-    layout["yaxis"] |= {"title": layout["yaxis"]["title"] | {"text": MEASURES[measure][1]}}
-    layout["yaxis"]["range"] = _reach([*([chosen] if chosen is not None else []), *thin.values()], x, measure)
+    drawn = [*([] if chosen is None else [chosen]), *thin.values()]
+    layout["xaxis"] |= _axis("stretch [-]", [float(x[0]), float(x[-1])])
+    layout["yaxis"] |= _axis(MEASURES[measure][1], _reach(drawn, x, measure))
     layout["annotations"] = [
         {
             "text": f"fitted {fitted[0]:.3g} to {fitted[1]:.3g}",
@@ -98,12 +100,16 @@ def _curve(material: Material, name: str, x: NDArray[np.float64], measure: str, 
         "y": _values(material, x, measure),
         "line": {
             "color": _COLOURS.get(law, _OWN),
-            "width": 3.5 if bold else 1.2,
+            "width": 3.5 if bold else 1.4,
             "dash": "solid" if bold else _DASHES.get(law, "solid"),
         },
         "opacity": 1.0 if bold else 0.85,
         "hovertemplate": "%{y:.4g} kPa at %{x:.3f}<extra>" + _plain(name) + "</extra>",
     }
+
+
+def _axis(title: str, reach: list[float] | None) -> dict[str, Any]:
+    return {"title": {"text": title, "font": {"size": 12}, "standoff": 6}, "range": reach}
 
 
 def _pose() -> dict[str, Any]:

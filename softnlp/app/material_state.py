@@ -1,9 +1,10 @@
-"""What a document says of its silicone, also where that is none: what can be drawn, what is wrong, and its other forms."""
+"""What a document says of its silicone, also where that is none: what can be drawn, what is wrong, other forms."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -68,10 +69,8 @@ def known_silicones(document: Document, folder: Path) -> Mapping[str, MaterialEn
     """Return the silicones of the document's materials file where it names one that can be read, else the library's."""
     file = document.get("material", "file")
     if isinstance(file, str):
-        try:
+        with suppress(InputError):
             return load_materials(folder / file)
-        except InputError:
-            pass
     return load_materials()
 
 
@@ -158,10 +157,8 @@ def _place(error: InputError) -> str:
     """Return the key of [material] that an error is about, "" for the whole table."""
     key = error.key or ""
     if key.startswith('"'):
-        try:
+        with suppress(ValueError):
             key = str(json.loads(key))
-        except ValueError:
-            pass
     if error.table == "material.constants":
         return f"constants.{key}" if key else "constants"
     return key

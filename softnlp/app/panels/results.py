@@ -52,7 +52,7 @@ class ResultsPanel:
             self._certificate.mark("certificate")
         self._warnings = ui.label().classes("text-xs text-orange-800 dark:text-orange-300 whitespace-pre-line")
         self._warnings.props("data-testid=warnings")
-        self._numbers = ui.grid(columns="1fr auto 52px").classes("w-full gap-x-2 gap-y-0 text-sm")
+        self._numbers = ui.grid(columns="1fr auto 52px").classes("w-full gap-x-2 gap-y-0 text-sm mt-2")
         with ui.row().classes("w-full gap-1"):
             ui.button("Copy", icon="content_copy", on_click=self._copy).props(
                 "flat dense no-caps size=sm data-testid=results-copy"

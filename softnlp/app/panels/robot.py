@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
-from softnlp.app.fields import number_field, tell_problem
+from softnlp.app.fields import number_field, say_beside, tell_problem
 from softnlp.app.redraw import Redraw
 from softnlp.app.robot_state import (
     OWN,
@@ -142,7 +142,7 @@ class _RobotPanel:
     def _line(self, key: str) -> None:
         line = (
             ui.label()
-            .classes("col-span-2 text-xs text-negative leading-tight whitespace-pre-line -mt-1")
+            .classes("col-span-2 text-xs text-red-700 dark:text-red-300 leading-tight whitespace-pre-line -mt-1")
             .mark(f"robot.{key}.said")
         )
         line.props(f"data-testid=robot-{key}-said role=alert")
@@ -154,7 +154,11 @@ class _RobotPanel:
             switch = ui.switch(_RULES[rule], on_change=lambda event, rule=rule: self._allow(rule, event.value))
             switch.props(f"dense size=sm data-testid=robot-allow-{rule}").classes("text-xs")
             self.rules[rule] = switch.mark(f"robot.allow.{rule}")
-        self.warning = ui.label().classes("text-xs text-warning leading-tight").props("data-testid=robot-warning")
+        self.warning = (
+            ui.label()
+            .classes("text-xs text-orange-800 dark:text-orange-300 leading-tight")
+            .props("data-testid=robot-warning")
+        )
         self.warning.mark("robot.warning")
 
     # --- what a person does -------------------------------------------------------------------------------------------
@@ -220,12 +224,11 @@ class _RobotPanel:
             message = messages.get(key, "")
             line.set_text(f"{_LABELS.get(key, ('Thinnest wall',))[0]}: {message}" if message else "")
             line.set_visibility(bool(message))
-            self.fields[key].props(remove="error error-message")  # the line has room for it, the field has not
-            if message:
-                self.fields[key].props("error")
+            say_beside(self.fields[key], "")  # the line has room for it, the field has not
+            self.fields[key].props.set_bool("error", bool(message))
         tell_problem(self.session, self.own_name, "robot", "name")
         if messages or state.broken:  # then that is what stands below
-            self.own_name.props(remove="error error-message")
+            say_beside(self.own_name, "")
         allowed = [v.message for v in state.broken if v.rule in state.allowed]
         self.warning.set_text(" ".join(f"{m[0].upper()}{m[1:]}." for m in allowed))
         self.warning.set_visibility(bool(allowed))
