@@ -73,7 +73,7 @@ async def _visit() -> None:
         user.find(marker="target.add").click()
         enter(user, "target.pick", True)
         view.handlers[0]((0.0, 0.0, 170.123456))
-        assert session.document.get("target", POSITION) == [[-12.0, 5.0, 62.0], [0.0, 0.0, 170.12]]
+        assert session.document.get("target", POSITION) == [[-12.0, 5.0, 62.0], [0.0, 0.0, 170.1]]
         # the second is out of reach; the nearest place is on the axis, as it must be
         await ran(user, "inverse", "A click on a row")
         table = field(user, "inverse.table")

@@ -86,6 +86,18 @@ def test_colours_run_from_the_smallest_number_to_the_largest() -> None:
     assert np.isfinite(cloud.colours_of(np.ones(3))).all()
 
 
+def test_a_line_of_sight_meets_the_point_in_front(tmp_path: Path) -> None:
+    """From straight above the axis, the poses with equal pressures stand behind each other."""
+    found = swept(tmp_path, {"levels": 3, "to_bar": 1.0})
+    assert found.workspace is not None
+    above = cloud.in_sight(found.workspace, (0.0, 0.0, 300.0), (0.0, 0.0, -1.0))
+    below = cloud.in_sight(found.workspace, (0.0, 0.0, -300.0), (0.0, 0.0, 1.0))
+    assert above is not None
+    assert below is not None
+    np.testing.assert_allclose(found.workspace.pressure[[above, below]], [[1.0 * BAR] * 3, [0.0] * 3])
+    assert cloud.in_sight(found.workspace, (0.0, 0.0, 300.0), (0.0, 0.0, 1.0)) is None
+
+
 async def _visit() -> None:
     async with opened(workspace_tab, "workspace") as (user, stage):
         view = stage.view
@@ -98,12 +110,14 @@ async def _visit() -> None:
         numbers = {row["c0"]: row["c1"] for row in field(user, "workspace.numbers").rows}
         assert numbers["Solved"] == "64"
         # a click near a tip gives its pressures, when that is wanted
-        place = tuple(view.points_shown[37] + [0.01, 0.0, -0.01])
+        tip = view.points_shown[37]
+        viewer = np.array([150.0, -200.0, 90.0])
+        along = (tip - viewer) / np.linalg.norm(tip - viewer)
         before = stage.session.pressure.copy()
-        view.handlers[0](place)
+        view.handlers[0](tuple(viewer), tuple(along))
         assert (stage.session.pressure == before).all()
         enter(user, "workspace.pick", True)
-        view.handlers[0](place)
+        view.handlers[0](tuple(viewer), tuple(along))
         scenario = stage.session.scenario
         assert scenario is not None
         run, _ = stage.session.live.pose(scenario, stage.session.pressure)

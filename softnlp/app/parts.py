@@ -188,9 +188,9 @@ def _is_number(rows: Sequence[Sequence[Any]], column: int) -> bool:
 
 
 # Plotly refuses to be resized while its tab is hidden, which nobody needs to know.
-_QUIET_RESIZE = """<script>window.softnlpQuiet ??= window.addEventListener("unhandledrejection", event => {
+_QUIET_RESIZE = """window.softnlpQuiet ??= window.addEventListener("unhandledrejection", event => {
 if (String(event.reason?.message ?? event.reason).startsWith("Resize must be passed")) event.preventDefault();
-}) ?? true;</script>"""
+}) ?? true"""
 
 
 class Chart:
@@ -204,7 +204,7 @@ class Chart:
         self._place = ui.element("div").classes("w-full").style(f"height: {height}")
         self._place.set_visibility(False)
         self._plot: ui.plotly | None = None
-        ui.add_body_html(_QUIET_RESIZE)
+        ui.run_javascript(_QUIET_RESIZE)
         self._modes = list(ElementFilter(kind=ui.dark_mode))
         on_dark(self._draw)
 

@@ -35,6 +35,8 @@ QUANTITIES: Mapping[str, tuple[str, str]] = {
     "blocked_force_N": ("Blocked force", "N"),
     MANIPULABILITY: ("Manipulability, by differences", "mm³/bar³"),
 }
+Point = tuple[float, float, float]
+_ALIKE = 0.004  # angle between points that the eye cannot tell apart [rad]
 _CUBIC_CENTIMETRE = 1e-6
 _SQUARE_CENTIMETRE = 1e-4
 
@@ -169,10 +171,19 @@ def gradient() -> str:
     return f"linear-gradient(to right, {', '.join(to_hex(c) for c in colormaps['viridis'](np.linspace(0, 1, 12)))})"
 
 
-def nearest(workspace: Workspace, place_mm: tuple[float, float, float]) -> int | None:
-    """Return the number (from 0) of the solved pose whose tip is nearest to a place; None without any."""
-    away = np.linalg.norm(workspace.tip_position - np.asarray(place_mm) * MILLIMETRE, axis=1)
-    return int(np.nanargmin(away)) if np.isfinite(away).any() else None
+def in_sight(workspace: Workspace, viewer_mm: Point, along: Point) -> int | None:
+    """Return the number (from 0) of the solved pose whose tip is nearest to a line of sight; None without any.
+
+    Of those that the eye cannot tell apart it is the one in front. along : a unit vector.
+    """
+    offset = workspace.tip_position / MILLIMETRE - np.asarray(viewer_mm)
+    depth = offset @ np.asarray(along)
+    seen = np.flatnonzero(np.isfinite(depth) & (depth > 0))
+    if not seen.size:
+        return None
+    aside = np.linalg.norm(offset[seen] - depth[seen, None] * np.asarray(along), axis=1) / depth[seen]
+    near = seen[aside <= aside.min() + _ALIKE]
+    return int(near[np.argmin(depth[near])])
 
 
 def lines(swept: Swept) -> list[Line]:

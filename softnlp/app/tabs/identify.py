@@ -65,7 +65,7 @@ def identify_tab(stage: Stage) -> None:
             session.document.replace(chosen, aside[chosen])
         session.reread()
 
-    with ui.column().classes("w-full gap-3"):
+    with ui.column().classes("w-full gap-3 pt-2"):
         toggle = ui.toggle({"measurements": "Robots", "tensile": "Tensile test"}, value=kind()).mark("identify.kind")
         toggle.props("dense no-caps unelevated spread data-testid=identify.kind").classes("w-full")
         boxes: dict[str, ui.column] = {}

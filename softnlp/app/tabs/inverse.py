@@ -38,7 +38,7 @@ MOST_EDITED = 25
 
 def inverse_tab(stage: Stage) -> None:
     """Build the tab in the current slot."""
-    with ui.column().classes("w-full gap-3"):
+    with ui.column().classes("w-full gap-3 pt-2"):
         _Targets(stage)
         _bounds(stage.session)
         ui.separator()
@@ -118,17 +118,16 @@ class _Targets:
             return
         for row in range(count):
             for place, key in enumerate(KINDS[kind]):
-                unit = "mm" if key == POSITION else ""
                 with ui.row().classes("w-full items-center gap-2 no-wrap"):
                     ui.label(str(row + 1) if place == 0 else "").classes("w-4 text-sm opacity-70 shrink-0")
                     for column, axis in enumerate("xyz"):
                         name = f"target.{key}.{row}.{column}"
                         field = ui.number(
-                            axis if key == POSITION else f"{axis} of axis",
+                            f"{axis} [mm]" if key == POSITION else f"{axis} of axis",
                             value=rows_of(self._table(), key)[row][column],
                             on_change=lambda event, at=(key, row, column): self._typed(at, event.value),
                         )
-                        field.props(f'dense outlined debounce=250 hide-bottom-space suffix="{unit}" data-testid={name}')
+                        field.props(f"dense outlined debounce=250 hide-bottom-space data-testid={name}")
                         field.classes("grow min-w-0").mark(name)
                         self._fields[key, row, column] = field
                     bin_ = ui.button(icon="close", on_click=lambda _, row=row: self._put(without(self._table(), row)))

@@ -68,7 +68,7 @@ def with_picked(table: Table, place_mm: Sequence[float]) -> Table:
     if kind_of(table) == "direction":
         return table
     rows = rows_of(table, POSITION)
-    return {**table, POSITION: [*rows[:-1], [round(float(x), 2) for x in place_mm]]}
+    return {**table, POSITION: [*rows[:-1], [round(float(x), 1) for x in place_mm]]}
 
 
 def words_of(step: Step) -> str:

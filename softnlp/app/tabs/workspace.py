@@ -23,7 +23,7 @@ _FIRST = {"levels": 8, "samples": 1000}
 
 def workspace_tab(stage: Stage) -> None:
     """Build the tab in the current slot."""
-    with ui.column().classes("w-full gap-3"):
+    with ui.column().classes("w-full gap-3 pt-2"):
         _source(stage.session)
         _Sweep(stage)
 
@@ -97,7 +97,7 @@ class _Sweep:
                 self._low = ui.label("").mark("workspace.low")
                 self._bar = ui.element("div").classes("grow h-3 rounded")
                 self._high = ui.label("").mark("workspace.high")
-            self._pick = ui.switch("A click in the view takes the pressures of the nearest point").props("dense")
+            self._pick = ui.switch("A click on a point takes its pressures").props("dense")
             self._pick.props("data-testid=workspace.pick").mark("workspace.pick")
             self._picked = ui.label("").classes("text-sm").mark("workspace.picked")
             with ui.row().classes("gap-1"):
@@ -109,7 +109,7 @@ class _Sweep:
                     button.props(f"dense flat no-caps size=sm data-testid=workspace.{name}")
         self._found.set_visibility(False)
         self._table = NumberTable("workspace.numbers", height="24rem")
-        stage.view.on_pick(self._clicked)
+        stage.view.on_sight(self._clicked)
         stage.session.on_scenario(self._follow)
 
     async def _begin(self) -> None:
@@ -173,11 +173,11 @@ class _Sweep:
         elif here and not self._drawn and self._swept is not None:
             self._draw()
 
-    def _clicked(self, place: tuple[float, float, float]) -> None:
+    def _clicked(self, viewer: cloud.Point, along: cloud.Point) -> None:
         session, swept = self._stage.session, self._swept
         if session.document.study != STUDY or not self._pick.value or swept is None or swept.workspace is None:
             return
-        number = cloud.nearest(swept.workspace, place)
+        number = cloud.in_sight(swept.workspace, viewer, along)
         if number is None or swept.workspace.pressure.shape[1] != len(session.pressure):
             return
         pressure = swept.workspace.pressure[number]
