@@ -22,7 +22,7 @@ class NotedView:
         self.points_shown: Any = None
         self.colours_shown: Any = None
         self.targets_shown: Any = None
-        self.handlers: list[Callable[[tuple[float, float, float]], None]] = []
+        self.handlers: list[Callable[..., None]] = []
 
     def points(self, xyz_mm: Any, colours: Any = None) -> None:
         self.points_shown = None if xyz_mm is None else np.asarray(xyz_mm)
@@ -32,6 +32,9 @@ class NotedView:
         self.targets_shown = None if xyz_mm is None else np.asarray(xyz_mm)
 
     def on_pick(self, handler: Callable[[tuple[float, float, float]], None]) -> None:
+        self.handlers.append(handler)
+
+    def on_sight(self, handler: Callable[[Any, Any], None]) -> None:
         self.handlers.append(handler)
 
 

@@ -70,7 +70,7 @@ LAYERS = (
     *("scenario_workspace", "scenario_inverse", "scenario_identify", "scenario_design"),
     "scenario",
     *("workspace.planning", "workspace.journal", "workspace.worker", "workspace.pool"),
-    *("runner_blocked", "runner_inverse", "runner", "runner_design", "results"),
+    *("runner_blocked", "runner_inverse", "runner", "runner_design", "runner_identify", "results"),
     *("workspace.columns", "workspace.sink", "workspace.dataset", "workspace.run"),
     *("workspace.read", "workspace.boundary", "workspace.dexterity", "workspace.summary", "workspace.export"),
     *("workspace.measured", "workspace.again", "workspace.comparison"),

@@ -14,6 +14,7 @@ from softnlp.errors import InputError
 from softnlp.reading import one_line
 from softnlp.robot import ROBOTS
 from softnlp.scenario_check import SCHEMAS
+from softnlp.scenario_identify import UNUSED_BY_TENSILE
 
 START = """\
 title = "D25L60, one chamber set"
@@ -33,7 +34,7 @@ sequence_bar = [[0.8, 0.0, 0.0]]
 
 _NEEDED: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "workspace": {"workspace": {"levels": 8, "to_bar": 1.2}},
-    "inverse": {"target": {"tip_position_mm": [[-20.0, 0.0, 55.0]]}, "bounds": {"pressure_bar": [0.0, 1.5]}},
+    "inverse": {"target": {"tip_position_mm": [[-20.0, 0.0, 62.0]]}, "bounds": {"pressure_bar": [0.0, 1.5]}},
 }
 """Tables without which a study cannot start, as the app first shows them."""
 _TOP = ""
@@ -130,6 +131,7 @@ class Document:
                 if name not in wanted and not (name == "workspace" and "pressure" in wanted):
                     wanted[name] = _new_table(values)
             _without_second_source(study, wanted)
+            _without_a_robots_tables(study, wanted)
         if wanted.get("study") != study:
             wanted["study"] = study
         return tomlkit.dumps(wanted)
@@ -180,3 +182,10 @@ def _without_second_source(study: str, tables: tomlkit.TOMLDocument) -> None:
         own = tables.get("workspace")
         if isinstance(own, Mapping) and ("levels" in own or "samples" in own):
             tables.pop("pressure", None)
+
+
+def _without_a_robots_tables(study: str, tables: tomlkit.TOMLDocument) -> None:
+    """Take what a tensile test does not use out of it."""
+    if study == "identify" and "tensile" in tables and "measurements" not in tables:
+        for name in UNUSED_BY_TENSILE:
+            tables.pop(name, None)

@@ -18,7 +18,7 @@ from softnlp.errors import InputError, SoftnlpError
 
 T = TypeVar("T")
 
-MOST_ROWS = 2000
+MOST_ROWS = 400
 """Rows of a table on the page; the CSV has all."""
 
 
@@ -59,7 +59,7 @@ class RunRow:
             return None
         self.running, self.progress, self._watch = True, Progress(), watch
         self._show(True)
-        self.say("")
+        self.say("Starting…")
         try:
             return await in_background(work, self.progress)
         except Stopped:
@@ -95,8 +95,10 @@ class RunRow:
         self._timer.active = running
 
     def _look(self) -> None:
+        begun = self.progress.fraction > 0
+        self._bar.props(remove="indeterminate") if begun else self._bar.props("indeterminate")
         self._bar.set_value(self.progress.fraction)
-        self.say("Stopping after this step…" if self.progress.stopping else self.progress.text)
+        self.say("Stopping after this step…" if self.progress.stopping else self.progress.text or "Working…")
         if self._watch is not None:
             self._watch()
 
@@ -129,7 +131,7 @@ class NumberTable:
         with ui.column().classes("w-full gap-1") as self._box:
             self._table = ui.table(columns=[], rows=[], row_key="row").props("dense flat bordered wrap-cells")
             self._table.classes("w-full softnlp-numbers").style(f"max-height: {height}").mark(marker)
-            self._table.props(f"data-testid={marker} hide-bottom :rows-per-page-options=[0] virtual-scroll")
+            self._table.props(f"data-testid={marker} hide-bottom :rows-per-page-options=[0]")
             self._table.add_slot(
                 "body-cell",
                 "<q-td :props=\"props\" :class=\"props.row.failed ? 'text-negative' : ''\">{{ props.value }}</q-td>",
@@ -186,9 +188,9 @@ def _is_number(rows: Sequence[Sequence[Any]], column: int) -> bool:
 
 
 # Plotly refuses to be resized while its tab is hidden, which nobody needs to know.
-_QUIET_RESIZE = """<script>window.softnlpQuiet ??= window.addEventListener("unhandledrejection", event => {
+_QUIET_RESIZE = """window.softnlpQuiet ??= window.addEventListener("unhandledrejection", event => {
 if (String(event.reason?.message ?? event.reason).startsWith("Resize must be passed")) event.preventDefault();
-}) ?? true;</script>"""
+}) ?? true"""
 
 
 class Chart:
@@ -202,7 +204,7 @@ class Chart:
         self._place = ui.element("div").classes("w-full").style(f"height: {height}")
         self._place.set_visibility(False)
         self._plot: ui.plotly | None = None
-        ui.add_body_html(_QUIET_RESIZE)
+        ui.run_javascript(_QUIET_RESIZE)
         self._modes = list(ElementFilter(kind=ui.dark_mode))
         on_dark(self._draw)
 
@@ -225,6 +227,7 @@ class Chart:
         layout = figure_layout(any(bool(mode.value) for mode in self._modes))
         for axis, label in zip(("xaxis", "yaxis"), self._labels, strict=True):
             layout[axis]["title"] = {"text": label, "standoff": 6}
+        layout["legend"] = {"orientation": "h", "yanchor": "bottom", "y": 1.02, "xanchor": "left", "x": 0.0}
         layout["showlegend"] = len([t for t in self._traces if t.get("name")]) > 1
         self._plot.update_figure({"data": self._traces, "layout": layout, "config": figure_config()})
 
@@ -261,18 +264,24 @@ def csv_drop(marker: str, label: str, take: Callable[[str, bytes], None]) -> ui.
         except SoftnlpError as error:
             ui.notify(plain_words(error), type="warning", multi_line=True)
 
+    ui.add_css(_DROP)
     box = ui.upload(
         label=label,
         on_upload=arrived,
-        on_rejected=lambda: ui.notify(_too_large("this file"), type="warning"),
+        on_rejected=lambda: ui.notify(_too_large("This file"), type="warning"),
         max_file_size=LARGEST_FILE,
         auto_upload=True,
     )
-    return (
-        box.props(f"accept=.csv,text/csv flat bordered hide-upload-btn data-testid={marker}")
-        .classes("w-full")
-        .mark(marker)
-    )
+    box.props(f"accept=.csv,text/csv flat bordered color=transparent text-color=primary data-testid={marker}")
+    return box.classes("w-full softnlp-drop").mark(marker)
+
+
+# The list of files is empty at once: a dropped one is named by the tab.
+_DROP = """
+.softnlp-drop .q-uploader__list, .softnlp-drop .q-uploader__subtitle { display: none }
+.softnlp-drop .q-uploader__header { background: transparent !important; color: inherit !important }
+.softnlp-drop .q-uploader__title { font-size: 0.85rem; font-weight: 400; line-height: 1.3 }
+"""
 
 
 def _too_large(name: str) -> str:

@@ -43,7 +43,7 @@ MOST_CURVES = 7  # colours that can be told apart
 
 def blocked_tab(stage: Stage) -> None:
     """Build the tab in the current slot."""
-    with ui.column().classes("w-full gap-3"):
+    with ui.column().classes("w-full gap-3 pt-2"):
         _contact_fields(stage.session)
         ui.separator()
         _Curves(stage.session)

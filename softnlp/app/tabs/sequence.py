@@ -35,7 +35,7 @@ STUDY = "forward"
 
 def sequence_tab(stage: Stage) -> None:
     """Build the tab in the current slot."""
-    with ui.column().classes("w-full gap-3"):
+    with ui.column().classes("w-full gap-3 pt-2"):
         _Source(stage.session)
         _StepSlider(stage.session)
         ui.separator()
@@ -189,7 +189,7 @@ class _StepSlider:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        with ui.row().classes("w-full items-center gap-3 no-wrap") as self._row:
+        with ui.row().classes("w-full items-center gap-3 pr-3 no-wrap") as self._row:
             self._label = ui.label("").classes("text-sm shrink-0")
             self._slider = ui.slider(min=1, max=2, value=1, on_change=self._moved).props("snap dense")
             self._slider.mark("sequence.step").props("data-testid=sequence.step")

@@ -35,7 +35,9 @@ class RobotView(Element, component="robot_view.js", esm={"softnlp-view": "js"}):
         self._number = 0
         self._frame: Frame | None = None
         self._marks: dict[str, Any] = {}
+        self._pickers: list[Callable[[GenericEventArguments], Any]] = []
         self.on("ready", self._begin)
+        self.on("pick", self._picked)  # now: a listener that comes later has the browser make the view anew
 
     def show(self, frame: Frame) -> int:
         """Draw a frame in place of the last one; return its number, which the DOM node has as data-frame once drawn."""
@@ -77,7 +79,11 @@ class RobotView(Element, component="robot_view.js", esm={"softnlp-view": "js"}):
         The point lies on the upright plane through the base's axis that faces the viewer; seen steeply from above or
         below, on the level plane through the tip.
         """
-        self.on("pick", lambda event: handler(_point(event)))
+        self._pickers.append(lambda event: handler(_point(event)))
+
+    def on_sight(self, handler: Callable[[Point, Point], Any]) -> None:
+        """Call a handler where the view is clicked, with the viewer's place [mm] and the direction of sight, a unit."""
+        self._pickers.append(lambda event: handler(_vector(event, "from"), _vector(event, "along")))
 
     async def picture(self) -> bytes:
         """Return the view as a PNG of twice its size on the screen.
@@ -99,6 +105,10 @@ class RobotView(Element, component="robot_view.js", esm={"softnlp-view": "js"}):
     def download(self, name: str = "robot.png") -> None:
         """Have the browser save the picture under a name."""
         self._call("download", name)
+
+    def _picked(self, event: GenericEventArguments) -> None:
+        for tell in self._pickers:
+            tell(event)
 
     def _begin(self) -> None:
         """Send everything to a browser that has just made the element, for the first time or again."""
@@ -131,4 +141,9 @@ class RobotView(Element, component="robot_view.js", esm={"softnlp-view": "js"}):
 
 def _point(event: GenericEventArguments) -> Point:
     x, y, z = (float(event.args[axis]) for axis in "xyz")
+    return x, y, z
+
+
+def _vector(event: GenericEventArguments, name: str) -> Point:
+    x, y, z = (float(number) for number in event.args[name])
     return x, y, z

@@ -164,17 +164,17 @@ export class Stage {
     canvas.addEventListener("pointerup", (event) => {
       if (start === null || Math.hypot(event.clientX - start[0], event.clientY - start[1]) > CLICK) return;
       const box = canvas.getBoundingClientRect();
-      const point = this.pick(
+      const picked = this.pick(
         (2 * (event.clientX - box.left)) / box.width - 1,
         1 - (2 * (event.clientY - box.top)) / box.height,
       );
-      if (point !== null) this.emit("pick", { x: point.x, y: point.y, z: point.z });
+      if (picked !== null) this.emit("pick", picked);
     });
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     canvas.addEventListener("webglcontextrestored", () => this.request());
   }
 
-  // Screen coordinates from -1 to 1 to a point on the plane through the robot that faces the viewer.
+  // Screen coordinates from -1 to 1 to a point on the plane through the robot that faces the viewer, and the line of sight.
   pick(x, y) {
     const towards = this.camera.getWorldDirection(new THREE.Vector3());
     const steep = Math.abs(towards.z) > Math.sin(radians(STEEP));
@@ -183,7 +183,10 @@ export class Stage {
     const caster = new THREE.Raycaster();
     caster.setFromCamera(new THREE.Vector2(x, y), this.camera);
     const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(normal, through);
-    return caster.ray.intersectPlane(plane, new THREE.Vector3());
+    const point = caster.ray.intersectPlane(plane, new THREE.Vector3());
+    if (point === null) return null;
+    const { origin, direction } = caster.ray;
+    return { x: point.x, y: point.y, z: point.z, from: origin.toArray(), along: direction.toArray() };
   }
 
   dispose() {
