@@ -92,27 +92,39 @@ export class Stage {
     this.arrows.update(frame.arrows, this.theme);
     this.marks.update(frame, tip, this.palette, this.theme);
     this.surroundings.build(frame.length, frame.width, this.robot.sets, this.theme);
-    const first = this.frame === undefined || this.frame.length !== frame.length;
+    const before = this.frame;
     this.frame = frame;
     this.tip = [...tip.subarray(0, 3)];
-    if (first) this.reset();
+    if (before === undefined) this.reset();
+    else if (before.length !== frame.length) this.grow(frame.length / before.length);
     this.rescale();
+  }
+
+  // A longer robot is seen from further away, in the direction in which the user left the camera.
+  grow(factor) {
+    this.camera.position.multiplyScalar(factor);
+    this.controls.target.multiplyScalar(factor);
+    this.limit(this.frame.length);
+  }
+
+  limit(size) {
+    this.camera.near = size / 50;
+    this.camera.far = 60 * size;
+    this.camera.updateProjectionMatrix();
+    this.controls.minDistance = 0.3 * size;
+    this.controls.maxDistance = 25 * size;
   }
 
   reset() {
     if (this.frame === undefined) return;
     const size = this.frame.length;
     const [a, e] = [radians(AZIMUTH), radians(ELEVATION)];
-    const narrow = Math.max(1, 1.25 / this.camera.aspect);
+    const narrow = Math.max(1, 1.35 / this.camera.aspect);
     const away = 4.6 * size * narrow;
     this.controls.target.set(0, 0, 0.42 * size);
     this.camera.position.set(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e));
     this.camera.position.multiplyScalar(away).add(this.controls.target);
-    this.camera.near = size / 50;
-    this.camera.far = 60 * size;
-    this.controls.minDistance = 0.3 * size;
-    this.controls.maxDistance = 25 * size;
-    this.camera.updateProjectionMatrix();
+    this.limit(size);
     this.controls.update();
     this.request();
   }
