@@ -5,12 +5,8 @@ from __future__ import annotations
 import base64
 import io
 import json
-import os
+import re
 import shutil
-import socket
-import subprocess
-import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -21,6 +17,7 @@ from arc_runs import arc_pose
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+from view_browser import FLAGS, STAGE, drawn, served
 
 from softnlp import robot
 from softnlp.app.view import Frame, frame_of
@@ -33,14 +30,7 @@ from softnlp.results import Body
 from softnlp.studies.wall import Wall
 
 ARM = robot("D25L60")
-PAGE = Path(__file__).with_name("view_page.py")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-FLAGS = [
-    *("--headless=new", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking"),
-    *("--disable-component-update", "--disable-sync"),
-    *("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
-]
-STAGE = "getElement(Number(document.querySelector('.softnlp-view').id.slice(1))).stage"
 
 
 def bent(pressure: tuple[float, ...] = (8e4, 2e4, 0.0), points: int = 31) -> Body:
@@ -197,6 +187,25 @@ def test_the_view_sends_what_is_new_when_there_is_a_browser(monkeypatch: pytest.
     assert sorted(made.names()) == ["points", "robot", "show", "targets"]
 
 
+def test_the_document_s_example_runs() -> None:
+    pytest.importorskip("nicegui", reason="the extra gui is not installed")
+    from sybil import Document
+    from sybil.parsers.markdown import PythonCodeBlockParser
+
+    document = Path(__file__).parents[1] / "docs" / "view.md"
+    (example,) = Document.parse(str(document), PythonCodeBlockParser()).examples()
+    example.evaluate()
+    from nicegui import ui
+    from nicegui.client import Client
+
+    with Client(ui.page("/test-document")) as client:
+        example.namespace["page"]()
+    (view,) = [element for element in client.elements.values() if type(element).__name__ == "RobotView"]
+    assert view._frame.robot.name == "D25L60"
+    for call in re.findall(r"`(\w+)\(", document.read_text()):
+        assert hasattr(view, call) or call in {"frame_of", "RobotView", "run", "handler", "picture"}, call
+
+
 @pytest.fixture(scope="module")
 def server() -> Iterator[str]:
     """Serve a page with a view; yield its address."""
@@ -204,31 +213,8 @@ def server() -> Iterator[str]:
     pytest.importorskip("playwright", reason="playwright is not installed")
     if CHROMIUM is None:
         pytest.skip("there is no chromium on this machine")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    known = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
-    # NiceGUI would take a run below pytest for a test of its own.
-    environment = {k: v for k, v in os.environ.items() if not k.startswith("PYTEST_")} | {"PYTHONPATH": known}
-    process = subprocess.Popen(
-        [sys.executable, str(PAGE), str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment
-    )
-    try:
-        for _ in range(300):
-            try:
-                socket.create_connection(("127.0.0.1", port)).close()
-                break
-            except OSError:
-                assert process.poll() is None, "the page did not start"
-                time.sleep(0.1)
-        yield f"http://127.0.0.1:{port}/"
-    finally:
-        process.terminate()
-        process.wait()
-
-
-def drawn(page: Any, number: int) -> None:
-    page.wait_for_selector(f'.softnlp-view[data-frame="{number}"]', timeout=30_000)
+    with served() as address:
+        yield address
 
 
 def pixels(page: Any) -> np.ndarray:

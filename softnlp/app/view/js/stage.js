@@ -227,6 +227,7 @@ export class Stage {
     this.ghost?.dispose();
     for (const label of this.labels) label.dispose();
     this.renderer.dispose();
+    this.renderer.forceContextLoss(); // a browser has few of them
     this.renderer.domElement.remove();
   }
 }
