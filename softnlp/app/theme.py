@@ -55,6 +55,12 @@ def figure_config() -> dict[str, Any]:
     }
 
 
+def darkness() -> Callable[[], bool]:
+    """Return what tells whether the page of the current slot is dark."""
+    modes = list(ElementFilter(kind=ui.dark_mode))
+    return lambda: any(bool(mode.value) for mode in modes)
+
+
 def on_dark(redraw: Callable[[], None]) -> None:
     """Call a function after each turn of the page of the current slot from light to dark or back."""
     for mode in ElementFilter(kind=ui.dark_mode):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from nicegui import ui
@@ -26,7 +26,7 @@ from softnlp.app.panels.constant_rows import ConstantRows
 from softnlp.app.redraw import Redraw
 from softnlp.app.session import Session
 from softnlp.app.stretch import PoseStretch
-from softnlp.app.theme import on_dark
+from softnlp.app.theme import darkness, on_dark
 from softnlp.formula import MAX_LENGTH
 from softnlp.laws import LAWS
 from softnlp.materials import DENSITY, FITTED_STRETCH, MaterialEntry
@@ -36,17 +36,17 @@ _LOOK = "dense outlined hide-bottom-space"
 _SMALL = "text-xs opacity-80 w-full"
 
 
-def material_panel(session: Session, dark: Callable[[], bool] = lambda: False) -> None:
-    """Build the panel in the current slot. dark : whether the page is dark now."""
-    _MaterialPanel(session, dark)
+def material_panel(session: Session) -> None:
+    """Build the panel in the current slot."""
+    _MaterialPanel(session)
 
 
 class _MaterialPanel:
     """The controls of one page; forms that a person left are kept, so that nothing typed is lost."""
 
-    def __init__(self, session: Session, dark: Callable[[], bool]) -> None:
+    def __init__(self, session: Session) -> None:
         self.session = session
-        self.dark = dark
+        self.dark = darkness()
         self.stretch = PoseStretch(session)
         self.seen = session.document
         self.left: dict[Form, dict[str, Any]] = {}
