@@ -175,12 +175,12 @@ class _Source:
         """Take a file of pressures; one that cannot be read leaves the sequence as it was."""
         session, before = self._session, self._table()
         kept = session.keep(name, content)
-        self._asked_file = False
         session.change_all("pressure", {"file": kept})
         problem = session.problem
         if problem is not None and problem.table == "pressure":
             session.change_all("pressure", before)
             raise InputError(problem.message)
+        self._asked_file = False
         session.show_step(-1)
 
 
