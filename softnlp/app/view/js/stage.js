@@ -117,6 +117,10 @@ export class Stage {
 
   reset() {
     if (this.frame === undefined) return;
+    // What is left of the swing of a drag would go on after it.
+    this.controls.enableDamping = false;
+    this.controls.update();
+    this.controls.enableDamping = true;
     const size = this.frame.length;
     const [a, e] = [radians(AZIMUTH), radians(ELEVATION)];
     const narrow = Math.max(1, 1.35 / this.camera.aspect);
