@@ -123,7 +123,7 @@ export class Stage {
     this.controls.enableDamping = true;
     const size = this.frame.length;
     const [a, e] = [radians(AZIMUTH), radians(ELEVATION)];
-    const narrow = Math.max(1, 1.35 / this.camera.aspect);
+    const narrow = Math.max(1, 1.5 / this.camera.aspect);
     const away = 4.8 * size * narrow;
     this.controls.target.set(0, 0, 0.45 * size);
     this.camera.position.set(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e));
