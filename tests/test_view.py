@@ -286,6 +286,17 @@ def test_a_browser_draws_it_in_place_and_asks_nobody_else(server: str, tmp_path:
         assert [float(x) for x in page.inner_text("#picked").split()] == pytest.approx(
             page.evaluate(f"{STAGE}.controls.target.toArray()"), abs=0.5
         )  # the middle of the picture is where the camera looks, on the axis
+        camera = f"{STAGE}.camera.position.toArray()"
+        start, picked = page.evaluate(camera), page.inner_text("#picked")
+        page.mouse.move(box["x"] + 100, box["y"] + 100)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 200, box["y"] + 120, steps=4)
+        page.mouse.up()
+        page.wait_for_timeout(100)
+        assert np.linalg.norm(np.subtract(page.evaluate(camera), start)) > 10  # turned
+        assert page.inner_text("#picked") == picked  # a drag is no click
+        page.click("#reset")
+        page.wait_for_function(f"Math.hypot(...{camera}.map((x, k) => x - {start}[k])) < 1e-6")
         page.click("#picture")
         page.wait_for_function("document.querySelector('#said').innerText.startsWith('png')")
         assert page.inner_text("#said").split()[2] == "89504e470d0a1a0a"

@@ -117,11 +117,15 @@ export class Stage {
 
   reset() {
     if (this.frame === undefined) return;
+    // What is left of the swing of a drag would go on after it.
+    this.controls.enableDamping = false;
+    this.controls.update();
+    this.controls.enableDamping = true;
     const size = this.frame.length;
     const [a, e] = [radians(AZIMUTH), radians(ELEVATION)];
-    const narrow = Math.max(1, 1.35 / this.camera.aspect);
-    const away = 4.6 * size * narrow;
-    this.controls.target.set(0, 0, 0.42 * size);
+    const narrow = Math.max(1, 1.5 / this.camera.aspect);
+    const away = 4.8 * size * narrow;
+    this.controls.target.set(0, 0, 0.45 * size);
     this.camera.position.set(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e));
     this.camera.position.multiplyScalar(away).add(this.controls.target);
     this.limit(size);
