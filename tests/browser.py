@@ -89,6 +89,23 @@ class Watched:
         )
         return {key: text for key, text in found.items() if not key.startswith("equation.")}
 
+    def shows(self, key: str, value: float, within: float = 0.0) -> None:
+        """Wait until a number of the results is a value."""
+        for _ in range(60):
+            text = self.numbers().get(key, "–")
+            if text != "–" and abs(float(text) - value) <= within:
+                return
+            self.page.wait_for_timeout(250)
+        raise AssertionError(f"{key}: {text} instead of {value}")
+
+    def shows_again(self, numbers: dict[str, str]) -> None:
+        """Wait until the results are these."""
+        for _ in range(60):
+            if self.numbers() == numbers:
+                return
+            self.page.wait_for_timeout(250)
+        raise AssertionError(f"{self.numbers()} instead of {numbers}")
+
     def said(self) -> list[str]:
         """Return what the page says is wrong, beside fields and below the view, once it says something."""
         places = self.page.locator(".q-field__messages [role=alert], [data-testid=message]:visible")

@@ -42,15 +42,25 @@ def assert_same_as_the_command(tab: Watched, folder: Path) -> None:
     """Compare every number shown with that of the last step of the saved scenario, run by the command."""
     tab.settled()
     step = run_json(tab.saved(folder))["steps"][-1]
-    shown = tab.numbers()
+    for _ in range(20):  # a busy machine may still be drawing
+        differs = difference(tab.numbers(), step)
+        if not differs:
+            return
+        tab.page.wait_for_timeout(500)
+    raise AssertionError(differs)
+
+
+def difference(shown: dict[str, str], step: dict[str, Any]) -> str:
+    """Return what differs between numbers on the page and those of the command, "" for nothing."""
     compared = 0
     for key, text in shown.items():
         name, _, index = key.partition(".")
         if name in step:
             value = step[name][int(index)] if index else step[name]
-            assert shown_like(text, value), f"{key}: {text} on the page, {value} of the command"
+            if text == "–" or value is None or not shown_like(text, value):
+                return f"{key}: {text} on the page, {value} of the command"
             compared += 1
-    assert compared >= 12
+    return "" if compared >= 10 else f"only {compared} numbers are shown"
 
 
 def test_pressures_bend_the_robot_and_the_command_agrees(tab: Watched, tmp_path: Path) -> None:
@@ -73,8 +83,7 @@ def test_pressures_bend_the_robot_and_the_command_agrees(tab: Watched, tmp_path:
     tab.type("pressure-limit", "40")
     assert_same_as_the_command(tab, tmp_path)
     tab.press("pressure-zero")
-    tab.settled()
-    assert tab.numbers()["bending_angle_deg"] == "0.000"
+    tab.shows("bending_angle_deg", 0.0)
 
 
 def test_loads_coefficients_and_solver_reach_the_file(tab: Watched, tmp_path: Path) -> None:
@@ -244,8 +253,7 @@ def test_wild_input_leaves_the_page_alive_with_a_message(tab: Watched, tmp_path:
         assert tab.said(), f"{field} = {value!r}: nothing is said"
         tab.type(field, was)
         tab.settled()
-    tab.settled()
-    assert tab.numbers() == good
+    tab.shows_again(good)
     broken = {
         "broken.toml": b"study = [",
         "binary.toml": b"study\xff\xfe",
@@ -263,8 +271,7 @@ def test_wild_input_leaves_the_page_alive_with_a_message(tab: Watched, tmp_path:
         for button in tab.page.locator(".q-notification button").all():
             button.click()
         tab.page.wait_for_selector(".q-notification", state="detached")
-    tab.settled()
-    assert tab.numbers() == good
+    tab.shows_again(good)
 
 
 def run(tab: Watched, marker: str) -> str:
@@ -367,11 +374,9 @@ def test_a_blocked_force_and_its_curve(tab: Watched, tmp_path: Path) -> None:
     tab.type("blocked.target", "0.2")
     run(tab, "blocked.find")
     tab.press("blocked.use")
-    tab.settled()
-    assert float(tab.numbers()["blocked_force_N"]) == pytest.approx(0.2, abs=2e-3)
+    tab.shows("blocked_force_N", 0.2, within=2e-3)
     tab.page.locator("[data-testid='contact.mode'] button", has_text="Chambers held").click()
-    tab.settled()
-    assert tab.numbers()["blocked_force_N"] == "0.0000"
+    tab.shows("blocked_force_N", 0.0)
 
 
 def test_a_workspace_is_swept_stopped_and_shown(tab: Watched) -> None:
@@ -403,9 +408,8 @@ def test_a_target_is_reached(tab: Watched) -> None:
     tab.settled()
     run(tab, "inverse")
     tab.press("inverse.use")
-    tab.settled()
-    found = [float(tab.numbers()[f"tip_position_mm.{k}"]) for k in range(3)]
-    assert found == pytest.approx([-15, 6, 62], abs=0.01)
+    for k, value in enumerate((-15, 6, 62)):
+        tab.shows(f"tip_position_mm.{k}", value, within=0.01)
     tab.press("target.pick")
     box = tab.page.locator("[data-testid=view] canvas").bounding_box()
     tab.page.mouse.click(box["x"] + box["width"] * 0.45, box["y"] + box["height"] * 0.4)
