@@ -8,6 +8,7 @@ back and is drawn. Beside it stands the same way without solving: a frame that i
 from __future__ import annotations
 
 import argparse
+import os
 import socket
 import subprocess
 import sys
@@ -68,7 +69,9 @@ def served(*arguments: str) -> Iterator[tuple[str, float]]:
     port = free_port()
     began = time.perf_counter()
     command = [sys.executable, "-m", "softnlp", "gui", *arguments, "--no-browser", "--port", str(port)]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    # NiceGUI behaves otherwise where it believes itself under test
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTEST")}
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, env=environment)
     address = f"http://{HOST}:{port}/"
     try:
         while process.poll() is None:
@@ -77,6 +80,8 @@ def served(*arguments: str) -> Iterator[tuple[str, float]]:
                 break
             except OSError:
                 time.sleep(0.02)
+        else:
+            raise RuntimeError(f"softnlp gui ended with status {process.returncode}")
         yield address, time.perf_counter() - began
     finally:
         process.terminate()

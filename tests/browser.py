@@ -44,15 +44,31 @@ class Watched:
             panel.locator(".q-item").first.click()
             self.page.wait_for_timeout(400)
 
+    def value_becomes(self, testid: str, text: str) -> None:
+        """Wait until a field shows a text."""
+        found = f"document.querySelector(\"input[data-testid='{testid}']\").value === {json.dumps(text)}"
+        self.page.wait_for_function(found)
+
     def type(self, testid: str, value: str) -> None:
         """Put text into a field."""
         self.page.fill(f"input[data-testid='{testid}'], [data-testid='{testid}'] input", value)
 
     def choose(self, testid: str, words: str) -> None:
         """Choose an entry of a select by what it says."""
-        self.page.click(f"[data-testid='{testid}']")
-        self.page.locator(".q-menu .q-item", has_text=re.compile(re.escape(words))).first.click()
-        self.page.wait_for_timeout(150)
+        from playwright.sync_api import Error
+
+        entry = self.page.locator(".q-menu .q-item", has_text=re.compile(re.escape(words))).first
+        for _ in range(5):  # a list that opens while the page still moves closes again
+            self.page.click(f"[data-testid='{testid}']")
+            try:
+                entry.click(timeout=4000)
+            except Error:
+                self.page.keyboard.press("Escape")
+                self.page.wait_for_timeout(500)
+                continue
+            self.page.wait_for_timeout(200)
+            return
+        raise AssertionError(f"{testid} offers no {words!r}")
 
     def settled(self) -> None:
         """Wait until the pose shown is that of the controls: nothing changes for a while."""
@@ -71,7 +87,17 @@ class Watched:
             "() => Object.fromEntries([...document.querySelectorAll('[data-testid^=\"value-\"]')]"
             ".map(e => [e.dataset.testid.slice(6), e.textContent]))"
         )
-        return found
+        return {key: text for key, text in found.items() if not key.startswith("equation.")}
+
+    def said(self) -> list[str]:
+        """Return what the page says is wrong, beside fields and below the view, once it says something."""
+        places = self.page.locator(".q-field__messages [role=alert], [data-testid=message]:visible")
+        for _ in range(40):
+            words = [text for text in places.all_inner_texts() if text and not text.startswith("Solving")]
+            if words:
+                return words
+            self.page.wait_for_timeout(200)
+        return []
 
     def saved(self, folder: Path) -> Path:
         """Save what is on the screen and return the file."""

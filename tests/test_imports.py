@@ -76,9 +76,9 @@ LAYERS = (
     *("workspace.measured", "workspace.again", "workspace.comparison"),
     "palette",
     "mesh",
-    *("plots", "cli", "__main__"),
+    *("plots", "app", "cli", "__main__"),
 )
-MIXED = ("results", "mesh", "plots", "cli")
+MIXED = ("results", "mesh", "plots", "app", "cli")
 LONGEST_FILE = 400
 HEAVY = ("casadi", "numpy", "scipy", "matplotlib", "pydantic", "cyclopts", "rich", "xarray", "h5netcdf", "h5py")
 

@@ -53,10 +53,10 @@ def page(dark: bool = False) -> None:
     said = ui.label("").props("id=said")
 
     async def turn_round() -> None:
-        """Show sixty frames, each as soon as the last is drawn; say the median of show to drawn [ms]."""
+        """Show twenty frames, each as soon as the last is drawn; say the median of show to drawn [ms]."""
         taken = []
-        for k in range(60):
-            shown = frame(0.9, k / 60)
+        for k in range(20):
+            shown = frame(0.9, k / 20)
             start = perf_counter()
             number = view.show(shown)
             await ui.run_javascript(DRAWN % number, timeout=10)

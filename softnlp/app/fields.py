@@ -101,3 +101,8 @@ def say_beside(field: ui.element, message: str) -> None:
     """Put a message beside a field, or take away the one there for ""; a person's text in it is shown as it is."""
     field.props.set_bool("error", bool(message))
     field.props.set_optional("error-message", message or None)
+
+
+def typed(value: Any) -> str:
+    """Return what a person typed as text that a file can hold: halves of characters become question marks."""
+    return str(value or "").encode("utf-8", "replace").decode()

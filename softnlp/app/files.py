@@ -42,12 +42,6 @@ def save(session: Session) -> None:
 
 def open_dialog(session: Session) -> ui.dialog:
     """Return a dialog that takes a scenario and the files that it names."""
-    with ui.dialog() as dialog, ui.card().classes("w-96"):
-        ui.label("Open a scenario").classes("text-lg")
-        ui.label("A .toml file; drop the CSV and material files that it names together with it.").classes("text-sm")
-        upload = ui.upload(multiple=True, auto_upload=True, max_file_size=LARGEST_FILE)
-        upload.props('flat bordered accept=".toml,.csv,.txt" data-testid=open-upload').classes("w-full")
-        ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
 
     async def taken(event: events.MultiUploadEventArguments) -> None:
         upload.reset()
@@ -59,8 +53,18 @@ def open_dialog(session: Session) -> ui.dialog:
         dialog.close()
         ui.notify(f"opened {session.name}", type="positive")
 
-    upload.on_multi_upload(taken)
-    upload.on_rejected(lambda: ui.notify(f"expected files of at most {LARGEST_FILE / 1e6:.0f} MB", type="negative"))
+    def refused() -> None:
+        ui.notify(f"not opened: expected .toml and .csv files of at most {LARGEST_FILE / 1e6:.0f} MB", type="negative")
+
+    with ui.dialog() as dialog, ui.card().classes("w-96"):
+        ui.label("Open a scenario").classes("text-lg")
+        ui.label("A .toml file; drop the CSV and material files that it names together with it.").classes("text-sm")
+        # Files that belong together come together only where their handler is given here
+        upload = ui.upload(
+            multiple=True, auto_upload=True, max_file_size=LARGEST_FILE, on_multi_upload=taken, on_rejected=refused
+        )
+        upload.props('flat bordered accept=".toml,.csv,.txt" data-testid=open-upload').classes("w-full")
+        ui.button("Cancel", on_click=dialog.close).props("flat no-caps data-testid=open-cancel")
     return dialog
 
 

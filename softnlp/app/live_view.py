@@ -62,7 +62,7 @@ class LiveView:
         scenario, pressure = session.scenario, session.pressure.copy()
         if scenario is None or len(pressure) != scenario.robot.chamber_sets:
             return
-        solve = session.live.blocked if session.document.study == "blocked-force" else session.live.pose
+        solve = session.live.blocked if scenario.study == "blocked-force" else session.live.pose
         task = asyncio.create_task(asyncio.to_thread(solve, scenario, pressure))
         if not (await asyncio.wait({task}, timeout=_PATIENCE_S))[0]:
             with self._client:

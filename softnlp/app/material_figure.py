@@ -32,6 +32,8 @@ WIDTH, HEIGHT = 306, 300
 _DASHES = {"linear": "dot", "neo-hookean": "dash", "mooney-rivlin": "solid", "yeoh": "dashdot", "ogden": "longdash"}
 _COLOURS = {law: colour(k) for k, law in enumerate(("mooney-rivlin", "neo-hookean", "yeoh", "ogden", "linear"))}
 _OWN = colour(5)
+_ON_DARK = {colour(0): colour(5), colour(5): colour(6)}
+"""Lines too dark for a dark page, and what takes their place."""
 _LEGEND = {"orientation": "h", "x": 0, "y": -0.24, "yanchor": "top", "font": {"size": 11}}
 _CLIP = 1.25  # the figure reaches this far beyond the values in the fitted range
 _LARGEST = 1e12  # kPa; beyond it nothing is drawn
@@ -54,10 +56,10 @@ def material_figure(
     fitted = next((m.fitted_stretch for m in (chosen, *others.values()) if m is not None), (1.0, 2.0))
     high = max(1.0 + 1.15 * (fitted[1] - 1.0), 1.03 * (stretch or 1.0))
     x = np.linspace(min(1.0, fitted[0]), min(high, 1e3), POINTS)
-    curves = [_curve(m, law_name(law), x, measure, bold=False) for law, m in thin.items()]
+    curves = [_curve(m, law_name(law), x, measure, dark=dark, bold=False) for law, m in thin.items()]
     if chosen is not None:
         own = f"{law_name(chosen.law.name)}, own" if chosen.law.name in others and chosen.law.name in thin else ""
-        curves.append(_curve(chosen, own or law_name(chosen.law.name), x, measure, bold=True))
+        curves.append(_curve(chosen, own or law_name(chosen.law.name), x, measure, dark=dark, bold=True))
     layout = figure_layout(dark)
     layout |= {"margin": {"l": 8, "r": 8, "t": 8, "b": 8}, "legend": dict(_LEGEND)}
     layout |= {"width": WIDTH, "height": HEIGHT, "shapes": _fit(fitted), "showlegend": True, "hovermode": "closest"}
@@ -67,7 +69,7 @@ def material_figure(
     layout["annotations"] = [
         {
             "text": f"fitted {fitted[0]:.3g} to {fitted[1]:.3g}",
-            "x": fitted[1], "y": 1, "yref": "paper", "xanchor": "right", "yanchor": "top", "showarrow": False,
+            "x": fitted[1], "y": 0, "yref": "paper", "xanchor": "right", "yanchor": "bottom", "showarrow": False,
             "font": {"size": 10}, "opacity": 0.8,
         }
     ]  # fmt: skip
@@ -90,8 +92,11 @@ def same(a: Material, b: Material) -> bool:
     return a.law.name == b.law.name and dict(a.constants) == dict(b.constants)
 
 
-def _curve(material: Material, name: str, x: NDArray[np.float64], measure: str, *, bold: bool) -> dict[str, Any]:
+def _curve(
+    material: Material, name: str, x: NDArray[np.float64], measure: str, *, dark: bool, bold: bool
+) -> dict[str, Any]:
     law = material.law.name
+    line = _COLOURS.get(law, _OWN)
     return {
         "type": "scatter",
         "mode": "lines",
@@ -99,11 +104,11 @@ def _curve(material: Material, name: str, x: NDArray[np.float64], measure: str, 
         "x": [float(f"{v:.5g}") for v in x],
         "y": _values(material, x, measure),
         "line": {
-            "color": _COLOURS.get(law, _OWN),
+            "color": _ON_DARK.get(line, line) if dark else line,
             "width": 3.5 if bold else 1.4,
             "dash": "solid" if bold else _DASHES.get(law, "solid"),
         },
-        "opacity": 1.0 if bold else 0.85,
+        "opacity": 1.0 if bold or dark else 0.85,
         "hovertemplate": "%{y:.4g} kPa at %{x:.3f}<extra>" + _plain(name) + "</extra>",
     }
 

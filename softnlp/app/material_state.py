@@ -60,9 +60,9 @@ def material_state(
     name = table.get("name")
     others = entries[name].models if isinstance(name, str) and name in entries else {}
     try:
-        return MaterialState(form_of(table), material_from_table(table, folder=folder), others, _of(problem))
+        return MaterialState(form_of(table), material_from_table(table, folder=folder), others, _of(problem, table))
     except InputError as error:
-        return MaterialState(form_of(table), None, others, {_place(error): error.message})
+        return MaterialState(form_of(table), None, others, {_place(error, table): error.message})
 
 
 def known_silicones(document: Document, folder: Path) -> Mapping[str, MaterialEntry]:
@@ -120,7 +120,9 @@ def inline(values: Mapping[str, Any]) -> InlineTable:
     """Return constants as a table on one line, which may stand anywhere in [material]."""
     table = tomlkit.inline_table()
     table.update(dict(values))
-    return table
+    written = tomlkit.value(table.as_string())  # what was read keeps its spaces in a copy of the document
+    assert isinstance(written, InlineTable)
+    return written
 
 
 def constants_of_rows(rows: Sequence[tuple[str, float | None]]) -> tuple[dict[str, float], str]:
@@ -149,17 +151,19 @@ def fitted_range(low: float | None, high: float | None) -> list[float] | None:
     return [FITTED_STRETCH[0] if low is None else low, FITTED_STRETCH[1] if high is None else high]
 
 
-def _of(problem: InputError | None) -> dict[str, str]:
-    return {_place(problem): problem.message} if problem is not None and problem.table == "material" else {}
+def _of(problem: InputError | None, table: Mapping[str, Any]) -> dict[str, str]:
+    return {_place(problem, table): problem.message} if problem is not None and problem.table == "material" else {}
 
 
-def _place(error: InputError) -> str:
+def _place(error: InputError, table: Mapping[str, Any]) -> str:
     """Return the key of [material] that an error is about, "" for the whole table."""
     key = error.key or ""
     if key.startswith('"'):
         with suppress(ValueError):
             key = str(json.loads(key))
     if error.table == "material.constants":
+        law = LAWS.get(str(table.get("model")))
+        key = next((c.file_key for c in law.constants if c.name == key), key) if law is not None else key
         return f"constants.{key}" if key else "constants"
     return key
 

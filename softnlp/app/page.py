@@ -69,7 +69,7 @@ def build_page(session: Session) -> None:
         exports = _files(session, dark)
     with ui.row().classes("w-full no-wrap gap-0").style("height: calc(100vh - 48px)"):
         with ui.element("div").classes(f"w-[330px] border-r {_COLUMN} {_LINE}"):
-            _panels(session, lambda: bool(dark.value))
+            _panels(session)
         with ui.column().classes("grow min-w-0 h-full gap-0 relative"):
             view = RobotView().classes("w-full grow min-h-0").props("data-testid=view")
             _view_buttons(view)
@@ -77,7 +77,7 @@ def build_page(session: Session) -> None:
             message.set_visibility(False)
         stage = Stage(session, view)
         with ui.element("div").classes(f"w-[390px] border-l {_COLUMN} {_LINE}"):
-            results = ResultsPanel(lambda: bool(dark.value))
+            results = ResultsPanel()
             ui.separator()
             _studies(stage, tabs, chosen)
             ui.separator()
@@ -92,7 +92,7 @@ def build_page(session: Session) -> None:
         mesh_menu(session, lambda: None if results.run is None else results.run.steps[0].pose)
 
     def read_again() -> None:
-        if session.problem is not None:
+        if session.problem is not None and not awaits_data(session):
             say(f"{_NOT_USED} {session.problem}")
         elif message.text.startswith(_NOT_USED):
             say("")
@@ -102,6 +102,12 @@ def build_page(session: Session) -> None:
 
     session.on_scenario(read_again)
     live.request()
+
+
+def awaits_data(session: Session) -> bool:
+    """Whether all that is missing is the file that an identification starts from."""
+    tables = ("measurements", "tensile")
+    return session.document.study == "identify" and not any(session.document.table(name) for name in tables)
 
 
 def _files(session: Session, dark: ui.dark_mode) -> ui.menu:
@@ -118,12 +124,12 @@ def _files(session: Session, dark: ui.dark_mode) -> ui.menu:
     return exports
 
 
-def _panels(session: Session, dark: Callable[[], bool]) -> None:
+def _panels(session: Session) -> None:
     """Build what describes the robot, its silicone, its loads and the equations."""
     for name, label, opened, build in (
         ("pressures", "Pressures", True, pressure_panel),
-        ("robot", "Robot", True, lambda s: robot_panel(s)),
-        ("material", "Silicone", False, lambda s: material_panel(s, dark)),
+        ("robot", "Robot", True, robot_panel),
+        ("material", "Silicone", False, material_panel),
         ("loads", "Gravity and tip load", False, loads_panel),
         ("coefficients", "Coefficients", False, coefficients_panel),
         ("solver", "Solver", False, solver_panel),

@@ -8,12 +8,12 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from math import isfinite
 from typing import Any, TypeVar
 
-from nicegui import ElementFilter, events, ui
+from nicegui import events, ui
 
 from softnlp.app.fields import tell_problem
 from softnlp.app.job import Progress, Stopped, in_background
 from softnlp.app.session import LARGEST_FILE, Session
-from softnlp.app.theme import figure_config, figure_layout, on_dark
+from softnlp.app.theme import darkness, figure_config, figure_layout, on_dark
 from softnlp.errors import InputError, SoftnlpError
 
 T = TypeVar("T")
@@ -209,7 +209,7 @@ class Chart:
         self._place.set_visibility(False)
         self._plot: ui.plotly | None = None
         ui.run_javascript(_QUIET_RESIZE)
-        self._modes = list(ElementFilter(kind=ui.dark_mode))
+        self._dark = darkness()
         on_dark(self._draw)
 
     def show(
@@ -228,7 +228,7 @@ class Chart:
     def _draw(self) -> None:
         if self._plot is None:
             return
-        layout = figure_layout(any(bool(mode.value) for mode in self._modes))
+        layout = figure_layout(self._dark())
         for axis, label in zip(("xaxis", "yaxis"), self._labels, strict=True):
             layout[axis]["title"] = {"text": label, "standoff": 6}
         layout["legend"] = {"orientation": "h", "yanchor": "bottom", "y": 1.02, "xanchor": "left", "x": 0.0}

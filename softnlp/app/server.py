@@ -44,6 +44,8 @@ def serve(scenario: Path | None, port: int | None, show: bool) -> None:
     @ui.page("/", title="softnlp")
     async def page(client: Client) -> None:
         await client.connected()
+        if client.is_deleted:
+            return
         session = Session()
         client.on_delete(session.close)
         if scenario is not None:

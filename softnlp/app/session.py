@@ -177,14 +177,15 @@ class Session:
         self._scratch.cleanup()
 
     def _read(self) -> Scenario | None:
-        try:
-            self.document.fit_pressures()
-            scenario = scenario_from_text(self.document.text(), self.folder / self.name)
-        except InputError as error:
-            self.problem = type(error)(error.message, table=error.table, key=error.key)
-            return None
+        """Return what the document says; of a study that lacks something of its own, the pose without it."""
         self.problem = None
-        return scenario
+        self.document.fit_pressures()
+        for study in dict.fromkeys((self.document.study, "forward")):
+            try:
+                return scenario_from_text(self.document.text(study), self.folder / self.name)
+            except InputError as error:
+                self.problem = self.problem or type(error)(error.message, table=error.table, key=error.key)
+        return None
 
     def _last_pressure(self) -> Array:
         """Return the pressures of the last step, of which a sequence is read first."""

@@ -16,7 +16,8 @@ body {{ overflow: hidden; }}
 .softnlp-surface {{ background: white !important; color: #222 !important; }}
 .body--dark .softnlp-surface {{ background: #1d1d1d !important; color: #e6e6e6 !important; }}
 .body--dark {{ --q-primary: {_SKY} !important; }}
-.body--dark .bg-primary {{ color: #111 !important; }}
+.body--dark {{ --q-negative: #FF8A80 !important; }}
+@layer overrides {{ .body--dark .bg-primary {{ color: #111 !important; }} }}
 .softnlp-panel .q-item {{ padding: 2px 0; min-height: 32px; }}
 .softnlp-panel .nicegui-expansion-content {{ padding: 0; }}
 """
@@ -52,6 +53,12 @@ def figure_config() -> dict[str, Any]:
         "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"],
         "toImageButtonOptions": {"format": "png", "scale": 3},
     }
+
+
+def darkness() -> Callable[[], bool]:
+    """Return what tells whether the page of the current slot is dark."""
+    modes = list(ElementFilter(kind=ui.dark_mode))
+    return lambda: any(bool(mode.value) for mode in modes)
 
 
 def on_dark(redraw: Callable[[], None]) -> None:

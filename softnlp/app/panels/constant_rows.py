@@ -7,6 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
+from softnlp.app.fields import typed
 from softnlp.app.material_state import constants_of_rows
 
 LONGEST_NAME = 40
@@ -35,13 +36,13 @@ class ConstantRows:
 
     def values(self) -> tuple[dict[str, float], str]:
         """Return the constants, and what is wrong with the rows."""
-        return constants_of_rows([((name.value or "").strip(), value.value) for _, name, value in self._rows])
+        return constants_of_rows([(typed(name.value).strip(), value.value) for _, name, value in self._rows])
 
     def say(self, name: str, message: str) -> bool:
         """Put a message beside the row of a constant; return whether there is one."""
         found = False
         for _, field, _ in self._rows:
-            mine = bool(message) and (field.value or "").strip() == name
+            mine = bool(message) and typed(field.value).strip() == name
             field.props.set_bool("error", mine)
             found = found or mine
         return found

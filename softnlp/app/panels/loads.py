@@ -58,6 +58,7 @@ def vector_fields(session: Session, table: str, key: str, label: str, unit: str,
             field.on_value_change(lambda e, index=index: entered(index, e))
             field.props("dense outlined debounce=250 hide-bottom-space").classes("min-w-0 grow basis-0")
             field.props(f"data-testid={table}-{key}-{axis}").mark(f"{table}.{key}.{axis}")
+            field.without_auto_validation()
             fields.append(field)
 
     def refresh() -> None:

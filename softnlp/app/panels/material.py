@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from nicegui import ui
 
-from softnlp.app.fields import number_field, say_beside
+from softnlp.app.fields import number_field, say_beside, typed
 from softnlp.app.material_figure import LAW_NAMES, MEASURES, law_name, mark_pose, material_figure
 from softnlp.app.material_state import (
     Form,
@@ -26,7 +26,7 @@ from softnlp.app.panels.constant_rows import ConstantRows
 from softnlp.app.redraw import Redraw
 from softnlp.app.session import Session
 from softnlp.app.stretch import PoseStretch
-from softnlp.app.theme import on_dark
+from softnlp.app.theme import darkness, on_dark
 from softnlp.formula import MAX_LENGTH
 from softnlp.laws import LAWS
 from softnlp.materials import DENSITY, FITTED_STRETCH, MaterialEntry
@@ -36,23 +36,25 @@ _LOOK = "dense outlined hide-bottom-space"
 _SMALL = "text-xs opacity-80 w-full"
 
 
-def material_panel(session: Session, dark: Callable[[], bool] = lambda: False) -> None:
-    """Build the panel in the current slot. dark : whether the page is dark now."""
-    _MaterialPanel(session, dark)
+def material_panel(session: Session) -> None:
+    """Build the panel in the current slot."""
+    _MaterialPanel(session)
 
 
 class _MaterialPanel:
     """The controls of one page; forms that a person left are kept, so that nothing typed is lost."""
 
-    def __init__(self, session: Session, dark: Callable[[], bool]) -> None:
+    def __init__(self, session: Session) -> None:
         self.session = session
-        self.dark = dark
+        self.dark = darkness()
         self.stretch = PoseStretch(session)
+        self.seen = session.document
         self.left: dict[Form, dict[str, Any]] = {}
         self.measure = "engineering_stress"
         self.constants: dict[str, ui.number] = {}
         self.entries: Mapping[str, MaterialEntry] = known_silicones(session.document, session.folder)
         self.file = session.document.get("material", "file")
+        self.read_from: Any = None
         self.state = self._read()
         with ui.column().classes("w-full gap-2").props("data-testid=material-panel") as self.root:
             self.form = ui.toggle(dict(_FORMS), on_change=self._form_chosen)
@@ -70,7 +72,7 @@ class _MaterialPanel:
         session.on_scenario(self._changed)
         session.on_pressure(self.move)
         on_dark(self._draw)
-        self._changed()
+        self._show()
         self._draw()
 
     # --- controls -----------------------------------------------------------------------------------------------------
@@ -98,18 +100,17 @@ class _MaterialPanel:
             self.formula = ui.textarea(
                 "Engineering stress [MPa] =", on_change=lambda event: self._text("formula", event.value)
             )
-            self.formula.props(
-                f"{_LOOK} autogrow debounce=300 maxlength={MAX_LENGTH} spellcheck=false input-class=font-mono data-testid=material-formula"
-            )
+            look = f"{_LOOK} autogrow debounce=300 maxlength={MAX_LENGTH} spellcheck=false input-class=font-mono"
+            self.formula.props(f"{look} data-testid=material-formula")
             self.formula.classes("w-full").without_auto_validation().mark("material.formula")
             ui.label("Of stretch and the constants below; 0 at stretch 1, rising.").classes(_SMALL)
             self.rows = ConstantRows(self._rows_changed)
 
     def _numbers(self) -> None:
-        field = number_field(
+        self.density = number_field(
             self.session, "material", "density_kg_m3", "Density", "kg/m³", default=lambda: self._density(), step=10
         )
-        field.props("data-testid=material-density_kg_m3")
+        self.density.props("data-testid=material-density_kg_m3")
         with ui.row().classes("w-full no-wrap gap-2") as self.fitted_box:
             self.fitted: list[ui.number] = []
             for k, label in enumerate(("Fitted from stretch", "to stretch")):
@@ -171,7 +172,7 @@ class _MaterialPanel:
             self.session.change("material", "model", event.value)
 
     def _text(self, key: str, value: Any) -> None:
-        text = str(value or "").encode("utf-8", "replace").decode()
+        text = typed(value)
         form = form_of(self._table)
         if (form == "library") or (form == "constants" and key != "name") or text == self._table.get(key, ""):
             return
@@ -203,7 +204,13 @@ class _MaterialPanel:
     # --- what is shown ------------------------------------------------------------------------------------------------
 
     def _read(self) -> MaterialState:
-        return material_state(self.session.document, self.entries, self.session.folder, self.session.problem)
+        """Read the silicone again where something about it changed; most changes are of other tables."""
+        problem = self.session.problem
+        read_from = (self._table, str(problem) if problem is not None and problem.table == "material" else "")
+        if read_from == self.read_from:
+            return self.state
+        self.read_from = read_from
+        return material_state(self.session.document, self.entries, self.session.folder, problem)
 
     def _density(self) -> float:
         models = getattr(self._entry(), "models", {}) if form_of(self._table) == "library" else {}
@@ -215,8 +222,16 @@ class _MaterialPanel:
 
     def _changed(self) -> None:
         """Show the document; the curves follow a moment later."""
+        self._show()
+        self.redraw()
+
+    def _show(self) -> None:
         table = self._table
-        if table.get("file") != self.file:
+        if self.session.document is not self.seen:  # another scenario was opened
+            self.seen = self.session.document
+            self.left.clear()
+            self.read_from = None
+        if table.get("file") != self.file or self.read_from is None:
             self.file = table.get("file")
             self.entries = known_silicones(self.session.document, self.session.folder)
         self.state = self._read()
@@ -241,7 +256,6 @@ class _MaterialPanel:
         for field, value in zip(self.fitted, self._fitted_shown(), strict=True):
             _put(field, value)
         self._say()
-        self.redraw()
 
     def _show_names(self, table: Mapping[str, Any], form: Form) -> None:
         name, model = table.get("name"), table.get("model")
@@ -287,13 +301,14 @@ class _MaterialPanel:
             (self.own_name if own else self.silicone, "name"),
             (self.own_law if self.state.form == "formula" else self.law, "model"),
             (self.formula, "formula"),
+            (self.density, "density_kg_m3"),
         )
         for element, key in beside:
             say_beside(element, said.pop(key, "") if element.visible else "")
         left = []
         for key, message in said.items():
             name = key.removeprefix("constants.")
-            left.append(f"{name}: {message}" if name not in ("", "constants", "density_kg_m3") else message)
+            left.append(f"{name}: {message}" if name not in ("", "constants") else message)
         if self.state.form == "constants":
             for key, field in self.constants.items():
                 field.props.set_bool("error", f"constants.{key}" in said)
@@ -303,7 +318,6 @@ class _MaterialPanel:
                 self.rows.say(key.removeprefix("constants."), message)
         for end in self.fitted:
             end.props.set_bool("error", "fitted_stretch" in said)
-        left = [] if list(said) == ["density_kg_m3"] else left  # its own field says it
         self.error.set_text(" ".join(left))
         self.error.set_visibility(bool(left))
 

@@ -18,6 +18,12 @@ from softnlp.units import BAR
 FIRST_LIMIT = 1.5 * BAR  # of the sliders
 
 
+class _Slider(ui.slider):
+    """A slider whose own moves are not sent back to it: under load they would come late and pull it back."""
+
+    LOOPBACK = False
+
+
 @dataclass
 class _Shown:
     """unit : of the controls. limit : right end of the sliders [Pa]."""
@@ -101,12 +107,12 @@ def _row(session: Session, state: _Shown, k: int) -> Any:
     with ui.row().classes("w-full items-center no-wrap gap-2"):
         ui.element("div").classes("shrink-0 rounded-full").style(f"width:12px;height:12px;background:{colour(k)}")
         ui.label(f"Set {k + 1}").classes("text-sm shrink-0 w-9")
-        slider = ui.slider(min=0, max=_ceil(state.limit, unit), step=unit.step, value=shown(), on_change=entered)
+        slider = _Slider(min=0, max=_ceil(state.limit, unit), step=unit.step, value=shown(), on_change=entered)
         slider.props(f'dense data-testid=pressure-slider-{k + 1} aria-label="pressure of set {k + 1}"')
         slider.classes("grow min-w-0").style(f"--q-primary: {colour(k)}").mark(f"pressure.slider.{k + 1}")
         field = ui.number(value=shown(), step=unit.step, on_change=entered, min=0)
         field.props(f'dense outlined hide-bottom-space debounce=250 suffix="{unit.name}"')
-        field.props(f"data-testid=pressure-number-{k + 1}")
+        field.props(f"data-testid=pressure-number-{k + 1}").without_auto_validation()
         field.classes("w-24 shrink-0").mark(f"pressure.number.{k + 1}")
 
     def refresh() -> None:

@@ -12,7 +12,7 @@ from nicegui import ui
 from numpy.typing import NDArray
 
 from softnlp.app.numbers import Line, certificate_words, chamber_lines, step_lines
-from softnlp.app.theme import figure_layout
+from softnlp.app.parts import Chart, line
 from softnlp.plots.style import COLOURS
 from softnlp.results import table_text, to_json
 from softnlp.studies.step import Run, Shape
@@ -34,16 +34,14 @@ _ENDS = {
     "warned": ("warning", "text-orange-700 dark:text-orange-300"),
     "failed": ("error", "text-red-700 dark:text-red-300"),
 }
-_CONFIG = {"displaylogo": False, "responsive": True}
 
 
 class ResultsPanel:
     """Shows one step; `show` is called with each new one, and only the texts that changed travel to the browser."""
 
-    def __init__(self, dark: Callable[[], bool]) -> None:
-        """Build the panel in the current slot. dark : whether the page is dark now."""
+    def __init__(self) -> None:
+        """Build the panel in the current slot."""
         self._run: Run | None = None
-        self._dark = dark
         self._labels: dict[str, ui.label] = {}
         self._drawn: Shape | None = None
         with ui.row().classes("w-full items-start no-wrap gap-2"):
@@ -77,7 +75,7 @@ class ResultsPanel:
                 on_change=lambda: self._draw(force=True),
             ).props("dense outlined options-dense data-testid=along-quantity")
             self._quantity.classes("w-full")
-            self._plot = ui.plotly({"data": [], "layout": {}, "config": _CONFIG}).classes("w-full h-56")
+            self._plot = Chart("along-plot", "s [mm]", "u [1/m]", height="14rem")
             ui.button("CSV along the rod", icon="download", on_click=self._download_along).props(
                 "flat dense no-caps size=sm data-testid=along-csv"
             )
@@ -137,18 +135,13 @@ class ResultsPanel:
         self._drawn = shape
         label, unit, frame, of = _ALONG[str(self._quantity.value)]
         traces = []
-        if shape is not None:
-            values = of(shape)
-            arc = np.asarray(shape.arc) * float(self._run.steps[0].pose.stretch) * self._run.robot.length / MILLIMETRE  # type: ignore[union-attr]
+        if pose is not None and shape is not None:
+            s = np.asarray(shape.arc) * pose.stretch * self._run.robot.length / MILLIMETRE
             traces = [
-                {"type": "scatter", "mode": "lines", "name": axis, "x": arc.tolist(), "y": values[:, k].tolist(),
-                 "line": {"color": COLOURS[k], "dash": ("solid", "dash", "dot")[k]}}
-                for k, axis in enumerate("xyz")
-            ]  # fmt: skip
-        layout = figure_layout(self._dark()) | {"height": 224, "margin": {"l": 48, "r": 8, "t": 8, "b": 36}}
-        layout["xaxis"] = layout.get("xaxis", {}) | {"title": {"text": "s [mm]"}}
-        layout["yaxis"] = layout.get("yaxis", {}) | {"title": {"text": f"{label.split()[-1]} [{unit}], {frame} frame"}}
-        self._plot.update_figure({"data": traces, "layout": layout, "config": _CONFIG})
+                line(s.tolist(), values.tolist(), COLOURS[k], axis, mode="lines")
+                for k, (axis, values) in enumerate(zip("xyz", of(shape).T, strict=True))
+            ]
+        self._plot.show(traces, y_label=f"{label.split()[-1]} [{unit}], {frame} frame")
 
     def _copy(self) -> None:
         if self._run is None:

@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
-from softnlp.app.fields import number_field, say_beside, tell_problem
+from softnlp.app.fields import number_field, say_beside, tell_problem, typed
 from softnlp.app.redraw import Redraw
 from softnlp.app.robot_state import (
     OWN,
@@ -40,6 +40,7 @@ _LABELS = {
 """Label and step of each dimension."""
 _WALL = "minimum_wall_mm"
 _RULES = {"wall_thickness": "Allow thin walls", "chamber_overlap": "Allow chambers that overlap"}
+_STRETCHED = "At the stretch of the pose"
 _RESTING = 1.0 + 1e-9  # below it a section looks as made
 
 
@@ -67,7 +68,7 @@ class _RobotPanel:
         self.redraw = Redraw(self.root, self._draw)
         session.on_scenario(self._changed)
         session.on_pressure(self._pose_changed)
-        self._changed()
+        self._show()
         self._draw()
 
     # --- controls -----------------------------------------------------------------------------------------------------
@@ -88,8 +89,10 @@ class _RobotPanel:
     def _drawing(self) -> None:
         self.picture = ui.html(sanitize=False).classes("w-full").props("data-testid=robot-section")
         self.picture.mark("robot.section")
-        self.caption = ui.label().classes("text-xs opacity-80 w-full").props("data-testid=robot-caption")
-        self.stretched = ui.switch("At the stretch of the pose", on_change=lambda: self._draw())
+        self.caption = (
+            ui.label().classes("text-xs opacity-80 w-full").props("data-testid=robot-caption").mark("robot.caption")
+        )
+        self.stretched = ui.switch(_STRETCHED, on_change=lambda: self._draw())
         self.stretched.props("dense size=sm data-testid=robot-stretched").classes("text-xs").mark("robot.stretched")
 
     def _dimensions(self) -> None:
@@ -174,7 +177,7 @@ class _RobotPanel:
         self.session.change_all("robot", table)
 
     def _named(self, event: Any) -> None:
-        name = str(event.value or "").encode("utf-8", "replace").decode()
+        name = typed(event.value)
         if self._shown_choice() == OWN and name != self._table.get("name", ""):
             self.session.change("robot", "name", name or None)
 
@@ -195,6 +198,10 @@ class _RobotPanel:
 
     def _changed(self) -> None:
         """Show the document; the drawing follows a moment later."""
+        self._show()
+        self.redraw()
+
+    def _show(self) -> None:
         state, chosen, changed = robot_state(self.session.document), self._shown_choice(), changed_keys(self._table)
         self.choice.set_value(chosen)
         self.own_name.set_visibility(chosen == OWN)
@@ -207,7 +214,6 @@ class _RobotPanel:
             switch.set_value(rule in state.allowed)
         self._note_latest()
         self._say(state)
-        self.redraw()
 
     def _note_latest(self) -> None:
         """Find out which one value changed since the last time."""
@@ -240,6 +246,7 @@ class _RobotPanel:
     def _draw(self) -> None:
         state = robot_state(self.session.document)
         stretch = self._drawn_stretch()
+        self.stretched.set_text(_STRETCHED if stretch == 1.0 else f"{_STRETCHED}, {stretch:.3g}")
         if state.robot is None:
             self._no_drawing("")
             return
@@ -250,10 +257,8 @@ class _RobotPanel:
             return
         self.picture.set_content(drawing)
         wall = (state.robot.chamber_wall + state.robot.outer_wall) / MILLIMETRE
-        words = ["As made" if stretch == 1.0 else f"Stretch {stretch:.3g}", f"wall {wall:.3g} mm"]
-        if 1.0 <= state.touching < inf:
-            words.append(f"chambers touch above stretch {state.touching:.3g}")
-        self.caption.set_text(" · ".join(words))
+        touch = f" · chambers touch from stretch {state.touching:.3g}" if 1.0 <= state.touching < inf else ""
+        self.caption.set_text(f"Wall {wall:.3g} mm{touch}")
 
     def _no_drawing(self, why: str) -> None:
         self.picture.set_content('<div class="text-center text-xs opacity-70 py-8">No section to draw</div>')

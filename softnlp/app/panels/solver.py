@@ -43,6 +43,7 @@ def _intervals(session: Session) -> None:
 
     field = ui.number("Intervals", value=shown(), placeholder="auto", on_change=entered, step=1)
     field.props("dense outlined clearable stack-label debounce=250 hide-bottom-space data-testid=solver-intervals")
+    field.without_auto_validation()
     field.classes("w-full").mark("solver.intervals").tooltip("Empty: as many as the accuracy needs")
 
     def refresh() -> None:

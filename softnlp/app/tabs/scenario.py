@@ -13,6 +13,7 @@ from pathlib import Path
 from nicegui import ui
 
 from softnlp.app.stage import Stage
+from softnlp.app.theme import darkness, on_dark
 from softnlp.errors import SoftnlpError
 
 _ENDED = {
@@ -103,6 +104,13 @@ def scenario_tab(stage: Stage) -> None:
         run_button.set_visibility(not on)
         stop_button.set_visibility(on)
 
+    dark = darkness()
+
+    def turn() -> None:
+        editor.set_theme("basicDark" if dark() else "basicLight")
+
+    on_dark(turn)
+    turn()
     session.on_scenario(follow)
     session.on_pressure(follow)
     ui.context.client.on_delete(stop)

@@ -2,7 +2,7 @@
 import { Stage } from "softnlp-view";
 
 export default {
-  template: `<div class="softnlp-view" style="position:relative;overflow:hidden;min-height:12rem;touch-action:none"></div>`,
+  template: `<div class="softnlp-view" role="img" aria-label="3-D view of the robot" style="position:relative;overflow:hidden;min-height:12rem;touch-action:none"></div>`,
 
   mounted() {
     try {

@@ -28,6 +28,12 @@ export class Marks {
       new THREE.LineBasicMaterial(),
     );
     this.trail.frustumCulled = false;
+    // A line of WebGL is one pixel wide, which is hard to see on a dense screen.
+    this.trailDots = new THREE.Points(
+      this.trail.geometry,
+      new THREE.PointsMaterial({ size: 2.5, sizeAttenuation: false, map: disc(), alphaTest: 0.5 }),
+    );
+    this.trailDots.frustumCulled = false;
     this.length = 1;
     this.clearTrail();
     this.wall = this.makeWall();
@@ -41,7 +47,7 @@ export class Marks {
     this.cap = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 24), new THREE.MeshPhongMaterial());
     this.cap.geometry.translate(0, 0.5, 0);
     this.cap.visible = false;
-    this.group.add(this.trail, this.wall, this.cloud, this.targets, this.cap);
+    this.group.add(this.trail, this.trailDots, this.wall, this.cloud, this.targets, this.cap);
   }
 
   makeWall() {
@@ -92,6 +98,7 @@ export class Marks {
 
   paint(theme) {
     this.trail.material.color.set(this.palette?.[3] ?? theme.ink);
+    this.trailDots.material.color.copy(this.trail.material.color);
     this.targetMaterial.color.set(this.palette?.[4] ?? theme.ink);
     this.cap.material.color.set(theme.plate);
     this.wallFace.color.set(theme.grey);

@@ -14,8 +14,17 @@ const ELEVATION = 17; // of the first view [deg]
 const STEEP = 60; // above this the plane that is picked on lies level [deg]
 const CLICK = 4; // a pointer that moves further is dragging [px]
 const PICTURE_SCALE = 2;
+const REST = 400; // after which a picture is smoothed, where that is not done for each frame [ms]
 
 const radians = (degrees) => (degrees * Math.PI) / 180;
+
+function drawnInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const known = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = known ? gl.getParameter(known.UNMASKED_RENDERER_WEBGL) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
 
 function readTube(message) {
   return message === null ? null : { ...message, axis: unpack(message.axis, Float32Array) };
@@ -25,8 +34,11 @@ export class Stage {
   constructor(element, emit) {
     this.element = element;
     this.emit = emit;
-    this.renderer = new THREE.WebGLRenderer({ antialias: true });
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    // Without a graphics card smoothing doubles the time of a frame: what moves is drawn plain, what rests is smoothed.
+    this.software = drawnInSoftware();
+    this.renderer = new THREE.WebGLRenderer({ antialias: !this.software });
+    this.ratio = this.software ? 1 : Math.min(window.devicePixelRatio, 2);
+    this.renderer.setPixelRatio(this.ratio);
     const canvas = this.renderer.domElement;
     canvas.style.cssText = "position:absolute;inset:0;display:block";
     element.appendChild(canvas);
@@ -80,27 +92,43 @@ export class Stage {
     this.arrows.update(frame.arrows, this.theme);
     this.marks.update(frame, tip, this.palette, this.theme);
     this.surroundings.build(frame.length, frame.width, this.robot.sets, this.theme);
-    const first = this.frame === undefined || this.frame.length !== frame.length;
+    const before = this.frame;
     this.frame = frame;
     this.tip = [...tip.subarray(0, 3)];
-    if (first) this.reset();
+    if (before === undefined) this.reset();
+    else if (before.length !== frame.length) this.grow(frame.length / before.length);
     this.rescale();
+  }
+
+  // A longer robot is seen from further away, in the direction in which the user left the camera.
+  grow(factor) {
+    this.camera.position.multiplyScalar(factor);
+    this.controls.target.multiplyScalar(factor);
+    this.limit(this.frame.length);
+  }
+
+  limit(size) {
+    this.camera.near = size / 50;
+    this.camera.far = 60 * size;
+    this.camera.updateProjectionMatrix();
+    this.controls.minDistance = 0.3 * size;
+    this.controls.maxDistance = 25 * size;
   }
 
   reset() {
     if (this.frame === undefined) return;
+    // What is left of the swing of a drag would go on after it.
+    this.controls.enableDamping = false;
+    this.controls.update();
+    this.controls.enableDamping = true;
     const size = this.frame.length;
     const [a, e] = [radians(AZIMUTH), radians(ELEVATION)];
-    const narrow = Math.max(1, 1.25 / this.camera.aspect);
-    const away = 4.6 * size * narrow;
-    this.controls.target.set(0, 0, 0.42 * size);
+    const narrow = Math.max(1, 1.5 / this.camera.aspect);
+    const away = 4.8 * size * narrow;
+    this.controls.target.set(0, 0, 0.45 * size);
     this.camera.position.set(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e));
     this.camera.position.multiplyScalar(away).add(this.controls.target);
-    this.camera.near = size / 50;
-    this.camera.far = 60 * size;
-    this.controls.minDistance = 0.3 * size;
-    this.controls.maxDistance = 25 * size;
-    this.camera.updateProjectionMatrix();
+    this.limit(size);
     this.controls.update();
     this.request();
   }
@@ -125,9 +153,17 @@ export class Stage {
     this.next = undefined;
     if (frame !== undefined && this.body !== undefined) this.apply(frame);
     this.controls.update();
+    this.render(this.ratio);
+    if (frame !== undefined) this.element.dataset.frame = frame.id;
+    if (!this.software) return;
+    clearTimeout(this.rest);
+    this.rest = setTimeout(() => this.render(PICTURE_SCALE), REST);
+  }
+
+  render(ratio) {
+    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
     this.light.position.copy(this.camera.position).add(new THREE.Vector3(0, 0, this.camera.position.length()));
     this.renderer.render(this.scene, this.camera);
-    if (frame !== undefined) this.element.dataset.frame = frame.id;
   }
 
   resize() {
@@ -147,11 +183,9 @@ export class Stage {
   }
 
   picture() {
-    const ratio = this.renderer.getPixelRatio();
-    this.renderer.setPixelRatio(PICTURE_SCALE);
     this.draw();
+    this.render(PICTURE_SCALE);
     const url = this.renderer.domElement.toDataURL("image/png");
-    this.renderer.setPixelRatio(ratio);
     this.request();
     return url;
   }
@@ -191,6 +225,7 @@ export class Stage {
 
   dispose() {
     cancelAnimationFrame(this.pending);
+    clearTimeout(this.rest);
     this.followed.stop();
     this.sizes.disconnect();
     this.controls.dispose();
@@ -199,6 +234,7 @@ export class Stage {
     this.ghost?.dispose();
     for (const label of this.labels) label.dispose();
     this.renderer.dispose();
+    this.renderer.forceContextLoss(); // a browser has few of them
     this.renderer.domElement.remove();
   }
 }

@@ -2,7 +2,7 @@
 import { THREE } from "nicegui-scene";
 import { Label } from "./label.js";
 
-const TICKS = 5; // numbers across the ground, about
+const TICKS = 3.2; // numbers along the natural length, at most
 const PLATE = 0.1; // thickness of the base plate, of D_r; it stands on the ground, so that the base is at z = 0
 
 // The nearest of 1, 2, 5 times a power of ten.
@@ -25,8 +25,8 @@ export class Surroundings {
     this.key = key;
     this.clear();
     this.theme = theme;
-    const step = roundStep((2 * length) / TICKS / 2);
-    const half = step * Math.ceil((0.95 * length) / step);
+    const step = roundStep(length / TICKS);
+    const half = step * Math.ceil((0.8 * length) / step);
     this.floor = -PLATE * width;
     this.grid(step, half);
     this.ticks(step, half, length);
@@ -50,25 +50,29 @@ export class Surroundings {
     this.lines([-half, 0, z, half, 0, z, 0, -half, z, 0, half, z], this.theme.gridStrong, 1);
   }
 
+  // Numbers stand beside their edge by their own size, which is the screen's, so that they never meet it.
   ticks(step, half, length) {
     const grey = { colour: this.theme.grey, size: 12 };
-    const out = 0.08 * length;
+    const out = 0.03 * length;
     const z = this.floor;
+    const below = [0.5, 0.9];
+    const right = [-0.05, 0.6];
+    const left = [1.05, 0.5];
     for (let at = -half; at <= half + step / 4; at += step) {
       const text = `${Number(at.toPrecision(6))}`;
-      this.write(text, [at, -half - out, z], grey);
-      if (at > -half) this.write(text, [half + out, at, z], grey);
+      this.write(text, [at, -half - out, z], { ...grey, anchor: below });
+      if (at > -half) this.write(text, [half + out, at, z], { ...grey, anchor: right });
     }
-    this.write("x [mm]", [0, -half - 2.8 * out, z], grey);
-    this.write("y [mm]", [half + 3.2 * out, 0, z], grey);
+    this.write("x [mm]", [0, -half - out, z], { ...grey, anchor: [0.5, 1.9] });
+    this.write("y [mm]", [half + out, 0, z], { ...grey, anchor: [-0.55, 0.6] });
     // A ruler upright in the far corner.
     const top = step * Math.ceil((1.2 * length) / step);
     const ruler = [-half, half, z, -half, half, top];
     for (let at = 0; at <= top + step / 4; at += step) {
-      ruler.push(-half, half, at, -half - 0.4 * out, half, at);
-      this.write(`${Number(at.toPrecision(6))}`, [-half - out, half, at], grey);
+      ruler.push(-half, half, at, -half - out, half, at);
+      this.write(`${Number(at.toPrecision(6))}`, [-half - out, half, at], { ...grey, anchor: left });
     }
-    this.write("z [mm]", [-half, half, top + out], grey);
+    this.write("z [mm]", [-half, half, top], { ...grey, anchor: [0.5, -0.4] });
     this.lines(ruler, this.theme.gridStrong, 1);
   }
 
@@ -109,10 +113,12 @@ export class Surroundings {
     this.group.add(new THREE.LineSegments(geometry, material));
   }
 
-  write(text, place, { colour, size, weight = 400 }) {
+  // anchor: the point of the text that stands at the place, from its lower left (0, 0) to its upper right (1, 1).
+  write(text, place, { colour, size, weight = 400, anchor = [0.5, 0.5] }) {
     const label = new Label({ size, weight });
     label.write(text, colour, this.theme.halo);
     label.sprite.position.set(...place);
+    label.sprite.center.set(...anchor);
     this.group.add(label.sprite);
     this.labels.add(label);
     (this.own ??= []).push(label);
