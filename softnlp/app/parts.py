@@ -236,7 +236,7 @@ class Chart:
         self._plot.update_figure({"data": self._traces, "layout": layout, "config": figure_config()})
 
 
-def line(x: Sequence[float], y: Sequence[float], colour: str, name: str = "") -> dict[str, Any]:
+def line(x: Sequence[float], y: Sequence[float], colour: str, name: str = "", **more: Any) -> dict[str, Any]:
     """Return a trace of a line with marks; there is a gap where there is no number. A long one is thinned evenly."""
     every = -(-len(x) // MOST_MARKS) if x else 1
     kept = sorted({*range(0, len(x), every), len(x) - 1} if x else set())
@@ -248,6 +248,7 @@ def line(x: Sequence[float], y: Sequence[float], colour: str, name: str = "") ->
         "name": name,
         "line": {"color": colour, "width": 2},
         "marker": {"color": colour, "size": 6},
+        **more,
     }
 
 

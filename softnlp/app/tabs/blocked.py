@@ -78,7 +78,7 @@ def _contact_fields(session: Session) -> None:
     )
     with ui.column().classes("w-full gap-2") as weights:
         for key, (label, unit) in WEIGHTS.items():
-            number_field(session, "contact", key, label, unit)
+            number_field(session, "contact", key, f"{label} [{unit}]")
     with ui.column().classes("w-full gap-2") as wall:
         number_field(session, "contact", "tip_cap_mm", "Tip cap, L_t", "mm", default=lambda: 0.0, step=1)
         anywhere = ui.switch("Wall by point and normal").mark("contact.wall").props("dense data-testid=contact.wall")
