@@ -294,7 +294,7 @@ def test_pressure_moves_the_point_and_leaves_the_curves() -> None:
 def test_the_curves_turn_dark_with_the_page() -> None:
     def page(session: Session) -> None:
         mode = ui.dark_mode().mark("dark")
-        material_panel(session, lambda: bool(mode.value))
+        material_panel(session)
         on_dark(lambda: turned.append(mode.value))
 
     turned: list[object] = []

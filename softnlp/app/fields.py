@@ -40,7 +40,9 @@ def number_field(
         session.change(table, key, int(value) if whole and value is not None and value == int(value) else value)
 
     field = ui.number(label, value=shown(), step=step, on_change=entered)
-    field.props("dense outlined debounce=250 hide-bottom-space").classes("w-full").mark(f"{table}.{key}")
+    field.props("dense outlined debounce=250 hide-bottom-space").classes("w-full").mark(f"{table}.{key}").props(
+        f"data-testid={table}.{key}"
+    )
     field.without_auto_validation()  # it would take away what `tell_problem` says
     if unit:
         field.props(f'suffix="{unit}"')
@@ -78,7 +80,9 @@ def choice_field(
 
     field = ui.select(dict(options) if isinstance(options, Mapping) else known, label=label, value=shown())
     field.on_value_change(entered)
-    field.props("dense outlined options-dense hide-bottom-space").classes("w-full").mark(f"{table}.{key}")
+    field.props("dense outlined options-dense hide-bottom-space").classes("w-full").mark(f"{table}.{key}").props(
+        f"data-testid={table}.{key}"
+    )
     field.without_auto_validation()
 
     def refresh() -> None:

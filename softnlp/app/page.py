@@ -48,7 +48,7 @@ _TAB_OF = {study.study: name for name, study in STUDIES.items()}
 SCENARIO = "scenario"
 _LINE = "border-neutral-300 dark:border-neutral-700"
 _HEADER = f"h-12 px-3 py-0 items-center no-wrap gap-2 border-b softnlp-surface {_LINE}"
-_COLUMN = "shrink-0 h-full overflow-y-auto overflow-x-hidden p-3"
+_COLUMN = "softnlp-column shrink-0 h-full overflow-y-auto overflow-x-hidden p-3"
 _MESSAGE = "absolute bottom-2 left-2 right-2 text-sm rounded px-3 py-2 bg-orange-100 text-orange-950"
 _NOT_USED = "Not used:"
 
