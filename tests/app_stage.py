@@ -64,7 +64,7 @@ def field(user: User, marker: str) -> Any:
     return found
 
 
-async def until(user: User, marker: str, words: str, tries: int = 200) -> str:
+async def until(user: User, marker: str, words: str, tries: int = 1200) -> str:
     """Wait until a line of text holds some words, and return it."""
     for _ in range(tries):
         text = str(field(user, marker).text)

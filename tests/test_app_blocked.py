@@ -105,6 +105,13 @@ async def _curve_and_target() -> None:
         await ran(user, "blocked.find", "0.8, 0, 0 bar")
         # nothing of it was written into the scenario
         assert tomllib.loads(stage.session.text())["contact"] == {"closure": "free"}
+        # without a wall its keys are put aside, and they come back with it
+        enter(user, "contact.offset_mm", -2.5)
+        enter(user, "contact.mode", "constrained")
+        assert tomllib.loads(stage.session.text())["contact"] == {"mode": "constrained"}
+        assert stage.session.problem is None
+        enter(user, "contact.mode", "blocked")
+        assert tomllib.loads(stage.session.text())["contact"] == {"closure": "free", "offset_mm": -2.5}
         # wild input: one message each, and the page goes on
         enter(user, "blocked.target", -1.0)
         await ran(user, "blocked.find", "target_force_N")

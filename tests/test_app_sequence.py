@@ -19,7 +19,7 @@ from nicegui import ui
 
 from softnlp import forward
 from softnlp.app.asking import scenario_with
-from softnlp.app.parts import csv_text, number_text
+from softnlp.app.parts import MOST_MARKS, csv_text, line, number_text
 from softnlp.app.tabs.sequence import sequence_tab
 from softnlp.app.tabs.sequence_table import rows_of_text, rows_text, source_of
 from softnlp.errors import InputError
@@ -57,6 +57,15 @@ def test_numbers_are_text_and_csv_as_a_person_reads_them() -> None:
     ]
     rows = list(csv.reader(io.StringIO(csv_text(["a [mm]", "b"], [[1 / 3, None], [float("nan"), 'x "y", z']]))))
     assert rows == [["a [mm]", "b"], [repr(1 / 3), ""], ["", 'x "y", z']]
+
+
+def test_a_long_line_is_thinned_from_end_to_end() -> None:
+    x = [0.5 * k for k in range(9001)]
+    trace = line(x, [float("nan"), *x[1:]], "#000000")
+    assert MOST_MARKS / 2 < len(trace["x"]) <= MOST_MARKS + 1
+    assert (trace["x"][0], trace["x"][-1], trace["y"][0], trace["y"][-1]) == (0.0, 4500.0, None, 4500.0)
+    assert line([], [], "#000000")["x"] == []
+    assert line([2.0], [3.0], "#000000")["y"] == [3.0]
 
 
 async def _visit() -> None:
@@ -104,6 +113,8 @@ async def _visit() -> None:
         enter(user, "pressure.ramp.to_bar", -4.0)
         await ran(user, "sequence", "[pressure] ramp.to_bar")
         enter(user, "pressure.ramp.to_bar", 0.5)
+        enter(user, "pressure.ramp.steps", 20_000)
+        await ran(user, "sequence", "too many for this page")
         # a file; one that cannot be read leaves the sequence as it was
         enter(user, "pressure.source", "file")
         before = session.document.table("pressure")

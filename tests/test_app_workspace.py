@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 from threading import Thread
 from time import sleep
@@ -131,7 +132,14 @@ async def _visit() -> None:
         # samples, a wall, and what cannot be run
         enter(user, "workspace.kind", "samples")
         assert stage.session.document.table("workspace") == {"samples": 1000, "to_bar": 1.0}
+        stage.session.change_all("contact", {"closure": "rigid"})
+        assert "contact" not in tomllib.loads(
+            stage.session.text()
+        )  # it belongs to the blocked force until it is wanted
         enter(user, "workspace.wall", True)
+        assert tomllib.loads(stage.session.text())["contact"] == {"closure": "rigid"}
+        assert Session(stage.session.text()).document.sweeps_wall
+        stage.session.change_all("contact", {"offset_mm": 0.0})
         enter(user, "workspace.samples", 16)
         await ran(user, "workspace", "16 poses, 0 failed")
         assert "blocked_force_N" in field(user, "workspace.colour").options

@@ -8,10 +8,14 @@ from typing import Any
 from softnlp.app.document import Document
 from softnlp.app.job import Progress, Stopped
 from softnlp.app.session import Session
+from softnlp.errors import InputError
 from softnlp.runner import partial_run, run_scenario
 from softnlp.scenario import Scenario, scenario_from_text
 from softnlp.studies.step import Run, Step
 from softnlp.units import BAR
+
+MOST_STEPS = 10_000
+"""Of a run on the page, which keeps every shape in memory; `softnlp run` takes more."""
 
 Tables = Mapping[str, Mapping[str, Any] | None]
 
@@ -35,7 +39,17 @@ def run_steps(asked: Scenario, progress: Progress, on_step: Callable[[Step], Non
     """Run a scenario; where a person stops it, the run has the steps done by then and says so.
 
     on_step : called with each step as it is done, in the thread of the work.
+
+    Raises
+    ------
+    InputError
+        For more steps than the page takes, and as `run_scenario`.
     """
+    if asked.step_count > MOST_STEPS:
+        raise InputError(
+            f"{asked.step_count} steps are too many for this page, which runs {MOST_STEPS}; save the scenario and use "
+            "softnlp run"
+        )
     steps: list[Step] = []
 
     def done(number: int, step: Step) -> None:

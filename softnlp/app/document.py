@@ -45,6 +45,8 @@ class Document:
     """Every table of the scenario, also those of studies that are not on the screen now.
 
     `text` writes the file of one study: with the tables that this study has, and with its comments.
+
+    sweeps_wall : whether a workspace pushes against the wall of the blocked force, which may be there for that alone.
     """
 
     def __init__(self, text: str = START) -> None:
@@ -55,6 +57,7 @@ class Document:
             raise InputError(f"not valid TOML: {one_line(str(error)) or 'nested too deeply'}") from None
         study = self._tables.get("study")
         self.study = str(study) if isinstance(study, str) else "forward"
+        self.sweeps_wall = self.study == "workspace" and "contact" in self._tables
 
     def get(self, table: str, key: str, default: Any = None) -> Any:
         """Return a value as plain Python, or the default; the table "" is the top level."""
@@ -132,6 +135,8 @@ class Document:
                     wanted[name] = _new_table(values)
             _without_second_source(study, wanted)
             _without_a_robots_tables(study, wanted)
+            if study == "workspace" and not self.sweeps_wall:
+                wanted.pop("contact", None)
         if wanted.get("study") != study:
             wanted["study"] = study
         return tomlkit.dumps(wanted)

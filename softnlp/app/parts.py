@@ -29,6 +29,10 @@ def plain_words(error: SoftnlpError) -> str:
     return str(error)
 
 
+MOST_MARKS = 2000
+"""Of a line of a chart."""
+
+
 class RunRow:
     """A run button, a stop button, a progress bar, and a line that says how it went. One run at a time."""
 
@@ -233,12 +237,14 @@ class Chart:
 
 
 def line(x: Sequence[float], y: Sequence[float], colour: str, name: str = "", **more: Any) -> dict[str, Any]:
-    """Return a trace of a line with marks; there is a gap where there is no number."""
+    """Return a trace of a line with marks; there is a gap where there is no number. A long one is thinned evenly."""
+    every = -(-len(x) // MOST_MARKS) if x else 1
+    kept = sorted({*range(0, len(x), every), len(x) - 1} if x else set())
     return {
         "type": "scatter",
         "mode": "lines+markers",
-        "x": [_number(v) for v in x],
-        "y": [_number(v) for v in y],
+        "x": [_number(x[k]) for k in kept],
+        "y": [_number(y[k]) for k in kept],
         "name": name,
         "line": {"color": colour, "width": 2},
         "marker": {"color": colour, "size": 6},

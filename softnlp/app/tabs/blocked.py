@@ -78,7 +78,7 @@ def _contact_fields(session: Session) -> None:
     )
     with ui.column().classes("w-full gap-2") as weights:
         for key, (label, unit) in WEIGHTS.items():
-            number_field(session, "contact", key, label, unit)
+            number_field(session, "contact", key, f"{label} [{unit}]")
     with ui.column().classes("w-full gap-2") as wall:
         number_field(session, "contact", "tip_cap_mm", "Tip cap, L_t", "mm", default=lambda: 0.0, step=1)
         anywhere = ui.switch("Wall by point and normal").mark("contact.wall").props("dense data-testid=contact.wall")
@@ -120,7 +120,21 @@ def _contact_fields(session: Session) -> None:
         if placed != ("wall_point_mm" in table()):
             put(with_wall(table(), placed))
 
-    mode.on_value_change(lambda event: put(with_mode(table(), event.value)))
+    aside: dict[str, Any] = {}
+
+    def choose_mode(chosen: str) -> None:
+        """Put the keys of the wall aside where there is none, and take them out again."""
+        new = with_mode(table(), chosen)
+        if chosen == table().get("mode", "blocked"):
+            return
+        if chosen == "constrained":
+            aside.update({key: value for key, value in table().items() if key not in new})
+        else:
+            new = with_closure(aside | new, str((aside | new).get("closure", "compliant")))
+            aside.clear()
+        put(new)
+
+    mode.on_value_change(lambda event: choose_mode(str(event.value)))
     select.on_value_change(lambda event: choose_closure(event.value))
     anywhere.on_value_change(lambda event: choose_wall(event.value))
     session.on_scenario(refresh)

@@ -103,7 +103,7 @@ class _Measurements:
                 ui.label("One of each kind; without any, 1 % of each number.").classes("text-xs opacity-70")
                 with ui.grid(columns=2).classes("w-full gap-2"):
                     for key, (label, unit) in SIGMAS.items():
-                        number_field(session, "sigma", key, label, unit)
+                        number_field(session, "sigma", key, f"{label} [{unit}]")
         self._problem = ui.label("").classes("text-sm text-negative break-words").mark("measurements.problem")
         self._problem.props("data-testid=measurements.problem")
         self._refresh()

@@ -32,6 +32,7 @@ from softnlp.results.csv_table import table_text
 from softnlp.studies.step import Step
 
 STUDY = "inverse"
+_FAR = 1e6  # [mm], farther targets are not marked
 MOST_EDITED = 25
 """Targets that have fields of their own; more come from a file."""
 
@@ -148,7 +149,7 @@ class _Targets:
     def _mark_targets(self) -> None:
         """Mark the targets in the view while this study is on the screen."""
         rows = rows_of(self._table(), POSITION) if self._session.document.study == STUDY else []
-        marked = [row for row in rows if all(isinstance(x, int | float) for x in row)] or None
+        marked = [row for row in rows if all(isinstance(x, int | float) and abs(x) < _FAR for x in row)] or None
         if marked != self._marked:
             self._marked = marked
             self._stage.view.targets(None if marked is None else np.array(marked, dtype=float))

@@ -59,7 +59,7 @@ def _test(session: Session) -> None:
     ui.label("The specimen, where the file has force and displacement").classes("text-xs opacity-70")
     with ui.grid(columns=2).classes("w-full gap-2"):
         for key, label in _SPECIMEN.items():
-            number_field(session, "tensile", key, label, "mm")
+            number_field(session, "tensile", key, f"{label} [mm]")
     told = ui.label("").classes("text-sm text-negative break-words").mark("tensile.problem")
     told.props("data-testid=tensile.problem")
 

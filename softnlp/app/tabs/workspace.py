@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from nicegui import ui
 
 from softnlp.app.asking import scenario_with
@@ -45,7 +43,6 @@ def _source(session: Session) -> None:
     count = ui.label("").classes("text-sm opacity-70").mark("workspace.count")
     wall = ui.switch("Push against the wall of the blocked force").props("dense data-testid=workspace.wall")
     wall.mark("workspace.wall")
-    aside: dict[str, Any] = {}
 
     def choose(chosen: str | None) -> None:
         if chosen is None or chosen == kind():
@@ -55,19 +52,18 @@ def _source(session: Session) -> None:
         session.change_all("workspace", {chosen: _FIRST[chosen], **kept})
 
     def push(wanted: bool) -> None:
-        table = session.document.table("contact")
-        if wanted and not table:
-            session.change_all("contact", aside or {"closure": "compliant"})
-        elif not wanted and table:
-            aside.clear()
-            aside.update(table)
-            session.change_all("contact", None)
+        document = session.document
+        if wanted != document.sweeps_wall:
+            document.sweeps_wall = wanted
+            if wanted and not document.table("contact"):
+                document.replace("contact", {"closure": "compliant"})
+            session.reread()
 
     def refresh() -> None:
         toggle.set_value(kind())
         levels.set_visibility(kind() == "levels")
         samples.set_visibility(kind() == "samples")
-        wall.set_value(bool(session.document.table("contact")))
+        wall.set_value(session.document.sweeps_wall)
         scenario = session.scenario
         poses = scenario.step_count if scenario is not None and scenario.study == STUDY else None
         count.set_text("" if poses is None or session.problem is not None else f"{poses} poses")
