@@ -13,6 +13,7 @@ from arc_workspaces import MODEL, arcs, grid, workspace_dataset, write_workspace
 
 from softnlp.cli import main
 from softnlp.errors import InputError
+from softnlp.evaluation.statistics import groups, statistics
 from softnlp.plots import comparison_figure
 from softnlp.units import BAR, MILLIMETRE
 from softnlp.workspace.again import model_of
@@ -20,8 +21,6 @@ from softnlp.workspace.comparison import (
     compare_measured,
     compare_workspaces,
     comparison_rows,
-    groups,
-    statistics,
 )
 from softnlp.workspace.measured import load_measured
 from softnlp.workspace.read import Workspace, column_names, load_workspace, read_column
@@ -141,7 +140,7 @@ def test_the_error_of_measured_tips_is_found_exactly(space: Workspace, tmp_path:
         pytest.approx(2e-3),
         pytest.approx(5e-3),
     )
-    assert told.root_mean_square == pytest.approx((34 / 5) ** 0.5 * 1e-3)
+    assert told.rmse == pytest.approx((34 / 5) ** 0.5 * 1e-3)
     assert statistics(np.zeros(0)).count == 0
 
 

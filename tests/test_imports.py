@@ -22,6 +22,7 @@ LAYERS = (
     *("formula", "laws", "materials", "robot", "section", "rod", "tip", "transcription"),
     *("quantities", "loadcase", "unloaded", "problem", "branch", "solver", "condensed", "continuation", "stability"),
     "implicit",
+    *("evaluation", "evaluation.statistics"),
     *(
         "studies",
         "studies.step",

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.evaluation.statistics import groups, statistics
 from softnlp.plots.cloud import mark_size
 from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, colour, new_figure, plain
 from softnlp.units import DEGREE, MILLIMETRE
 from softnlp.workspace.boundary import thinned
-from softnlp.workspace.comparison import Comparison, groups, statistics
+from softnlp.workspace.comparison import Comparison
 from softnlp.workspace.read import Workspace
 
 if TYPE_CHECKING:
