@@ -67,7 +67,7 @@ LAYERS = (
     *("workspace.chunk", "workspace.task", "workspace.table", "workspace.manufacture"),
     "scenario_schema",
     *("schema_workspace", "schema_inverse", "schema_identify", "schema_design"),
-    *("scenario_check", "pressures", "columns", "scenario_contact"),
+    *("scenario_check", "pressures", "columns", "measured_rows", "scenario_contact"),
     *("scenario_workspace", "scenario_inverse", "scenario_identify", "scenario_design"),
     "scenario",
     *("workspace.planning", "workspace.journal", "workspace.worker", "workspace.pool"),

@@ -38,7 +38,7 @@ def statistics(errors: Array, compared_with: Array | None = None) -> Statistics:
     """Return the statistics of errors (M,), each compared with a number (M,) for the mape."""
     nan = float("nan")
     if not len(errors):
-        return Statistics(0, *[nan] * 6, 0)
+        return Statistics(0, nan, nan, nan, nan, nan, nan, 0)
     sizes = np.abs(errors)
     mape, left_out = nan, 0
     if compared_with is not None:
@@ -46,8 +46,16 @@ def statistics(errors: Array, compared_with: Array | None = None) -> Statistics:
         kept = whole > NOTHING * np.max(whole)
         left_out = int(np.sum(~kept))
         mape = float(100 * np.mean(sizes[kept] / whole[kept])) if np.any(kept) else nan
-    found = (sizes.mean(), np.median(sizes), sizes.max(), np.mean(errors))
-    return Statistics(len(sizes), float(np.sqrt(np.mean(sizes**2))), mape, *map(float, found), left_out)
+    return Statistics(
+        count=len(sizes),
+        rmse=float(np.sqrt(np.mean(sizes**2))),
+        mape=mape,
+        mean=float(np.mean(sizes)),
+        median=float(np.median(sizes)),
+        largest=float(np.max(sizes)),
+        bias=float(np.mean(errors)),
+        left_out=left_out,
+    )
 
 
 def groups(pressure: Array) -> list[tuple[str, Mask]]:
