@@ -24,6 +24,8 @@ _LINES: tuple[Any, ...] = ("-", "--", ":", (0, (6, 1, 1, 1)), (0, (1, 1)), (0, (
 _HATCHES = ("", "////", "....", "xxxx", "----", "\\\\\\\\")
 MEASURED = "measured"
 LEGEND_ROW = 0.2  # [inch]
+_NOTE_WIDTH = 4.4  # [inch]
+_NOTE = "boxes: quartiles and median, diamonds: mean"
 
 
 @dataclass(frozen=True)
@@ -51,12 +53,15 @@ def looks(found: Comparison) -> list[Look]:
 def legend_rows(found: Comparison, width: float) -> tuple[int, int]:
     """Return (columns, rows) of a legend of the variants and the measurement on a figure so wide [inch]."""
     longest = max(len(label) for label in [*found.labels, MEASURED])
-    columns = max(1, min(len(found.labels) + 1, int((width - 0.4) / (0.75 + 0.068 * longest))))
+    columns = max(1, min(len(found.labels) + 1, int((width - _NOTE_WIDTH) / (0.75 + 0.068 * longest))))
     return columns, -(-(len(found.labels) + 1) // columns)
 
 
-def legend(figure: Figure, handles: Sequence[Any], columns: int) -> None:
-    """Put the legend at the foot of a figure."""
+def legend(figure: Figure, handles: Sequence[Any], columns: int, any_lost: bool = False) -> None:
+    """Put the legend at the foot of a figure, and beside it what the marks of all of them mean."""
+    lost = "; crosses: no solution" if any_lost else ""
+    note: dict[str, Any] = {"size": SMALL, "color": GREY, "ha": "right"}
+    figure.text(1 - 0.15 / figure.get_figwidth(), 0.1 / figure.get_figheight(), _NOTE + lost, **note)
     figure.legend(
         handles=list(handles),
         loc="lower left",

@@ -51,8 +51,8 @@ def tips_figure(found: Comparison, title: str) -> Figure:
     bottom, top = (foot + 0.5) / height, 1 - 0.75 / height
     _clouds(figure, found, best, made[best], (-0.01, foot / height, 0.54, top - foot / height + 0.02))
     half = (top - bottom - 0.7 / height) / 2
-    _axis_boxes(figure.add_axes((0.605, top - half, 0.385, half)), found, made)
-    _histogram(figure.add_axes((0.605, bottom, 0.385, half)), found, made)
+    _axis_boxes(figure.add_axes((0.62, top - half, 0.37, half)), found, made)
+    _histogram(figure.add_axes((0.62, bottom, 0.37, half)), found, made)
     legend(figure, _handles(found, made, best), columns)
     return figure
 
@@ -86,8 +86,8 @@ def _clouds(figure: Figure, found: Comparison, v: int, look: Look, place: tuple[
     axes.add_collection3d(pairs)
     size = max(mark_size(len(k), 9_000), 4.0)
     plot: dict[str, Any] = {"s": size, "depthshade": False, "rasterized": True}
-    axes.scatter(*simulated.T, color=look.colour, linewidths=0, zorder=2, label=found.labels[v], **plot)
-    axes.scatter(*measured.T, facecolors="white", edgecolors=INK, linewidths=0.7, zorder=3, label=MEASURED, **plot)
+    axes.scatter(*simulated.T, color=look.colour, linewidths=0, zorder=3, label=found.labels[v], **plot)
+    axes.scatter(*measured.T, facecolors="none", edgecolors=INK, linewidths=0.8, zorder=3, label=MEASURED, **plot)
 
 
 def _axis_boxes(axes: Axes, found: Comparison, made: list[Look]) -> None:
