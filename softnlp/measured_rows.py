@@ -93,20 +93,17 @@ def rows_by_robot(
     own : robots by the name that the column robot has for them, before those of the library. unnamed : gives the robot
     of a row without a name, or raises.
     """
-    rows: dict[str, list[tuple[Columns, int]]] = {}
+    found: dict[tuple[str, int], tuple[Robot, list[tuple[Columns, int]]]] = {}
     for columns in tables:
         for k, name in enumerate(columns.text("robot")):
-            rows.setdefault(name, []).append((columns, k))
-    found = []
-    for name, places in rows.items():
-        robot = _named(name, own, *places[0]) if name else unnamed(*places[0])
-        found.append(RobotRows(robot, name or robot.name, tuple(places)))
-    return found
+            robot = _named(name, own, columns, k) if name else unnamed(columns, k)
+            found.setdefault((name or robot.name, id(robot)), (robot, []))[1].append((columns, k))
+    return [RobotRows(robot, label, tuple(places)) for (label, _), (robot, places) in found.items()]
 
 
 def _named(name: str, own: Mapping[str, Robot], columns: Columns, row: int) -> Robot:
     known = {**ROBOTS, **own}
     if name in known:
         return known[name]
-    message = f"expected a table of [robots] or a robot of the library, got {shown(name)}{nearest(name, known)}"
+    message = f"expected a robot of the scenario or of the library, got {shown(name)}{nearest(name, known)}"
     raise columns.wrong(row, "robot", message)

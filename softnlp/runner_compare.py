@@ -22,7 +22,7 @@ from softnlp.evaluation.variants import NAMED, OWN, Variant, every_variant, name
 from softnlp.materials import Material, load_materials
 from softnlp.measured_rows import SCALARS, TIP_COLUMNS, RobotRows, rows_by_robot
 from softnlp.pressures import TIME_COLUMN
-from softnlp.reading import choices, shown
+from softnlp.reading import choices, read_text, shown
 from softnlp.robot import Robot
 from softnlp.scenario import Scenario
 from softnlp.studies.measurements import Measurements
@@ -62,13 +62,14 @@ class Asked:
 class CompareTask:
     """A comparison that can be run.
 
-    columns : the file, with the names that this package has for its columns; header : as it names them itself. rows :
-    of each robot, as `measurements`. time : (rows of the file,) [s], nan where there is none. notes : what is not
+    path, text : of the file. columns : of it, under the names that this package has for them; header : under its own.
+    rows : of each robot, as `measurements`. time : (rows of the file,) [s], nan where there is none. notes : what is not
     compared, and why.
     """
 
     scenario: Scenario
     path: Path
+    text: str
     columns: Columns
     header: tuple[str, ...]
     rows: tuple[RobotRows, ...]
@@ -87,10 +88,19 @@ def compare_task(scenario: Scenario, path: str | PathLike[str], asked: Asked = A
     InputError
         For a study without steps at pressures, a file that does not fit, an unknown name.
     """
+    try:
+        return _task(scenario, path, asked)
+    except InputError as error:
+        # what reads columns speaks of a scenario's key; here the file is an argument
+        raise (InputError(error.message) if error.key == "file" else error) from None
+
+
+def _task(scenario: Scenario, path: str | PathLike[str], asked: Asked) -> CompareTask:
     _require_study(scenario)
     if asked.shape not in SHAPES:
         raise InputError(f"expected {choices(SHAPES)}, got {shown(asked.shape)}", key="--shape")
     file = read_columns(Path(), str(path))
+    text = read_text(Path(path))
     columns = named_columns(file)
     notes = list(_notes(columns, scenario))
     compared = [name for name in MEASURED_COLUMNS if name in columns]
@@ -121,6 +131,7 @@ def compare_task(scenario: Scenario, path: str | PathLike[str], asked: Asked = A
     return CompareTask(
         scenario=scenario,
         path=Path(path),
+        text=text,
         columns=columns,
         header=file.header,
         rows=rows,

@@ -156,7 +156,7 @@ def _write(folder: Path, task: CompareTask, found: Comparison, document: str) ->
         "summary.csv": summary_text(found).encode(),
         "versions.json": (json_module.dumps(versions(), indent=2) + "\n").encode(),
         "scenario.toml": task.scenario.text.encode(),
-        "measured.csv": task.path.read_bytes(),
+        "measured.csv": task.text.encode(),
     }
     for name, figure in compare_figures(task, found).items():
         png = io.BytesIO()
