@@ -63,8 +63,8 @@ class CompareTask:
     """A comparison that can be run.
 
     path, text : of the file. columns : of it, under the names that this package has for them; header : under its own.
-    rows : of each robot, as `measurements`. time : (rows of the file,) [s], nan where there is none. notes : what is not
-    compared, and why.
+    rows : of each robot, as `measurements`. time : (rows of the file,) [s], nan where there is none. notes : what is
+    not compared, and why.
     """
 
     scenario: Scenario

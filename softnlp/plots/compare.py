@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from softnlp.evaluation.comparison import Comparison
 from softnlp.evaluation.observed import NUMBERS, OBSERVABLES
 from softnlp.evaluation.statistics import USED, groups
-from softnlp.plots.compare_parts import LEGEND_ROW, MEASURED, Look, bars, boxes, legend, legend_rows, looks
+from softnlp.plots.compare_parts import LEGEND_ROW, MEASURED, Look, bars, box_labels, boxes, legend, legend_rows, looks
 from softnlp.plots.compare_tips import tips_figure
 from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, new_figure, plain
 from softnlp.runner_compare import CompareTask
@@ -101,7 +101,8 @@ def observable_figure(found: Comparison, name: str, title: str, times: list[Arra
     half = (top - bottom) * min(max(0.12 + 0.04 * len(found.variants), 0.34), 0.52)
     over = bottom + half + 0.62 / height
     bars(figure.add_axes((right / _WIDTH, over, (_WIDTH - right - 0.15) / _WIDTH, top - over)), found, name, made)
-    start = _LEFT + 0.25 + max(len(label) for label in found.labels) * 0.066
+    start = _LEFT + 0.25 + max(len(line) for label in box_labels(found) for line in label.split("\n")) * 0.066
+    start = max(start, right)
     boxes(figure.add_axes((start / _WIDTH, bottom, (_WIDTH - start - 0.15) / _WIDTH, half)), found, name, made)
     lost = any(found.statistics(v, name).count < found.measured(name) for v in range(len(made)))
     legend(figure, _handles(found, made, curved), legend_columns, lost)

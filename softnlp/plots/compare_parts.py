@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +25,7 @@ _LINES: tuple[Any, ...] = ("-", "--", ":", (0, (6, 1, 1, 1)), (0, (1, 1)), (0, (
 _HATCHES = ("", "////", "....", "xxxx", "----", "\\\\\\\\")
 MEASURED = "measured"
 LEGEND_ROW = 0.2  # [inch]
+_LABEL_WIDTH, _MOST_WRAPPED = 24, 8
 _NOTE_WIDTH = 4.4  # [inch]
 _NOTE = "boxes: quartiles and median, diamonds: mean"
 
@@ -105,6 +107,14 @@ def bars(axes: Axes, found: Comparison, name: str, made: Sequence[Look]) -> None
     axes.tick_params(axis="x", length=0, rotation=30 if crowded else 0)
 
 
+def box_labels(found: Comparison) -> list[str]:
+    """Return the names of the boxes: none of a single one, long ones on two lines where there is room for them."""
+    if len(found.labels) == 1:
+        return [""]
+    width = _LABEL_WIDTH if len(found.labels) <= _MOST_WRAPPED else 100
+    return ["\n".join(wrap(label, width)) for label in found.labels]
+
+
 def boxes(axes: Axes, found: Comparison, name: str, made: Sequence[Look]) -> None:
     """Draw a box of the errors of each variant, the first on top; below zero the model is below the measurement."""
     what = OBSERVABLES[name]
@@ -113,7 +123,8 @@ def boxes(axes: Axes, found: Comparison, name: str, made: Sequence[Look]) -> Non
     values = [found.errors(v, name)[0] / what.scale for v in order]
     axes.axvline(0, color=GREY, linewidth=0.8, zorder=1)
     draw_boxes(axes, values, [made[v].colour for v in order], hatches=[made[v].hatch for v in order], mean=True)
-    axes.set_yticks(range(1, len(made) + 1), [found.labels[v] for v in order])
+    names = box_labels(found)
+    axes.set_yticks(range(1, len(made) + 1), [names[v] for v in order])
     axes.tick_params(axis="y", length=0)
     axes.tick_params(labelsize=SMALL if len(made) <= 12 else SMALL - 1.5)
     axes.grid(False, axis="y")
