@@ -22,8 +22,10 @@ from softnlp import (
     Variant,
     compare,
     forward,
+    load_scenario,
     material,
     robot,
+    run_scenario,
 )
 from softnlp.cli import main
 from softnlp.errors import InputError
@@ -31,6 +33,8 @@ from softnlp.evaluation.comparison import Comparison
 from softnlp.evaluation.observed import Observed
 from softnlp.evaluation.simulated import Solved
 from softnlp.evaluation.variants import every_variant, labels
+from softnlp.results.csv_table import write_table
+from softnlp.runner_compare import Asked, compare_task
 from softnlp.status import Status
 from softnlp.units import BAR, DEGREE, MILLIMETRE
 
@@ -123,9 +127,8 @@ def test_results_compared_with_themselves_have_no_error(
         asked.write_text(
             re.sub(r"sequence_bar = .*?\]\]", "sequence_bar = [[0.4, 0, 0], [0.9, 0, 0]]", asked.read_text())
         )
-    assert main(["run", str(asked), "--out", str(tmp_path / "run")]) == 0
-    capsys.readouterr()
-    document = told(capsys, asked, tmp_path / "run" / "table.csv", *words)
+    table = write_table(run_scenario(load_scenario(asked)), tmp_path / "table.csv")
+    document = told(capsys, asked, table, *words)
     found = document["variants"][0]["statistics"]
     expected = {"tip_position_mm", "x_mm", "y_mm", "z_mm", "bending_angle_deg", "elongation_mm", "tilt_deg"}
     assert set(found) == expected | ({"blocked_force_N"} if study == "blocked-force" else set())
@@ -175,7 +178,7 @@ def test_all_rows_at_once_are_the_rows_one_by_one() -> None:
 def test_a_workspace_takes_its_wall_and_its_lane(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The numbers are those of docs/blocked-force.md and docs/model.md."""
     file = measured(tmp_path, f"{HEADER},blocked_force_N,bending_angle_deg", "1.5,0,0,1.18,107.67", "0.5,0,0,,")
-    document = told(capsys, scenario(tmp_path, "workspace", "contact = {}"), file)
+    document = told(capsys, scenario(tmp_path, "workspace", "contact = {}\nsolver = { accuracy = 1e-4 }"), file)
     (variant,) = document["variants"]
     assert variant["closure"] == "compliant"
     assert [row["status"] for row in variant["rows"]] == ["solved", None]
@@ -329,19 +332,24 @@ def test_what_is_not_compared_is_said(tmp_path: Path, capsys: pytest.CaptureFixt
     ]
 
 
-def test_laws_are_those_of_the_silicone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_variants_are_those_that_are_named(tmp_path: Path) -> None:
     file = measured(tmp_path, f"{HEADER},elongation_mm", "0.2,0.2,0.2,2")
-    found = told(capsys, scenario(tmp_path, more=COARSE), file, "--law", "all", "--law", "yeoh")["variants"]
-    assert [v["law"] for v in found] == ["linear", "neo-hookean", "mooney-rivlin", "yeoh", "ogden"]
-    assert len({v["rows"][0]["simulated"]["elongation_mm"] for v in found}) == 5
+    task = compare_task(load_scenario(scenario(tmp_path)), file, Asked(laws=("all", "yeoh"), coefficients=("none",)))
+    assert [v.law for v in task.variants] == ["linear", "neo-hookean", "mooney-rivlin", "yeoh", "ogden"]
+    assert {(v.coefficients.elongation, v.coefficients.bending, v.named) for v in task.variants} == {(0, 0, "none")}
     own = tmp_path / "own.toml"
     law = 'model = "mine", formula = "c*(stretch-1)", constants = { c = 0.05 }'
-    text = scenario(tmp_path, more="stiffening = { elongation = 0.3 }\n" + COARSE).read_text()
-    own.write_text(text.replace('model = "mooney-rivlin"', law))
-    (variant,) = told(capsys, own, file, "--law", "all", "--conventions", "as-printed")["variants"]
-    names = ("law", "coefficients", "conventions")
-    assert [variant[name] for name in names] == ["mine", "scenario", "as_printed"]
-    assert variant["coefficient_values"]["elongation"] == 0.3
+    more = "stiffening = { elongation = 0.3 }\ncorrections = { inertia = 1.1 }"
+    own.write_text(scenario(tmp_path, more=more).read_text().replace('model = "mooney-rivlin"', law))
+    asked = Asked(laws=("all",), coefficients=("scenario", "calibrated"), conventions=("as-printed", "reproduction"))
+    variants = compare_task(load_scenario(own), file, asked).variants
+    assert [(v.law, v.named, v.conventions.name) for v in variants] == [
+        ("mine", named, read) for named in ("scenario", "calibrated") for read in ("as_printed", "reproduction")
+    ]
+    assert [v.coefficients.elongation for v in variants] == [0.3, 0.3, 0.427, 0.427]
+    assert {v.coefficients.inertia for v in variants} == {1.1}  # k_i is the scenario's in every set
+    (by_default,) = compare_task(load_scenario(own), file).variants
+    assert (by_default.named, by_default.closure) == ("scenario", None)
 
 
 GOOD = f"{HEADER},bending_angle_deg"
