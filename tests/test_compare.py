@@ -5,17 +5,19 @@ from __future__ import annotations
 import csv
 import json
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from comparisons import ECOFLEX, made_up
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softnlp import (
     COEFFICIENT_SETS,
-    ContactSettings,
     Loads,
     Measurements,
     Numerics,
@@ -29,9 +31,6 @@ from softnlp import (
 )
 from softnlp.cli import main
 from softnlp.errors import InputError
-from softnlp.evaluation.comparison import Comparison
-from softnlp.evaluation.observed import Observed
-from softnlp.evaluation.simulated import Solved
 from softnlp.evaluation.variants import every_variant, labels
 from softnlp.results.csv_table import write_table
 from softnlp.runner_compare import Asked, compare_task
@@ -41,7 +40,6 @@ from softnlp.units import BAR, DEGREE, MILLIMETRE
 ROOT = Path(__file__).parents[1]
 ANGLES, FORCES = (ROOT / "scenarios" / "compare" / f"{name}.toml" for name in ("angles", "forces"))
 DATA = ROOT / "scenarios" / "files"
-ECOFLEX = material("Ecoflex 00-50")
 BOTH = ["--coefficients", "reproduction", "--coefficients", "calibrated"]
 HEAD = 'robot = { name = "D25L60" }\nmaterial = { name = "Ecoflex 00-50", model = "mooney-rivlin" }\n'
 COARSE = "solver = { intervals = 8 }"
@@ -204,19 +202,6 @@ def test_free_poses_are_solved_once_for_all_closures() -> None:
 
 
 # --- comparisons made up ---
-
-
-def made_up(values: np.ndarray, simulated: np.ndarray, robots: int = 1) -> Comparison:
-    """Return a comparison of the rows dealt out to robots, with numbers as given."""
-    P = np.zeros((len(values), 3))
-    parts = [np.arange(k, len(values), robots) for k in range(robots)]
-    observed = tuple(Observed(robot("D25L60"), f"r{k}", P[rows], values[rows]) for k, rows in enumerate(parts))
-    solved = []
-    for each in simulated:
-        status = [Status.SOLVED if np.isfinite(row).any() else Status.FOLD for row in each]
-        solved.append(tuple(Solved(each[r], tuple(status[k] for k in r), ("",) * len(r)) for r in parts))
-    variants = every_variant([ECOFLEX], {f"c{k}": COEFFICIENT_SETS["reproduction"] for k in range(len(simulated))})
-    return Comparison(observed, variants, tuple(solved), ContactSettings(), "free")
 
 
 @given(st.integers(2, 9), st.integers(0, 2**32 - 1), st.integers(1, 2))
@@ -414,6 +399,24 @@ def test_other_studies_and_missing_files_are_refused(tmp_path: Path, capsys: pyt
     assert "study: expected 'forward', 'blocked-force' or 'workspace', got 'inverse'" in capsys.readouterr().err
     assert main(["compare", str(ANGLES), str(tmp_path / "none.csv")]) == 2
     assert capsys.readouterr().err == f"softnlp: {tmp_path / 'none.csv'}: no such file\n"
+
+
+def test_a_comparison_that_is_stopped_writes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    @contextmanager
+    def stopped(total: int, title: str) -> Iterator[tuple[Any, Any]]:
+        assert total == 2
+        yield done.append, lambda: len(done) == 1
+
+    done: list[int] = []
+    monkeypatch.setattr("softnlp.cli.compare.progress", stopped)
+    file = measured(tmp_path, f"{HEADER},bending_angle_deg", "0.5,0,0,25", "0.6,0,0,30")
+    out = tmp_path / "o"
+    assert main(["compare", str(scenario(tmp_path, more=COARSE)), str(file), "--out", str(out)]) == 130
+    assert capsys.readouterr() == ("", "softnlp: stopped\n")
+    assert done == [1]
+    assert not out.exists()
 
 
 def test_python_arguments_are_checked() -> None:

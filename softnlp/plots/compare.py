@@ -105,7 +105,7 @@ def observable_figure(found: Comparison, name: str, title: str, times: list[Arra
     start = max(start, right)
     boxes(figure.add_axes((start / _WIDTH, bottom, (_WIDTH - start - 0.15) / _WIDTH, half)), found, name, made)
     lost = any(found.statistics(v, name).count < found.measured(name) for v in range(len(made)))
-    legend(figure, _handles(found, made, curved), legend_columns, lost)
+    legend(figure, _handles(found, made, curved), legend_columns, "; crosses: no solution" if lost else "")
     return figure
 
 

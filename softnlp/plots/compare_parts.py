@@ -27,6 +27,7 @@ MEASURED = "measured"
 LEGEND_ROW = 0.2  # [inch]
 _LABEL_WIDTH, _MOST_WRAPPED = 24, 8
 _NOTE_WIDTH = 4.4  # [inch]
+_WIDEST_BAR = 0.3
 _NOTE = "boxes: quartiles and median, diamonds: mean"
 
 
@@ -59,11 +60,10 @@ def legend_rows(found: Comparison, width: float) -> tuple[int, int]:
     return columns, -(-(len(found.labels) + 1) // columns)
 
 
-def legend(figure: Figure, handles: Sequence[Any], columns: int, any_lost: bool = False) -> None:
+def legend(figure: Figure, handles: Sequence[Any], columns: int, more: str = "") -> None:
     """Put the legend at the foot of a figure, and beside it what the marks of all of them mean."""
-    lost = "; crosses: no solution" if any_lost else ""
     note: dict[str, Any] = {"size": SMALL, "color": GREY, "ha": "right"}
-    figure.text(1 - 0.15 / figure.get_figwidth(), 0.1 / figure.get_figheight(), _NOTE + lost, **note)
+    figure.text(1 - 0.15 / figure.get_figwidth(), 0.1 / figure.get_figheight(), _NOTE + more, **note)
     figure.legend(
         handles=list(handles),
         loc="lower left",
@@ -83,7 +83,7 @@ def bars(axes: Axes, found: Comparison, name: str, made: Sequence[Look]) -> None
     what = OBSERVABLES[name]
     robots = [k for k in range(len(found.observed)) if found.measured(name, k)]
     plain(axes, "", f"mean error [{what.unit}]")
-    width = 0.82 / len(made)
+    width = min(0.82 / len(made), _WIDEST_BAR)
     for v, look in enumerate(made):
         means = np.array([found.statistics(v, name, k).mean for k in robots]) / what.scale
         places = np.arange(len(robots)) + (v - (len(made) - 1) / 2) * width

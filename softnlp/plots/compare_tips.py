@@ -53,7 +53,7 @@ def tips_figure(found: Comparison, title: str) -> Figure:
     half = (top - bottom - 0.7 / height) / 2
     _axis_boxes(figure.add_axes((0.62, top - half, 0.37, half)), found, made)
     _histogram(figure.add_axes((0.62, bottom, 0.37, half)), found, made)
-    legend(figure, _handles(found, made, best), columns)
+    legend(figure, _handles(found, made, best), columns, "; thin lines: mean distances")
     return figure
 
 
@@ -127,6 +127,4 @@ def _histogram(axes: Axes, found: Comparison, made: list[Look]) -> None:
             axes.axvline(float(np.mean(d)), color=look.colour, linestyle=look.line, linewidth=0.9, alpha=0.8)
     axes.set_xlim(0.0, highest)
     axes.set_ylim(bottom=0)
-    note: dict[str, Any] = {"size": SMALL, "color": GREY, "ha": "right", "va": "top"}
-    axes.text(0.985, 0.96, "thin vertical lines: means", transform=axes.transAxes, **note)
     axes.tick_params(labelsize=SMALL)
