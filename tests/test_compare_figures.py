@@ -21,7 +21,7 @@ from softnlp.evaluation.comparison import Comparison
 from softnlp.evaluation.observed import OBSERVABLES
 from softnlp.plots import observable_figure, tips_figure
 from softnlp.plots.compare_parts import looks
-from softnlp.results.comparison import _STATISTICS
+from softnlp.results.comparison import STATISTICS
 from softnlp.runner_compare import ALIASES, MEASURED_COLUMNS
 from softnlp.units import BAR, DEGREE, MILLIMETRE
 
@@ -248,4 +248,4 @@ def test_everything_is_documented(capsys: pytest.CaptureFixture[str]) -> None:
     plain = {name for name in ALIASES if not re.search(r"_[yz]_mm$", name)}
     assert plain <= shown
     assert {o.key for o in OBSERVABLES.values()} <= shown
-    assert set(_STATISTICS) <= shown
+    assert set(STATISTICS) <= shown

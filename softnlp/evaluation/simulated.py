@@ -26,6 +26,8 @@ from softnlp.workspace.poses import STATUSES
 Array = NDArray[np.float64]
 Tell = Callable[[int], None]
 """Called with how many rows were solved since the last call."""
+Solve = Callable[[Array, Any], tuple[Step, Any]]
+"""Solves a row from the last one that was found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,40 +54,31 @@ class RowSolver:
 
     def solve(self, model: Model, pressure: Array, contact: ContactSettings | None, tell: Tell) -> Solved:
         """Return the poses at pressures (rows, sets) [Pa], against the wall of `contact` if there is one."""
-        steps = self._free_steps(model, pressure, tell) if contact is None else None
-        if contact is not None:
-            steps = self._blocked_steps(model, pressure, contact, tell)
-        assert steps is not None
+        solve = self._free_solve(model) if contact is None else self._blocked_solve(model, pressure, contact)
+        near, steps = None, []
+        for P in pressure:
+            step, found = solve(P, near)
+            near = found or near
+            steps.append(step)
+            tell(1)
         length = float(model.robot.length)
         values = np.array([_numbers(step, length) for step in steps]).reshape(-1, len(NUMBERS))
         return Solved(values, tuple(step.status for step in steps), tuple(step.message for step in steps))
 
-    def _free_steps(self, model: Model, pressure: Array, tell: Tell) -> list[Step]:
+    def _free_solve(self, model: Model) -> Solve:
         kind = _kind(model)
         if kind not in self._free:
             self._free[kind] = PoseSolver(model, self._numerics)
         solver = self._free[kind].with_model(model)
-        near, steps = None, []
-        for P in pressure:
-            step, found = solver.solve(P, self._loads, near)
-            near = found or near
-            steps.append(step)
-            tell(1)
-        return steps
+        return lambda P, near: solver.solve(P, self._loads, near)
 
-    def _blocked_steps(self, model: Model, pressure: Array, contact: ContactSettings, tell: Tell) -> list[Step]:
+    def _blocked_solve(self, model: Model, pressure: Array, contact: ContactSettings) -> Solve:
         kind = (*_kind(model), contact)
         if kind not in self._blocked:
             self._blocked[kind] = BlockedSolver(model, self._numerics, contact)
         solver = self._blocked[kind].with_model(model)
         wall = standing_wall(solver.poses, contact, pressure, self._loads)
-        near, steps = None, []
-        for P in pressure:
-            step, found = solver.solve(P, self._loads, wall, near)
-            near = found or near
-            steps.append(step)
-            tell(1)
-        return steps
+        return lambda P, near: solver.solve(P, self._loads, wall, near)
 
 
 def _kind(model: Model) -> tuple[Any, ...]:

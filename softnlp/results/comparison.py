@@ -18,7 +18,7 @@ from softnlp.results.identify_document import number
 from softnlp.results.inputs import coefficients_table, contact_table, loads_table, package_version, pressure_bar, tidy
 from softnlp.runner_compare import CompareTask
 
-_STATISTICS = ("count", "rmse", "mape_percent", "mean", "median", "max", "bias", "left_out_of_mape", "unit")
+STATISTICS = ("count", "rmse", "mape_percent", "mean", "median", "max", "bias", "left_out_of_mape", "unit")
 _VARIANT = ("law", "coefficients", "conventions", "closure")
 
 
@@ -80,12 +80,12 @@ def _statistics(found: Comparison, v: int, robot: int | None) -> dict[str, Any]:
     for name in found.observables:
         if found.measured(name, robot):
             values = statistics_cells(found.statistics(v, name, robot), name)
-            told[OBSERVABLES[name].key] = dict(zip(_STATISTICS, values, strict=True))
+            told[OBSERVABLES[name].key] = dict(zip(STATISTICS, values, strict=True))
     return told
 
 
 def statistics_cells(s: Statistics, name: str) -> list[Any]:
-    """Return statistics in the unit of files, in the order of `_STATISTICS`; None where there is no number."""
+    """Return statistics in the unit of files, in the order of `STATISTICS`; None where there is no number."""
     scale = OBSERVABLES[name].scale
     rmse, mean, median, largest, bias = (number(x / scale) for x in (s.rmse, s.mean, s.median, s.largest, s.bias))
     return [s.count, rmse, number(s.mape), mean, median, largest, bias, s.left_out, OBSERVABLES[name].unit]
@@ -148,7 +148,7 @@ def summary_text(found: Comparison) -> str:
                 if found.measured(name, robot):
                     cells = statistics_cells(found.statistics(v, name, robot), name)
                     rows.append([*_named(found, v).values(), label, OBSERVABLES[name].key, *cells])
-    return _csv([*_VARIANT, "robot", "observable", *_STATISTICS], rows)
+    return _csv([*_VARIANT, "robot", "observable", *STATISTICS], rows)
 
 
 def require_free_names(task: CompareTask) -> None:
