@@ -54,6 +54,7 @@ def _app() -> App:
     from cyclopts import App, Parameter
 
     from softnlp import __version__
+    from softnlp.cli.compare import compare
     from softnlp.cli.design import design
     from softnlp.cli.identify import identify
     from softnlp.cli.inverse import inverse
@@ -79,6 +80,7 @@ def _app() -> App:
     app.command(inverse)
     app.command(sensitivity)
     app.command(identify)
+    app.command(compare)
     app.command(design)
     app.command(robots)
     app.command(materials)
