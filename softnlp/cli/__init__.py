@@ -54,6 +54,7 @@ def _app() -> App:
     from cyclopts import App, Parameter
 
     from softnlp import __version__
+    from softnlp.cli.compare import compare
     from softnlp.cli.design import design
     from softnlp.cli.gui import gui
     from softnlp.cli.identify import identify
@@ -81,6 +82,7 @@ def _app() -> App:
     app.command(inverse)
     app.command(sensitivity)
     app.command(identify)
+    app.command(compare)
     app.command(design)
     app.command(gui)
     app.command(mesh)

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softnlp.evaluation.statistics import Statistics
 from softnlp.materials import Material
 from softnlp.results.inputs import package_version, tidy
-from softnlp.studies.fit_statistics import Misfit
 from softnlp.studies.free_constants import COEFFICIENTS
 from softnlp.studies.measurements import OBSERVABLES, column_slice
 from softnlp.units import BAR, DEGREE, MEGAPASCAL, MILLIMETRE
@@ -54,7 +54,7 @@ def _head(asked: Scenario) -> dict[str, Any]:
     }
 
 
-def _misfit(found: Misfit, unit: float) -> dict[str, Any]:
+def _misfit(found: Statistics, unit: float) -> dict[str, Any]:
     return {"count": found.count, "rmse": number(found.rmse / unit), "mape_percent": number(found.mape)}
 
 
