@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from softnlp.scenario import Scenario
     from softnlp.studies.identified import Identified
-    from softnlp.studies.identify_task import RobotTask, TensileTask
+    from softnlp.studies.identify_task import TensileTask
     from softnlp.studies.tensile import TensileFit
 
 
