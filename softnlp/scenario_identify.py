@@ -32,7 +32,7 @@ RobotMaker = Callable[[RobotTable], Robot]
 FILE_KEYS: Mapping[str, tuple[str, float]] = {"tip_position": ("tip_position_mm", MILLIMETRE), **SCALARS}
 """What an observable is called in files, and its unit there."""
 
-_UNUSED_BY_TENSILE = ("robots", "sigma", "contact", "gravity", "tip_load", "stiffening", "corrections", "solver")
+UNUSED_BY_TENSILE = ("robots", "sigma", "contact", "gravity", "tip_load", "stiffening", "corrections", "solver")
 _UNUSED_CONTACT = ("offsets_mm", "offset_ramp", "target_force_N")
 
 
@@ -58,7 +58,7 @@ def identify_task(given: Given) -> TensileTask | RobotTask:
     file = given.file
     tensile, measured = file.tensile, file.measurements
     if tensile is not None and measured is None:
-        for name in _UNUSED_BY_TENSILE:
+        for name in UNUSED_BY_TENSILE:
             if name in given.written:
                 raise InputError("this table is not used by a tensile test; remove it", table=name)
         return _located("tensile", lambda: _tensile(given, tensile))

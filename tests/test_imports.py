@@ -73,13 +73,15 @@ LAYERS = (
     *("scenario_workspace", "scenario_inverse", "scenario_identify", "scenario_design"),
     "scenario",
     *("workspace.planning", "workspace.journal", "workspace.worker", "workspace.pool"),
-    *("runner_blocked", "runner_inverse", "runner", "runner_design", "runner_compare", "results"),
+    *("runner_blocked", "runner_inverse", "runner", "runner_design", "runner_identify", "runner_compare", "results"),
     *("workspace.columns", "workspace.sink", "workspace.dataset", "workspace.run"),
     *("workspace.read", "workspace.boundary", "workspace.dexterity", "workspace.summary", "workspace.export"),
     *("workspace.measured", "workspace.again", "workspace.comparison"),
-    *("plots", "cli", "__main__"),
+    "palette",
+    "mesh",
+    *("plots", "app", "cli", "__main__"),
 )
-MIXED = ("results", "plots", "cli")
+MIXED = ("results", "mesh", "plots", "app", "cli")
 LONGEST_FILE = 400
 HEAVY = ("casadi", "numpy", "scipy", "matplotlib", "pydantic", "cyclopts", "rich", "xarray", "h5netcdf", "h5py")
 
