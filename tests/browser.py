@@ -46,7 +46,7 @@ class Watched:
 
     def value_becomes(self, testid: str, text: str) -> None:
         """Wait until a field shows a text."""
-        found = f"document.querySelector(\"input[data-testid='{testid}']\").value === {json.dumps(text)}"
+        found = f"document.querySelector(\"input[data-testid='{testid}']\")?.value === {json.dumps(text)}"
         self.page.wait_for_function(found)
 
     def type(self, testid: str, value: str) -> None:
