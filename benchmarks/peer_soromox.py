@@ -1,4 +1,4 @@
-"""The cantilever by SoRoMoX: strain-based rods in JAX, of piecewise constant strain (PCS) and of strain as polynomials (GVS).
+"""The cantilever by SoRoMoX: strain-based rods in JAX, of piecewise constant (PCS) and of polynomial strain (GVS).
 
 SoRoMoX 0.5 has no solver for statics, so its equilibrium is written with what it has: elastic_force(q) is to equal the
 tip's Jacobian transposed times the load, solved by Newton's method with JAX's own derivative, all of it in one compiled
@@ -10,14 +10,16 @@ three strains of the plane as Legendre polynomials over the whole rod. Compiling
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from benchmarks.paper_method import Array
 from benchmarks.race import Entry
 
 if TYPE_CHECKING:
-    from benchmarks.cantilever import Array, Cantilever
+    from benchmarks.cantilever import Cantilever
 
 STEP = 1e-10  # of strain, the curvature times the length
 _MOST_ITERATIONS = 50
@@ -40,18 +42,18 @@ def entries(c: Cantilever) -> list[Entry]:
 def piecewise_constant(c: Cantilever, segments: int) -> Callable[[], Array]:
     """Return what solves the planar model; its base points along y, so x is across it."""
     jnp = _jax_numpy()
-    from soromox import LinkSpec, PlanarPCS, PlanarPCSStructure
+    sm: Any = import_module("soromox")
 
     h = c.length / segments
-    link = LinkSpec.circular(
+    link = sm.LinkSpec.circular(
         length=h,
         radius=c.radius,
         density=_DENSITY,
         reference_strain=[0.0, 1.0, 0.0],
         stiffness=h * np.diag([c.EI, c.EA, c.GA]),
     )
-    rod = PlanarPCS.from_links(
-        [link] * segments, gravity=jnp.zeros(2), structure=PlanarPCSStructure(num_gauss_points=1)
+    rod = sm.PlanarPCS.from_links(
+        [link] * segments, gravity=jnp.zeros(2), structure=sm.PlanarPCSStructure(num_gauss_points=1)
     )
     wrench, tip = jnp.array([0.0, c.force, 0.0]), jnp.asarray(c.length)
     newton = _newton(lambda q: rod.elastic_force(q) - rod.jacobian(q, tip).T @ wrench, 3 * segments, h)
@@ -66,9 +68,9 @@ def piecewise_constant(c: Cantilever, segments: int) -> Callable[[], Array]:
 def polynomial(c: Cantilever, order: int) -> Callable[[], Array]:
     """Return what solves the spatial model; its base points along z, and the force is along y."""
     jnp = _jax_numpy()
-    from soromox import GVS, GVSSegment, JointSpec, LinkSpec, StrainBasisSpec
+    sm: Any = import_module("soromox")
 
-    link = LinkSpec.circular(
+    link = sm.LinkSpec.circular(
         length=c.length,
         radius=c.radius,
         density=_DENSITY,
@@ -76,8 +78,8 @@ def polynomial(c: Cantilever, order: int) -> Callable[[], Array]:
         young_modulus=c.youngs_modulus,
         shear_modulus=c.shear_modulus,
     )
-    basis = StrainBasisSpec("legendre", ("kappa_z", "sigma_x", "sigma_y"), order)
-    rod = GVS.from_segments([GVSSegment(link, JointSpec.fixed(), basis, 2 * order + 4)], gravity=jnp.zeros(3))
+    basis = sm.StrainBasisSpec("legendre", ("kappa_z", "sigma_x", "sigma_y"), order)
+    rod = sm.GVS.from_segments([sm.GVSSegment(link, sm.JointSpec.fixed(), basis, 2 * order + 4)], gravity=jnp.zeros(3))
     wrench, tip = jnp.zeros(6).at[4].set(c.force), jnp.asarray(c.length)
     newton = _newton(
         lambda q: rod.elastic_force(q) - rod.jacobian_inertialframe(q, tip).T @ wrench, 3 * (order + 1), c.length
@@ -95,7 +97,7 @@ def _newton(residual: Callable[[Any], Any], size: int, length: float) -> Callabl
 
     What it returns raises RuntimeError where it does not converge.
     """
-    import jax
+    jax: Any = import_module("jax")
 
     jnp = _jax_numpy()
 
@@ -120,7 +122,7 @@ def _newton(residual: Callable[[Any], Any], size: int, length: float) -> Callabl
 
 def _jax_numpy() -> Any:
     """Return JAX's NumPy, in double precision."""
-    import jax
+    jax: Any = import_module("jax")
 
     jax.config.update("jax_enable_x64", True)
     return jax.numpy

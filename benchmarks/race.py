@@ -20,8 +20,9 @@ class Entry:
     """A method at one resolution.
 
     prepare : builds what is kept between solves and returns what solves once. module : what must be installed, if it
-    is not the package's own. units : how many answers a solve gives; times are for one. uncharged : seconds of all
-    solves so far that the method is not to be charged with.
+    is not the package's own. units : how many answers a solve gives; times are for one. once : nothing is kept between
+    solves and one takes long, so the first is the only one. uncharged : seconds of all solves so far that the method is
+    not to be charged with. judged : whether its answer is that of the others.
     """
 
     tool: str
@@ -30,6 +31,8 @@ class Entry:
     module: str = ""
     reference: bool = False
     units: int = 1
+    judged: bool = True
+    once: bool = False
     note: str = ""
     uncharged: Callable[[], float] = field(default=lambda: 0.0)
 
@@ -70,10 +73,12 @@ class _Runner:
         began = time.perf_counter()
         try:
             self.solve = self.entry.prepare()
-            self.answer = self.solve()
+            self.again()
         except (ArithmeticError, RuntimeError, ValueError) as error:
             self.solve, self.trouble = None, f"failed: {str(error).splitlines()[0]}"
         self.first = time.perf_counter() - began
+        if not self.entry.once:
+            self.times.clear()
 
     def again(self) -> None:
         """Solve once more on the clock."""
@@ -99,7 +104,7 @@ def race(
     running = [r for r in runners if r.solve is not None]
     for turn in range(repeats):
         for r in running:
-            if turn == 0 or sum(r.times) * r.entry.units * (turn + 1) / turn <= seconds:
+            if not r.entry.once and (turn == 0 or sum(r.times) * r.entry.units * (turn + 1) / turn <= seconds):
                 say(f"{task}: {r.entry.tool}, {r.entry.resolution}, {turn + 1} of {repeats}")
                 r.again()
     reference = next((median(r.times) for r in running if r.entry.reference), None)
@@ -118,7 +123,7 @@ def _row(task: str, r: _Runner, judge: Judge, reference: float | None) -> Row:
         seconds=seconds,
         first_seconds=r.first,
         ratio=None if reference is None else seconds / reference,
-        error=judge(r.answer),
+        error=judge(r.answer) if entry.judged else None,
         repeats=len(r.times),
         reference=entry.reference,
         note=entry.note,

@@ -1,4 +1,4 @@
-"""The same rod by `scipy.integrate.solve_bvp`: a public collocation solver with an adaptive mesh, to be timed beside us.
+"""The same rod by `scipy.integrate.solve_bvp`: a public collocation solver with an adaptive mesh.
 
 The state is p, R, n, m with 12 conditions at the base and 6 at the tip, made dimensionless by L, EI/L^2 and EI/L. The
 field is vectorised over the mesh, as the solver wants it; its Jacobian is the solver's own forward difference, as a
