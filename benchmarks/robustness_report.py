@@ -30,7 +30,7 @@ def figure(poses: Sequence[Tried], buckling: float, path: Path) -> None:
         12.0,
         7.6,
         "Which way finds an equilibrium, from nothing",
-        f"{each} directions of the force a cell; its number: median iterations of those solved; (n): n of the solutions "
+        f"{each} directions of the force a cell; its number: median iterations of those solved; (n): n solutions "
         "are not the load path's",
     )
     axes = drawn.subplots(2, 4, sharex=True, sharey=True)
@@ -109,7 +109,8 @@ def markdown(poses: Sequence[Tried], buckling: float, machine: Mapping[str, str]
     parts.append("Written by `python -m benchmarks.robustness_map`; [what they mean](../robustness.md).")
     listed = ", ".join(f"{key}: {machine[key]}" for key in ("processor", "cores", "Python", "casadi", "scipy", "date"))
     parts.append(
-        f"{listed}. D15L60 in Ecoflex 00-50, {len(poses)} poses, {seconds:.0f} s. The straight robot buckles at {buckling:.4g} N."
+        f"{listed}. D15L60 in Ecoflex 00-50, {len(poses)} poses, {seconds:.0f} s. "
+        f"The straight robot buckles at {buckling:.4g} N."
     )
     parts.append(_load_paths(poses))
     head = "| way | solved | the load path's | another, stable | another, unstable | iterations, median | nine in ten |"
