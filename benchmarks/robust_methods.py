@@ -162,7 +162,7 @@ class Methods:
         return straight_path(self.grid.problem, unloaded, values), self.start(self.grid, unloaded)[1]
 
     def end_of_load_path(self, pose: Pose) -> Array | None:
-        """Return the load path's equilibrium, followed in steps too small to meet another branch; None at a fold."""
+        """Return the load path's equilibrium, followed in small steps; None at a fold."""
         path, x = self.load_path(self.values(pose))
         followed = follow(
             self.grid.stepper, path, x, distance=pose_distance, first_step=1 / 16, largest_jump=0.1, most_solves=1000

@@ -145,7 +145,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "residual": RESIDUAL,
         "poses": [asdict(pose) for pose in found],
     }
-    (given.out / "robustness.json").write_text(json.dumps(document, allow_nan=False) + "\n", encoding="utf-8")
+    (given.out / "robustness.json").write_text(
+        json.dumps(document, allow_nan=False, separators=(",", ":")) + "\n", encoding="utf-8"
+    )
     print(page)
 
 
