@@ -90,7 +90,7 @@ class _Runner:
 
 
 def race(
-    task: str, entries: Sequence[Entry], judge: Judge, *, repeats: int = 5, seconds: float = 12.0, say: Say = print
+    task: str, entries: Sequence[Entry], judge: Judge, *, repeats: int = 5, seconds: float = 6.0, say: Say = print
 ) -> list[Row]:
     """Time all entries of one task in turns; the first solve of each is not among its repeats.
 

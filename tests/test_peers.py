@@ -208,3 +208,35 @@ def test_the_report_counts_what_was_tried(mild: robustness_map.Tried, column: ro
     assert "| softnlp | 1 | diverged after … % |" in page
     robustness_report.figure([flat, mild, column, worse], 0.1, tmp_path / "map.png")
     assert (tmp_path / "map.png").stat().st_size > 10_000
+
+
+# --- the documents ---------------------------------------------------------------------------------------------------
+
+DOCS = Path(__file__).parents[1] / "docs"
+
+
+def test_the_table_of_the_documents_is_made_of_its_json() -> None:
+    whole = json.loads((DOCS / "benchmarks" / "table.json").read_text())
+    rows = [race.Row(**row) for row in whole["rows"]]
+    headings = {name: table.Heading(**heading) for name, heading in whole["tasks"].items()}
+    page = table.markdown(rows, headings, whole["machine"], whole["seconds"])
+    assert page == (DOCS / "benchmarks" / "table.md").read_text()
+    assert len(headings) == len(command.TASKS)
+
+
+def test_the_numbers_of_robustness_are_made_of_their_json() -> None:
+    whole = json.loads((DOCS / "benchmarks" / "robustness.json").read_text())
+    poses = [
+        robustness_map.Tried(**{**pose, "outcomes": tuple(robustness_map.Outcome(**end) for end in pose["outcomes"])})
+        for pose in whole["poses"]
+    ]
+    page = robustness_report.markdown(poses, whole["buckling_N"], whole["machine"], whole["seconds"])
+    assert page == (DOCS / "benchmarks" / "robustness.md").read_text()
+
+
+def test_the_documents_name_every_task_and_every_way() -> None:
+    listed = [line.split(" | ")[0].strip("| ") for line in (DOCS / "robustness.md").read_text().splitlines()]
+    assert set(robustness_map.methods().by_name) <= set(listed)
+    text = (DOCS / "benchmarks.md").read_text()
+    for task in json.loads((DOCS / "benchmarks" / "table.json").read_text())["tasks"]:
+        assert f"| {task} |" in text or f"## The {task}" in text, task
