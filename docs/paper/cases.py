@@ -1,0 +1,67 @@
+"""The scenarios behind the pages, and variants of them over laws, sets and coefficients."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from docs.paper.published import ROOT
+from softnlp import BAR, COEFFICIENT_SETS, ROBOTS, Coefficients, material
+from softnlp.laws import LAWS
+from softnlp.quantities import Model
+from softnlp.scenario import Scenario, load_scenario
+from softnlp.studies.statics import PoseSolver
+
+Array = NDArray[np.float64]
+
+NAMES = tuple(name for name in ROBOTS if name.startswith("D"))
+"""The eight robots that were tested."""
+STIFFENED = COEFFICIENT_SETS["reproduction"]
+BARE = replace(STIFFENED, elongation=0.0, bending=0.0)
+"""Without the stiffening terms of Eqs. (10) and (12)."""
+HYPERELASTIC = tuple(law for law in LAWS if law != "linear")
+
+
+@cache
+def case(name: str, folder: str = "paper") -> Scenario:
+    """Return a scenario of `scenarios/<folder>`."""
+    return load_scenario(ROOT / "scenarios" / folder / f"{name}.toml")
+
+
+def model_of(scenario: Scenario, law: str | None = None, coefficients: Coefficients | None = None) -> Model:
+    """Return the model of a scenario, with another law or other coefficients where they are given."""
+    silicone = scenario.material if law is None else material(scenario.material.name, law)
+    return Model(scenario.robot, silicone, coefficients or scenario.coefficients, scenario.conventions)
+
+
+def law_of(scenario: Scenario) -> str:
+    """Return the name of a scenario's law."""
+    return scenario.material.law.name
+
+
+def with_sets(pressures: Array, sets: int) -> Array:
+    """Return pressures of set 1 (steps, sets) [Pa] with the same in the first so many sets."""
+    pressed = np.arange(pressures.shape[1]) < sets
+    return np.where(pressed, pressures[:, :1], 0.0)
+
+
+def in_bar(pressures: Array) -> Array:
+    """Return the pressures of set 1 (steps,) [bar]."""
+    return np.asarray(pressures[:, 0] / BAR)
+
+
+class Solvers:
+    """Pose solvers of many models; what robots of one kind and law share is compiled once."""
+
+    def __init__(self) -> None:
+        self._made: dict[tuple[int, int, str], PoseSolver] = {}
+
+    def of(self, model: Model, scenario: Scenario) -> PoseSolver:
+        """Return the solver of a model, with the numerics of a scenario."""
+        key = (model.robot.chamber_sets, model.robot.chambers_per_set, model.material.law.name)
+        if key not in self._made:
+            self._made[key] = PoseSolver(model, scenario.numerics)
+        return self._made[key].with_model(model)
