@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from docs.paper.cases import BARE, NAMES, STIFFENED, Solvers, case, in_bar, law_of, model_of, with_sets
+from docs.paper.cases import BARE, NAMES, STIFFENED, Solvers, arc_angle, case, in_bar, law_of, model_of, with_sets
 from docs.paper.figures import MEASURED, label_outer, legend, named, panels, saved
 from docs.paper.published import elongation_range, mean_error, measured_angles, measured_pressure
 from docs.paper.text import between, figure, fixed, page_text, scenario_link, table
 from softnlp import COEFFICIENT_SETS, DEGREE, MILLIMETRE, Coefficients, Loads, Material, material
 from softnlp.laws import LAWS
 from softnlp.plots.style import INK, colour
-from softnlp.studies.arc import arc_pose, unloaded_arc
+from softnlp.studies.arc import unloaded_arc
 from softnlp.studies.identify import identify
 from softnlp.studies.identify_task import RobotTask
 
@@ -54,9 +54,8 @@ def curve(solvers: Solvers, robot: str, sets: int, law: str, coefficients: Coeff
         if not branch.status.has_solution:
             rows.append((np.nan, np.nan, np.nan))
             continue
-        pose = arc_pose(poses, arc)
-        longer = pose.backbone_length - float(scenario.robot.length)
-        rows.append((pose.bending_angle / DEGREE, longer / MILLIMETRE, pose.stretch))
+        longer = (arc.stretch - 1) * float(scenario.robot.length)  # an arc without loads is stretched by pressure alone
+        rows.append((arc_angle(poses, arc) / DEGREE, longer / MILLIMETRE, arc.stretch))
     return Curve(in_bar(scenario.pressures), *np.array(rows).T)
 
 
@@ -184,8 +183,8 @@ def _reasons(found: Mapping[Key, Curve], law: str) -> str:
         [
             "- The coefficients are those that reproduce the paper's own simulations "
             "([laparoscope](laparoscope.md)). They are shared by all robots; with two sets the error is "
-            f"{', '.join(over)}. Fitting k_e and k_b to the angles does not help, as the table shows: no pair shared by "
-            "all does well for both wide and narrow robots. With phi the error falls, but does not vanish.",
+            f"{', '.join(over)}. Fitting k_e and k_b to the angles does not help, as the table shows: no pair shared "
+            "by all does well for both wide and narrow robots. With phi the error falls, but does not vanish.",
             f"- {narrow.name} has nearly the proportions of {wide.name}. By any law in which only proportions count it "
             f"bends {float(wide.outer_diameter / narrow.outer_diameter):.2f} times as far: {scaled:.0f} deg with one "
             f"set. It bent {measured[narrow.name, 1]:.0f} deg. That is in the robot, not in the equations.",
@@ -195,7 +194,8 @@ def _reasons(found: Mapping[Key, Curve], law: str) -> str:
             f"laws were not fitted; the largest is {max(stretches):.2f}. With it the largest is "
             f"{max(float(np.nanmax(c.stretch)) for key, c in found.items() if key[3]):.2f}.",
             "- The modulus of the linear law is not published; here it is the secant of the Mooney-Rivlin curve at "
-            fXX
+            f"the end of the fitted range, a stretch of {limit:g}: {_kilopascal(linear):.1f} kPa, where the tangent "
+            f"modulus E_t of {law} is {_kilopascal(silicone):.1f} kPa at rest. So this law bends too far.",
             f"- Conventions: `{case(f'bending_{NAMES[0]}').conventions.name}`. As printed, the stiffening force adds "
             "to the pressure, and the larger robots have no equilibrium ([model](../model.md#conventions)).",
         ]

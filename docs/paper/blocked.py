@@ -163,9 +163,9 @@ def page(folder: Path) -> str:
         "A status in place of a number: the branch from zero pressure ends before.",
         *(part for closure in CLOSURES for part in (f"### `{closure}`", _table(found, closure))),
         "## RMSE and MAPE",
-        "As in Table IV of the paper, over all robots and all steps from the first pressure to the last; the measured "
-        "force is taken as linear in pressure, as it was found to be nearly. Steps without a solution are left out, and "
-        "counted.",
+        "The measures of Table IV of the paper, over all robots and all steps from the first pressure to the last; the "
+        "measured force is taken as linear in pressure, as it was found to be nearly. Steps without a solution are left "
+        "out, and counted.",
         _misfits(found, calibrated, law),
         "By robot, over the same steps:",
         _by_robot(found, calibrated, law),
@@ -199,7 +199,16 @@ def _misfits(found: Forces, calibrated: Mapping[str, Pushed], law: str) -> str:
                      fixed(end.rmse, 3), fixed(end.mape), f"{end.solved} of {end.steps}"])  # fmt: skip
     top = measured_pressure()
     return table(
-        ["closure", "law", "RMSE [N]", "MAPE [%]", "steps", f"RMSE at {top} bar [N]", f"MAPE at {top} bar [%]", "robots"],
+        [
+            "closure",
+            "law",
+            "RMSE [N]",
+            "MAPE [%]",
+            "steps",
+            f"RMSE at {top} bar [N]",
+            f"MAPE at {top} bar [%]",
+            "robots",
+        ],
         rows,
     )
 
@@ -227,22 +236,27 @@ def _tuned(tuned: Mapping[str, tuple[float, Pushed | None]], law: str) -> str:
         if curve is not None:
             error = curve.force / _measured_curve(name) - 1
             errors.append(error)
-            row[2:] = [fixed(float(curve.force[-1]), 3), fixed(float(curve.force[0]), 3), fixed(100 * float(np.nanmean(np.abs(error))))]
+            row[2:] = [
+                fixed(float(curve.force[-1]), 3),
+                fixed(float(curve.force[0]), 3),
+                fixed(100 * float(np.nanmean(np.abs(error)))),
+            ]
         rows.append(row)
     pressures = in_bar(raised(case(f"blocked_{NAMES[0]}").pressures))
     none = [name for name, (length, _) in tuned.items() if np.isnan(length)]
     least = (
-        f" For {', '.join(none)} no W_L gives the measured force: the force jumps over it where the branch folds, and the "
-        "other weights would have to change too."
+        f" For {', '.join(none)} no W_L gives the measured force: the force jumps over it where the branch folds, and "
+        "the other weights would have to change too."
         if none
         else ""
     )
     return (
-        f"The W_L with which `weighted` gives the force measured at {measured_pressure()} bar ({law}, the other weights "
-        f"as above). The curves are then {100 * float(np.nanmean(np.abs(errors))):.1f} % off on average, with a "
+        f"The W_L with which `weighted` gives the force measured at {measured_pressure()} bar ({law}, the other "
+        f"weights as above). The curves are then {100 * float(np.nanmean(np.abs(errors))):.1f} % off on average, with a "
         f"constant for each robot instead of one for all.{least}\n\n"
         + table(
-            ["robot", "W_L [1/m]", *(f"force at {p:g} bar [N]" for p in (pressures[-1], pressures[0])), "MAPE [%]"], rows
+            ["robot", "W_L [1/m]", *(f"force at {p:g} bar [N]" for p in (pressures[-1], pressures[0])), "MAPE [%]"],
+            rows,
         )
     )
 
@@ -272,23 +286,21 @@ def _reasons(found: Forces, calibrated: Mapping[str, Pushed], law: str) -> str:
             f"- `rigid` holds the lengths exactly. It gives {min(ratios):.1f} to {max(ratios):.1f} times the measured "
             f"force, and its branch ends before {measured_pressure()} bar on {folds['rigid']} of {len(NAMES)} robots "
             f"({folds['weighted']} for `weighted`, {folds['compliant']} for `compliant`).",
-            f"- `compliant` is semi-empirical: its one constant k_c = {k_c:g} was fitted to these {len(NAMES)} forces at "
-            f"{measured_pressure()} bar, so its {at_end.mape:.1f} % there is a fit and no prediction. Its force rises "
+            f"- `compliant` is semi-empirical: its one constant k_c = {k_c:g} was fitted to these {len(NAMES)} forces "
+            f"at {measured_pressure()} bar, so its {at_end.mape:.1f} % there is a fit and no prediction. Its force rises "
             f"faster than in proportion: at the lowest pressure it is below the measured line for {low} of "
             f"{len(NAMES)} robots, and the whole curve is {compliant.mape:.0f} % off. The calibrated coefficients, "
             f"fitted to forces and angles together, bring that to {fitted.mape:.1f} %.",
-            "- The shapes are planar. Without friction a blocked robot may slip sideways past the wall above a pressure "
-            f"that depends on the robot: {', '.join(slips)} (`compliant`). A sensor has friction, and the paper's model "
-            "is used in the plane; the force given is that of the planar shape.",
-            "- Measured curves are known here by their last point and by being close to linear, so the errors along the "
-            "curve are those to that line.",
+            "- The shapes are planar. Without friction a blocked robot may slip sideways past the wall above a "
+            f"pressure that depends on the robot: {', '.join(slips)} (`compliant`). A sensor has friction, and the "
+            "paper's model is used in the plane; the force given is that of the planar shape.",
+            "- Measured curves are known here by their last point and by being close to linear, so the errors along "
+            "the curve are those to that line.",
         ]
     )
 
 
-def _draw_curves(
-    found: Forces, calibrated: Mapping[str, Pushed], law: str, silicone: str, folder: Path
-) -> None:
+def _draw_curves(found: Forces, calibrated: Mapping[str, Pushed], law: str, silicone: str, folder: Path) -> None:
     """Draw a panel a robot: the closures under one law, the spread over the laws, and the measured line."""
     columns = len(NAMES) // 2
     words = "bands: spread over the four laws; rigid leaves the panels"

@@ -13,6 +13,7 @@ from softnlp import BAR, COEFFICIENT_SETS, ROBOTS, Coefficients, material
 from softnlp.laws import LAWS
 from softnlp.quantities import Model
 from softnlp.scenario import Scenario, load_scenario
+from softnlp.studies.arc import Arc
 from softnlp.studies.statics import PoseSolver
 
 Array = NDArray[np.float64]
@@ -54,14 +55,22 @@ def in_bar(pressures: Array) -> Array:
 
 
 class Solvers:
-    """Pose solvers of many models; what robots of one kind and law share is compiled once."""
+    """Pose solvers of many models; robots of one kind, law and conventions share what is compiled."""
 
     def __init__(self) -> None:
-        self._made: dict[tuple[int, int, str], PoseSolver] = {}
+        self._made: dict[tuple[int, int, str, str], PoseSolver] = {}
 
     def of(self, model: Model, scenario: Scenario) -> PoseSolver:
         """Return the solver of a model, with the numerics of a scenario."""
-        key = (model.robot.chamber_sets, model.robot.chambers_per_set, model.material.law.name)
+        robot = model.robot
+        key = (robot.chamber_sets, robot.chambers_per_set, model.material.law.name, model.conventions.name)
         if key not in self._made:
             self._made[key] = PoseSolver(model, scenario.numerics)
         return self._made[key].with_model(model)
+
+
+def arc_angle(poses: PoseSolver, arc: Arc) -> float:
+    """Return the bending angle of an unloaded arc [rad], which does not wrap."""
+    functions = poses.functions
+    base, constants = functions.arc(arc.column, arc.stretch, 0.0), functions.section(arc.column, arc.stretch)[0]
+    return float(np.asarray(functions.lengths(base, constants)).ravel()[poses.model.robot.chambers])

@@ -19,15 +19,20 @@ MEASURED: dict[str, Any] = {
 }  # fmt: skip
 
 
-def panels(title: str, subtitle: str, rows: int, columns: int, row: float = _ROW) -> tuple[Figure, list[Axes]]:
-    """Return a figure with its heading, and empty panels row by row; row : height of one [inch]."""
+def panels(
+    title: str, subtitle: str, rows: int, columns: int, *, row: float = _ROW, right: float = _RIGHT
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure with its heading, and empty panels row by row.
+
+    row : height of one, right : room beside them [inch].
+    """
     height = _HEAD + rows * row + _FOOT
     figure = new_figure(_WIDTH, height, title, subtitle)
     grid = figure.add_gridspec(
         rows,
         columns,
         left=_LEFT / _WIDTH,
-        right=1 - _RIGHT / _WIDTH,
+        right=1 - right / _WIDTH,
         top=1 - _HEAD / height,
         bottom=_FOOT / height,
         hspace=0.38,

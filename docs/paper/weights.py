@@ -14,7 +14,7 @@ from softnlp.studies.wall import standing_wall
 Array = NDArray[np.float64]
 
 _LOWEST, _HIGHEST = 0.03, 1.2  # of the weight given: where the search looks
-_CLOSE = 1e-3  # of the weight
+_CLOSE = 2e-3  # of the weight
 
 
 def with_length_weight(solver: BlockedSolver, length: float) -> BlockedSolver:
