@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from docs.paper.cases import HYPERELASTIC, NAMES, STIFFENED, case, in_bar, law_o
 from docs.paper.figures import MEASURED, label_outer, legend, named, panels, saved
 from docs.paper.published import measured_forces, measured_pressure
 from docs.paper.text import NONE, figure, fixed, page_text, scenario_link, table
-from docs.paper.weights import length_weight_for, with_length_weight
+from docs.paper.weights import ROUGH, length_weight_for, with_length_weight
 from softnlp import BAR, COEFFICIENT_SETS, Coefficients, ContactSettings
 from softnlp.contact_settings import CLOSURES
 from softnlp.plots.style import COLOURS, GREY, INK, PALE, SMALL, colour
@@ -49,6 +49,7 @@ class Presses:
 
     def __init__(self) -> None:
         self._made: dict[tuple[str, str], BlockedSolver] = {}
+        self._rough: BlockedSolver | None = None
         self._contact = {closure: settings(closure) for closure in CLOSURES}
 
     def solver(self, model: Model, closure: str) -> BlockedSolver:
@@ -68,8 +69,13 @@ class Presses:
     def tuned(self, robot: str, law: str) -> tuple[float, Pushed | None]:
         """Return the W_L [1/m] that gives the measured force, and the force with it; NaN and None where none does."""
         scenario = case(f"blocked_{robot}")
-        solver = self.solver(model_of(scenario, law, STIFFENED), "weighted")
-        length = length_weight_for(solver, scenario.pressures[-1], measured_forces()[robot])
+        model = model_of(scenario, law, STIFFENED)
+        if self._rough is None:
+            rough = replace(scenario.numerics, accuracy=ROUGH)
+            self._rough = BlockedSolver(model, rough, self._contact["weighted"])
+        search = self._rough.with_model(model)
+        length = length_weight_for(search, scenario.pressures[-1], measured_forces()[robot])
+        solver = self.solver(model, "weighted")
         return length, None if np.isnan(length) else pushed(with_length_weight(solver, length))
 
 
@@ -163,9 +169,9 @@ def page(folder: Path) -> str:
         "A status in place of a number: the branch from zero pressure ends before.",
         *(part for closure in CLOSURES for part in (f"### `{closure}`", _table(found, closure))),
         "## RMSE and MAPE",
-        "The measures of Table IV of the paper, over all robots and all steps from the first pressure to the last; the "
-        "measured force is taken as linear in pressure, as it was found to be nearly. Steps without a solution are left "
-        "out, and counted.",
+        "The measures of Table IV of the paper, over all robots and all steps from the first pressure to the last. "
+        "The measured force is taken as linear in pressure, as it was found to be nearly. Steps without a solution are "
+        "left out, and counted.",
         _misfits(found, calibrated, law),
         "By robot, over the same steps:",
         _by_robot(found, calibrated, law),
@@ -252,8 +258,8 @@ def _tuned(tuned: Mapping[str, tuple[float, Pushed | None]], law: str) -> str:
     )
     return (
         f"The W_L with which `weighted` gives the force measured at {measured_pressure()} bar ({law}, the other "
-        f"weights as above). The curves are then {100 * float(np.nanmean(np.abs(errors))):.1f} % off on average, with a "
-        f"constant for each robot instead of one for all.{least}\n\n"
+        f"weights as above). The curves are then {100 * float(np.nanmean(np.abs(errors))):.1f} % off on average, with "
+        f"a constant for each robot instead of one for all.{least}\n\n"
         + table(
             ["robot", "W_L [1/m]", *(f"force at {p:g} bar [N]" for p in (pressures[-1], pressures[0])), "MAPE [%]"],
             rows,
@@ -287,8 +293,8 @@ def _reasons(found: Forces, calibrated: Mapping[str, Pushed], law: str) -> str:
             f"force, and its branch ends before {measured_pressure()} bar on {folds['rigid']} of {len(NAMES)} robots "
             f"({folds['weighted']} for `weighted`, {folds['compliant']} for `compliant`).",
             f"- `compliant` is semi-empirical: its one constant k_c = {k_c:g} was fitted to these {len(NAMES)} forces "
-            f"at {measured_pressure()} bar, so its {at_end.mape:.1f} % there is a fit and no prediction. Its force rises "
-            f"faster than in proportion: at the lowest pressure it is below the measured line for {low} of "
+            f"at {measured_pressure()} bar, so its {at_end.mape:.1f} % there is a fit and no prediction. Its force "
+            f"rises faster than in proportion: at the lowest pressure it is below the measured line for {low} of "
             f"{len(NAMES)} robots, and the whole curve is {compliant.mape:.0f} % off. The calibrated coefficients, "
             f"fitted to forces and angles together, bring that to {fitted.mape:.1f} %.",
             "- The shapes are planar. Without friction a blocked robot may slip sideways past the wall above a "
@@ -350,7 +356,7 @@ def _draw_parity(found: Forces, law: str, folder: Path) -> None:
     """Draw the simulated against the measured force at the last pressure."""
     measured = measured_forces()
     title = f"Simulated against measured, {measured_pressure()} bar"
-    canvas, (panel,) = panels(title, f"{law}, every robot a mark; on the line they agree", 1, 1, row=3.6)
+    canvas, (panel,) = panels(title, f"{law}, every robot a mark; on the line they agree", 1, 1, row_height=3.6)
     label_outer([panel], 1, "measured blocked force [N]", "simulated blocked force [N]")
     marks: dict[str, Any] = dict(zip(CLOSURES, "vos^", strict=True))
     known = np.array(list(measured.values()))

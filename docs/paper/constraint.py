@@ -140,7 +140,8 @@ def page(folder: Path) -> str:
     return page_text(
         "With and without the chamber constraint",
         "A robot pressed against a wall cannot let its pressurised chambers shorten freely. The paper simulates "
-        f"{robot} in {scenario.material.name} ({law_of(scenario)}) at {top} bar with that constraint, Eq. (14), and without.",
+        f"{robot} in {scenario.material.name} ({law_of(scenario)}) at {top} bar with that constraint, Eq. (14), "
+        "and without.",
         f"Scenarios: {links}.",
         _table(it),
         figure("constraint", "Blocked force against pressure, and against the weight of the constraint"),
@@ -217,7 +218,11 @@ def _draw(it: Found, folder: Path) -> None:
     known = published()["simulated_blocked_force"]
     robot, top = known["robot"], measured_pressure()
     canvas, (left, right) = panels(
-        f"{robot}, with and without the chamber constraint", f"{law_of(case('constraint_weighted'))}", 1, 2, row=3.4
+        f"{robot}, with and without the chamber constraint",
+        f"{law_of(case('constraint_weighted'))}",
+        1,
+        2,
+        row_height=3.4,
     )
     label_outer([left, right], 2, "pressure [bar]", "blocked force [N]")
     named(left, "force against pressure")

@@ -20,13 +20,13 @@ MEASURED: dict[str, Any] = {
 
 
 def panels(
-    title: str, subtitle: str, rows: int, columns: int, *, row: float = _ROW, right: float = _RIGHT
+    title: str, subtitle: str, rows: int, columns: int, *, row_height: float = _ROW, right: float = _RIGHT
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with its heading, and empty panels row by row.
 
-    row : height of one, right : room beside them [inch].
+    row_height : of one, right : room beside them [inch].
     """
-    height = _HEAD + rows * row + _FOOT
+    height = _HEAD + rows * row_height + _FOOT
     figure = new_figure(_WIDTH, height, title, subtitle)
     grid = figure.add_gridspec(
         rows,
@@ -38,7 +38,7 @@ def panels(
         hspace=0.38,
         wspace=0.28,
     )
-    return figure, [figure.add_subplot(cell) for cell in grid]
+    return figure, [figure.add_subplot(grid[row, column]) for row in range(rows) for column in range(columns)]
 
 
 def label_outer(axes: Sequence[Axes], columns: int, x_label: str, y_label: str) -> None:

@@ -148,7 +148,7 @@ def _chosen(done: Design) -> str:
 def _draw(runs: Mapping[str, Run], folder: Path) -> None:
     """Draw the angle against pressure for every silicone, and the published points."""
     first = case(next(iter(names())))
-    canvas, (panel,) = panels(f"{first.robot.name}, one set", f"{law_of(first)}, by silicone", 1, 1, row=3.4)
+    canvas, (panel,) = panels(f"{first.robot.name}, one set", f"{law_of(first)}, by silicone", 1, 1, row_height=3.4)
     label_outer([panel], 1, "pressure [bar]", "bending angle [deg]")
     for k, (name, known) in enumerate(names().items()):
         pressure = in_bar(case(name).pressures)

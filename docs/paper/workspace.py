@@ -76,6 +76,14 @@ def _arcs(solvers: Solvers, model: Model, pressures: Array | None = None) -> Arr
     return np.array(tips)
 
 
+def times() -> Array:
+    """Return when each pressure of the scenario is reached [s]."""
+    found = case(NAME).times
+    if found is None:
+        raise RuntimeError("the scenario has no times")
+    return found
+
+
 def _grid(solvers: Solvers, model: Model) -> Array:
     """Return the tips at every combination of a few pressures up to the largest of the sequence."""
     levels = np.linspace(0, case(NAME).pressures.max(), LEVELS)
@@ -86,17 +94,16 @@ def page(folder: Path) -> str:
     """Write the figures into a folder and return the page."""
     it = found()
     scenario = case(NAME)
-    assert scenario.times is not None
     steps = len(scenario.pressures)
-    second = float(np.median(np.diff(scenario.times)))
+    second = float(np.median(np.diff(times())))
     _draw_time(it, folder)
     _draw_tips(it, folder)
     return page_text(
         f"Workspace, {steps} points",
         f"In the paper's test the pressure of each set varies up to {scenario.pressures.max() / BAR:.1f} bar over "
-        f"{steps} points, one each {second:g} s. The sequence and the measured tips are not published, so this page shows the "
-        f"simulation alone, of {scenario.robot.name} in {scenario.material.name} ({law_of(scenario)}) along a sequence "
-        f"that is made up: each set rises and falls at its own rhythm.{_back(scenario.pressures)}",
+        f"{steps} points, one each {second:g} s. The sequence and the measured tips are not published, so this page "
+        f"shows the simulation alone, of {scenario.robot.name} in {scenario.material.name} ({law_of(scenario)}) along "
+        f"a sequence that is made up: each set rises and falls at its own rhythm.{_back(scenario.pressures)}",
         f"Scenario: {scenario_link(NAME)}, with its pressures in "
         "[three_rhythms.csv](../../scenarios/files/three_rhythms_260.csv).",
         figure("workspace_time", "Pressures and tip position against time"),
@@ -142,9 +149,9 @@ def _numbers(it: Found, steps: int) -> str:
     return (
         table(["", "sequence", f"grid of {LEVELS} pressures a set"], rows)
         + f"\n\nThe sequence is solved as boundary value problems, all at once, with residuals up to {residual:.0e} "
-        f"and a tip within {error:.0e} of the length by the estimated discretisation error; the grid in closed form. A sequence is a "
-        f"curve: its hull takes in {100 * hull.volume / whole.volume:.0f} % of that of the grid. The tips lie on a "
-        "thin dome, whose hollow a convex hull counts and the volume between the poses does not."
+        f"and a tip within {error:.0e} of the length by the estimated discretisation error; the grid in closed form. "
+        f"A sequence is a curve: its hull takes in {100 * hull.volume / whole.volume:.0f} % of that of the grid. The "
+        "tips lie on a thin dome, whose hollow a convex hull counts and the volume between the poses does not."
     )
 
 
@@ -169,18 +176,20 @@ def _draw_time(it: Found, folder: Path) -> None:
     label_outer(axes, 1, "time [s]", "pressure [bar]")
     plain(axes[1], "time [s]", "tip position [mm]")
     for k, pressure in enumerate(scenario.pressures.T / BAR):
-        axes[0].plot(scenario.times, pressure, color=colour(k), label=f"set {k + 1}")
+        axes[0].plot(times(), pressure, color=colour(k), label=f"set {k + 1}")
     for k, (name, values) in enumerate(zip("xyz", it.tips.T / MILLIMETRE, strict=True)):
-        axes[1].plot(scenario.times, values, color=colour(k + 3), label=name)
+        axes[1].plot(times(), values, color=colour(k + 3), label=name)
     for panel in axes:
-        panel.set_xlim(0, float(np.max(scenario.times)) if scenario.times is not None else None)
+        panel.set_xlim(0, float(times().max()))
         panel.legend(fontsize=SMALL, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
     saved(canvas, folder, "workspace_time")
 
 
 def _draw_tips(it: Found, folder: Path) -> None:
     """Draw the tips from the side and from above, in the order of time, over those of the grid."""
-    canvas, axes = panels("Tips of the sequence", "grey: a grid of pressures up to the same", 1, 2, row=4.1, right=1.0)
+    canvas, axes = panels(
+        "Tips of the sequence", "grey: a grid of pressures up to the same", 1, 2, row_height=4.1, right=1.0
+    )
     tips, grid = it.tips / MILLIMETRE, it.grid / MILLIMETRE
     for panel, (first, second) in zip(axes, ((0, 2), (0, 1)), strict=True):
         plain(panel, f"{'xyz'[first]} [mm]", f"{'xyz'[second]} [mm]")
