@@ -86,10 +86,10 @@ _INTRODUCTION = (
     "differ, the page says why."
 )
 _CONTENTS = {
-    "bending": ("Bending and elongation", "eight robots, one to three sets, five laws, with and without stiffening"),
-    "blocked": ("Blocked tip force", "eight robots, four laws, four closures, with RMSE and MAPE"),
+    "bending": ("Bending and elongation", "all robots, one to three sets, every law, with and without stiffening"),
+    "blocked": ("Blocked tip force", "all robots, hyperelastic laws, every closure, with RMSE and MAPE"),
     "constraint": ("The chamber constraint", "the blocked force with and without it"),
     "workspace": ("Workspace", "the tip along a sequence of pressures"),
-    "laparoscope": ("Laparoscope", "five published angles; choice of silicone and chambers"),
+    "laparoscope": ("Laparoscope", "published angles; choice of silicone and chambers"),
     "times": ("Run times", "beside the paper's method, and the published ones"),
 }

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from docs.paper.cases import BARE, NAMES, STIFFENED, Solvers, arc_angle, case, in_bar, law_of, model_of, with_sets
 from docs.paper.figures import MEASURED, label_outer, legend, named, panels, saved
 from docs.paper.published import elongation_range, mean_error, measured_angles, measured_pressure
-from docs.paper.text import between, figure, fixed, page_text, scenario_link, table
+from docs.paper.text import between, figure, fixed, page_text, scenario_link, table, worded
 from softnlp import COEFFICIENT_SETS, DEGREE, MILLIMETRE, Coefficients, Loads, Material, material
 from softnlp.laws import LAWS
 from softnlp.plots.style import INK, colour
@@ -74,7 +74,7 @@ def curves() -> dict[Key, Curve]:
 def page(folder: Path) -> str:
     """Write the figures into a folder and return the page."""
     found = curves()
-    angles = measured_angles()
+    angles = _known()
     first = case(f"bending_{NAMES[0]}")
     top, law, silicone = measured_pressure(), law_of(first), first.material.name
     for sets, name in SETS.items():
@@ -82,11 +82,12 @@ def page(folder: Path) -> str:
     links = ", ".join(scenario_link(f"bending_{name}") for name in NAMES)
     return page_text(
         "Bending and elongation",
-        f"Eight robots in {silicone}, from zero pressure to {top} bar with the same pressure in one, two or three "
-        f"sets, without loads. Five laws, with stiffening (k_e = {STIFFENED.elongation}, k_b = {STIFFENED.bending}) "
-        "and without (both zero). Curves were measured in the paper; their last points are what is known of them here.",
+        f"{worded(len(NAMES)).capitalize()} robots in {silicone}, from zero pressure to {top} bar with the same "
+        f"pressure in one, two or three sets, without loads. {worded(len(LAWS)).capitalize()} laws, with stiffening "
+        f"(k_e = {STIFFENED.elongation}, k_b = {STIFFENED.bending}) and without (both zero). Curves were measured in "
+        "the paper; their last points are what is known of them here.",
         f"Scenarios: {links}. They press one set; the page presses the same in two and three.",
-        *(figure(_file(sets), f"{name}, five laws") for sets, name in SETS.items()),
+        *(figure(_file(sets), f"{name}, {worded(len(LAWS))} laws") for sets, name in SETS.items()),
         f"## At {top} bar",
         "Each cell: with stiffening / without.",
         *(part for sets in SETS for part in (f"### {_heading(sets)}", _table(found, sets))),
@@ -114,7 +115,7 @@ def _value(found: Curve, sets: int) -> float:
 
 
 def _table(found: Mapping[Key, Curve], sets: int) -> str:
-    measured = measured_angles()
+    measured = _known()
     rows = []
     for robot in NAMES:
         known = between(*elongation_range(robot)) if sets == len(SETS) else fixed(measured.get((robot, sets)))
@@ -124,11 +125,11 @@ def _table(found: Mapping[Key, Curve], sets: int) -> str:
 
 
 def _last(found: Mapping[Key, Curve], law: str, stiffened: bool) -> dict[tuple[str, int], float]:
-    return {key: float(found[*key, law, stiffened].angle[-1]) for key in measured_angles()}
+    return {key: float(found[*key, law, stiffened].angle[-1]) for key in _known()}
 
 
 def _errors(found: Mapping[Key, Curve]) -> str:
-    measured = measured_angles()
+    measured = _known()
     rows = [[law, *(fixed(mean_error(_last(found, law, s), measured)) for s in (True, False))] for law in LAWS]
     return table(["law", "with stiffening [deg]", "without [deg]"], rows)
 
@@ -145,7 +146,7 @@ def fitted(free: Sequence[str], start: Coefficients) -> Coefficients:
 
 def _coefficients(found: Mapping[Key, Curve], law: str) -> str:
     """Compare coefficient sets under one law."""
-    measured = measured_angles()
+    measured = _known()
     solvers, rows = Solvers(), []
     chosen = dict(COEFFICIENT_SETS)
     chosen["k_e, k_b fitted to these angles"] = fitted(["k_e", "k_b"], STIFFENED)
@@ -163,13 +164,18 @@ def _coefficients(found: Mapping[Key, Curve], law: str) -> str:
     )
 
 
+def _known() -> dict[tuple[str, int], float]:
+    """Return the measured angles [deg] of the robots of the page, by robot and pressurised sets."""
+    return {key: angle for key, angle in measured_angles().items() if key[0] in NAMES}
+
+
 def _long() -> list[str]:
     """Return the robots whose angles were measured."""
-    return list(dict.fromkeys(robot for robot, _ in measured_angles()))
+    return list(dict.fromkeys(robot for robot, _ in _known()))
 
 
 def _reasons(found: Mapping[Key, Curve], law: str) -> str:
-    measured = measured_angles()
+    measured = _known()
     ours = _last(found, law, True)
     over = [f"{robot} by {ours[robot, 2] - measured[robot, 2]:+.0f} deg" for robot in _long()]
     wide, narrow = (case(f"bending_{name}").robot for name in _long()[:2])
@@ -236,7 +242,7 @@ def _small(value: float) -> str:
 def _draw(found: Mapping[Key, Curve], sets: int, name: str, folder: Path) -> None:
     """Draw a panel a robot: every law, with stiffening and without, and what was measured."""
     longer = sets == len(SETS)
-    measured, top = measured_angles(), measured_pressure()
+    measured, top = _known(), measured_pressure()
     silicone = case(f"bending_{NAMES[0]}").material.name
     what = "Elongation" if longer else "Bending"
     columns = len(NAMES) // 2

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from docs.paper.cases import HYPERELASTIC, NAMES, STIFFENED, case, in_bar, law_of, model_of
 from docs.paper.figures import MEASURED, label_outer, legend, named, panels, saved
 from docs.paper.published import measured_forces, measured_pressure
-from docs.paper.text import NONE, figure, fixed, page_text, scenario_link, table
+from docs.paper.text import NONE, figure, fixed, page_text, scenario_link, table, worded
 from docs.paper.weights import ROUGH, length_weight_for, with_length_weight
 from softnlp import BAR, COEFFICIENT_SETS, Coefficients, ContactSettings
 from softnlp.contact_settings import CLOSURES
@@ -133,9 +133,9 @@ class Misfit:
 def misfit(found: Mapping[str, Pushed], last_only: bool) -> Misfit:
     """Compare forces by robot with the measured ones, taken as linear in pressure."""
     measured = measured_forces()
-    simulated = np.array([found[name].force for name in measured])
+    simulated = np.array([pushed.force for pushed in found.values()])
     part = in_bar(raised(case(f"blocked_{NAMES[0]}").pressures)) / measured_pressure()
-    known = np.array(list(measured.values()))[:, None] * part
+    known = np.array([measured[name] for name in found])[:, None] * part
     if last_only:
         simulated, known = simulated[:, -1:], known[:, -1:]
     error = simulated - known
@@ -160,11 +160,12 @@ def page(folder: Path) -> str:
     links = ", ".join(scenario_link(f"blocked_{name}") for name in NAMES)
     return page_text(
         "Blocked tip force",
-        f"Eight robots in {silicone}, one set at up to {top} bar, the tip held on the axis of the base. Four "
-        "hyperelastic laws and the four closures of [blocked force](../blocked-force.md#closures): `free` is the "
-        "rod alone, `weighted` the paper's method, `compliant` this project's own, `rigid` an upper bound.",
+        f"{worded(len(NAMES)).capitalize()} robots in {silicone}, one set at up to {top} bar, the tip held on the axis "
+        f"of the base. {worded(len(HYPERELASTIC)).capitalize()} hyperelastic laws and the {worded(len(CLOSURES))} "
+        "closures of [blocked force](../blocked-force.md#closures): `free` is the rod alone, `weighted` the paper's "
+        "method, `compliant` this project's own, `rigid` an upper bound.",
         f"Scenarios: {links}; the weights are those of {scenario_link('constraint_weighted')}.",
-        figure("blocked_curves", "Blocked force against pressure, eight robots"),
+        figure("blocked_curves", "Blocked force against pressure, every robot"),
         f"## Forces at {top} bar [N]",
         "A status in place of a number: the branch from zero pressure ends before.",
         *(part for closure in CLOSURES for part in (f"### `{closure}`", _table(found, closure))),
@@ -186,7 +187,8 @@ def page(folder: Path) -> str:
 def _table(found: Forces, closure: str) -> str:
     measured = measured_forces()
     rows = []
-    for name, force in measured.items():
+    for name in NAMES:
+        force = measured[name]
         cells = [found[closure, law, name] for law in HYPERELASTIC]
         rows.append([name, fixed(force, 2), *(p.ended or fixed(float(p.force[-1]), 3) for p in cells)])
     return table(["robot", "measured", *HYPERELASTIC], rows)
@@ -309,7 +311,7 @@ def _reasons(found: Forces, calibrated: Mapping[str, Pushed], law: str) -> str:
 def _draw_curves(found: Forces, calibrated: Mapping[str, Pushed], law: str, silicone: str, folder: Path) -> None:
     """Draw a panel a robot: the closures under one law, the spread over the laws, and the measured line."""
     columns = len(NAMES) // 2
-    words = "bands: spread over the four laws; rigid leaves the panels"
+    words = "bands: spread over the laws; rigid leaves the panels"
     canvas, axes = panels("Blocked tip force, one set", f"{silicone}, {law}  ·  {words}", 2, columns)
     label_outer(axes, columns, "pressure [bar]", "blocked force [N]")
     for panel, name in zip(axes, _two_rows(), strict=True):
@@ -354,7 +356,7 @@ def _two_rows() -> list[str]:
 
 def _draw_parity(found: Forces, law: str, folder: Path) -> None:
     """Draw the simulated against the measured force at the last pressure."""
-    measured = measured_forces()
+    measured = {name: measured_forces()[name] for name in NAMES}
     title = f"Simulated against measured, {measured_pressure()} bar"
     canvas, (panel,) = panels(title, f"{law}, every robot a mark; on the line they agree", 1, 1, row_height=3.6)
     label_outer([panel], 1, "measured blocked force [N]", "simulated blocked force [N]")

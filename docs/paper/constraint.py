@@ -25,7 +25,7 @@ from softnlp.units import STANDARD_GRAVITY
 
 Array = NDArray[np.float64]
 
-CLOSURES = {"without": "`free`: not constrained", "compliant": "`compliant`: springs", "weighted": "`weighted`"}
+RUNS = ("without", "compliant", "weighted")
 _PARTS = np.geomspace(0.01, 10.0, 13)  # W_L of the figure over that of the scenario
 
 
@@ -50,7 +50,7 @@ class Found:
 
 def found() -> Found:
     """Compute everything on the page."""
-    runs = {name: run_scenario(case(f"constraint_{name}")) for name in CLOSURES}
+    runs = {name: run_scenario(case(f"constraint_{name}")) for name in RUNS}
     known = published()["simulated_blocked_force"]
     weighted = case("constraint_weighted")
     solver = _solver(weighted)
@@ -136,7 +136,7 @@ def page(folder: Path) -> str:
     scenario = case("constraint_weighted")
     robot, top = scenario.robot.name, measured_pressure()
     _draw(it, folder)
-    links = ", ".join(scenario_link(f"constraint_{name}") for name in CLOSURES)
+    links = ", ".join(scenario_link(f"constraint_{name}") for name in RUNS)
     return page_text(
         "With and without the chamber constraint",
         "A robot pressed against a wall cannot let its pressurised chambers shorten freely. The paper simulates "

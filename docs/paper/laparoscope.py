@@ -12,7 +12,7 @@ import numpy as np
 from docs.paper.cases import Solvers, arc_angle, case, in_bar, law_of, model_of
 from docs.paper.figures import MEASURED, label_outer, legend, panels, saved
 from docs.paper.published import published
-from docs.paper.text import NONE, figure, fixed, page_text, scenario_link, table
+from docs.paper.text import NONE, figure, fixed, page_text, scenario_link, table, worded
 from softnlp import BAR, DEGREE, Design, run_scenario
 from softnlp.plots.design import design_figure
 from softnlp.plots.style import colour
@@ -46,12 +46,12 @@ def page(folder: Path) -> str:
     return page_text(
         "Laparoscope: silicone and design",
         f"The paper simulates a robot for keyhole surgery, {robot.name} with {robot.chambers} chambers in "
-        f"{robot.chamber_sets} sets, in five silicones ({law_of(first)}, one set), and chooses silicone and number of "
-        "chambers for it.",
-        "## Five published angles",
+        f"{robot.chamber_sets} sets, in {worded(len(names()))} silicones ({law_of(first)}, one set), and chooses "
+        "silicone and number of chambers for it.",
+        f"## The {worded(len(names()))} published angles",
         f"Scenarios: {', '.join(scenario_link(name) for name in names())}.",
         _angles(runs),
-        figure("laparoscope_bending", "Bending angle against pressure, five silicones"),
+        figure("laparoscope_bending", "Bending angle against pressure, by silicone"),
         _settled(runs),
         "## Silicone and number of chambers",
         f"Scenario: {scenario_link('laparoscope_paper', 'design')}, to run with `softnlp design`. {_asked(done)}",
@@ -78,7 +78,7 @@ def _settled(runs: Mapping[str, Run]) -> str:
     return (
         f"The largest difference is {largest:.2f} deg. A published angle is rounded to a decimal, and so are the "
         f"coefficients k_e = {c.elongation:g} and k_b = {c.bending:g}: half of their last digit moves these angles by "
-        f"up to {_by_rounding():.2f} deg. These five settle how the equations are read: the set "
+        f"up to {_by_rounding():.2f} deg. These angles settle how the equations are read: the set "
         f"`{scenario.conventions.name}` of [conventions](../model.md#conventions). Every pose is a boundary value "
         f"problem with a residual of at most {residual:.0e}."
     )

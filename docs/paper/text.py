@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from docs.paper.published import citation
 
 NONE = "–"
+_WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -19,6 +20,11 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def fixed(value: float | None, digits: int = 1) -> str:
     """Return a number with so many decimals, or a dash for None and NaN."""
     return NONE if value is None or math.isnan(value) else f"{value:.{digits}f}"
+
+
+def worded(count: int) -> str:
+    """Return a small number as a word."""
+    return _WORDS[count] if count < len(_WORDS) else str(count)
 
 
 def between(low: float, high: float, digits: int = 1) -> str:
