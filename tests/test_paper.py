@@ -135,7 +135,7 @@ def test_the_published_laparoscope_angles_to_a_tenth_of_a_degree() -> None:
     runs = {}
     for name, known in laparoscope.names().items():
         P = known["pressure_bar"] * BAR * np.array([[1, 0, 0]])
-        runs[name] = forward(robot("laparoscope-6"), material(known["material"], LAW), P)
+        runs[name] = forward(robot("laparoscope-6"), material(known["material"], LAW), P).steps
         angle = laparoscope.bending(runs[name])[-1]
         assert angle == pytest.approx(known["bending_angle_deg"], abs=0.1005)
     table = rows_of(laparoscope._angles(runs), "| silicone")
@@ -208,7 +208,7 @@ def test_forces_of_the_tables_are_those_of_the_public_interface(monkeypatch: pyt
         contact = ContactSettings(closure=closure, weights=given)  # type: ignore[arg-type]
         steps = blocked_force(robot(name), material("Ecoflex 00-50", LAW), P, contact).steps
         exact = [step.contact.force for step in steps if step.contact is not None]
-        np.testing.assert_allclose(found[closure, LAW, name].force, exact, rtol=2e-5)
+        np.testing.assert_allclose(found[closure, LAW, name].force, exact, rtol=1e-4)
         cells = rows_of(blocked._table(found, closure), "| robot")[name]
         assert float(cells[0]) == measured_forces()[name]
         assert float(cells[1]) == pytest.approx(exact[-1], abs=6e-4)

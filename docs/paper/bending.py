@@ -4,21 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from docs.paper.cases import BARE, NAMES, STIFFENED, Solvers, arc_angle, case, in_bar, law_of, model_of, with_sets
+from docs.paper.cases import BARE, NAMES, STIFFENED, Solvers, case, in_bar, law_of, model_of, unloaded, with_sets
 from docs.paper.figures import MEASURED, label_outer, legend, named, panels, saved
 from docs.paper.published import elongation_range, mean_error, measured_angles, measured_pressure
 from docs.paper.text import between, figure, fixed, page_text, scenario_link, table, worded
 from softnlp import COEFFICIENT_SETS, DEGREE, MILLIMETRE, Coefficients, Loads, Material, material
 from softnlp.laws import LAWS
 from softnlp.plots.style import INK, colour
-from softnlp.studies.arc import unloaded_arc
+from softnlp.scenario import Scenario
 from softnlp.studies.identify import identify
 from softnlp.studies.identify_task import RobotTask
+from softnlp.studies.statics import PoseSolver
 
 Array = NDArray[np.float64]
 
@@ -47,28 +49,27 @@ Key = tuple[str, int, str, bool]
 def curve(solvers: Solvers, robot: str, sets: int, law: str, coefficients: Coefficients) -> Curve:
     """Return the unloaded robot along the pressures of its scenario: an arc in closed form at each."""
     scenario = case(f"bending_{robot}")
-    poses = solvers.of(model_of(scenario, law, coefficients), scenario)
+    return _along(solvers.of(model_of(scenario, law, coefficients), scenario), scenario, sets)
+
+
+def _along(poses: PoseSolver, scenario: Scenario, sets: int) -> Curve:
     rows = []
     for pressure in with_sets(scenario.pressures, sets):
-        branch, arc = unloaded_arc(poses, pressure)
-        if not branch.status.has_solution:
-            rows.append((np.nan, np.nan, np.nan))
-            continue
-        longer = (arc.stretch - 1) * float(scenario.robot.length)  # an arc without loads is stretched by pressure alone
-        rows.append((arc_angle(poses, arc) / DEGREE, longer / MILLIMETRE, arc.stretch))
+        angle, stretch = unloaded(poses, pressure)
+        longer = (stretch - 1) * float(scenario.robot.length)  # without loads only pressure lengthens the axis
+        rows.append((angle / DEGREE, longer / MILLIMETRE, stretch))
     return Curve(in_bar(scenario.pressures), *np.array(rows).T)
 
 
 def curves() -> dict[Key, Curve]:
     """Return every curve of the page."""
     solvers = Solvers()
-    return {
-        (robot, sets, law, stiffened): curve(solvers, robot, sets, law, STIFFENED if stiffened else BARE)
-        for law in LAWS
-        for stiffened in (True, False)
-        for robot in NAMES
-        for sets in SETS
-    }
+    found = {}
+    for law, stiffened, robot in product(LAWS, (True, False), NAMES):
+        scenario = case(f"bending_{robot}")
+        poses = solvers.of(model_of(scenario, law, STIFFENED if stiffened else BARE), scenario)
+        found |= {(robot, sets, law, stiffened): _along(poses, scenario, sets) for sets in SETS}
+    return found
 
 
 def page(folder: Path) -> str:

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from docs.paper.published import ROOT
-from softnlp import BAR, COEFFICIENT_SETS, ROBOTS, Coefficients, material
+from softnlp import BAR, COEFFICIENT_SETS, ROBOTS, Coefficients, Loads, material
+from softnlp.branch import stretch_on_branch
 from softnlp.laws import LAWS
 from softnlp.quantities import Model
 from softnlp.scenario import Scenario, load_scenario
-from softnlp.studies.arc import Arc
 from softnlp.studies.statics import PoseSolver
 
 Array = NDArray[np.float64]
@@ -69,8 +69,14 @@ class Solvers:
         return self._made[key].with_model(model)
 
 
-def arc_angle(poses: PoseSolver, arc: Arc) -> float:
-    """Return the bending angle of an unloaded arc [rad], which does not wrap."""
-    functions = poses.functions
-    base, constants = functions.arc(arc.column, arc.stretch, 0.0), functions.section(arc.column, arc.stretch)[0]
-    return float(np.asarray(functions.lengths(base, constants)).ravel()[poses.model.robot.chambers])
+def unloaded(poses: PoseSolver, pressure: Array) -> tuple[float, float]:
+    """Return the bending angle [rad], which does not wrap, and the stretch of the arc at a pressure (sets,) [Pa].
+
+    NaN where the branch from zero pressure has ended.
+    """
+    column = poses.column(poses.values(pressure, Loads()))
+    branch, functions = stretch_on_branch(poses.branch, column, pressure), poses.functions
+    if not branch.status.has_solution:
+        return float("nan"), float("nan")
+    base, constants = functions.arc(column, branch.stretch, 0.0), functions.section(column, branch.stretch)[0]
+    return float(np.asarray(functions.lengths(base, constants)).ravel()[poses.model.robot.chambers]), branch.stretch

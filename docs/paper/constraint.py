@@ -13,7 +13,7 @@ from docs.paper.cases import BARE, STIFFENED, case, in_bar, law_of, model_of
 from docs.paper.figures import MEASURED, label_outer, legend, named, panels, saved
 from docs.paper.published import measured_forces, measured_pressure, published
 from docs.paper.text import NONE, figure, fixed, page_text, scenario_link, table
-from docs.paper.weights import force_at, length_weight_for, with_length_weight
+from docs.paper.weights import ROUGH, force_at, length_weight_for, with_length_weight
 from softnlp import MILLIMETRE, Conventions, Loads, run_scenario
 from softnlp.plots.style import GREY, colour
 from softnlp.quantities import Model
@@ -55,11 +55,12 @@ def found() -> Found:
     weighted = case("constraint_weighted")
     solver = _solver(weighted)
     last = weighted.pressures[-1]
-    tuned = length_weight_for(solver, last, known["with_constraint_N"])
+    search = _solver(replace(weighted, numerics=replace(weighted.numerics, accuracy=ROUGH)))
+    tuned = length_weight_for(search, last, known["with_constraint_N"])
     given = weighted.contact.weights.length if weighted.contact else None
     assert given is not None
     lengths = given * _PARTS
-    by_length = np.array([force_at(with_length_weight(solver, length), last) for length in lengths])
+    by_length = np.array([force_at(with_length_weight(search, length), last) for length in lengths])
     pressed = weighted.pressures[1:]
     at_tuned = np.array([force_at(with_length_weight(solver, tuned), P) for P in pressed])
     return Found(

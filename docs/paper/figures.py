@@ -20,18 +20,25 @@ MEASURED: dict[str, Any] = {
 
 
 def panels(
-    title: str, subtitle: str, rows: int, columns: int, *, row_height: float = _ROW, right: float = _RIGHT
+    title: str,
+    subtitle: str,
+    rows: int,
+    columns: int,
+    *,
+    row_height: float = _ROW,
+    right: float = _RIGHT,
+    left: float = _LEFT,
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with its heading, and empty panels row by row.
 
-    row_height : of one, right : room beside them [inch].
+    row_height : of one; left, right : room beside them [inch].
     """
     height = _HEAD + rows * row_height + _FOOT
     figure = new_figure(_WIDTH, height, title, subtitle)
     grid = figure.add_gridspec(
         rows,
         columns,
-        left=_LEFT / _WIDTH,
+        left=left / _WIDTH,
         right=1 - right / _WIDTH,
         top=1 - _HEAD / height,
         bottom=_FOOT / height,

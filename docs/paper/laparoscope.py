@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from docs.paper.cases import Solvers, arc_angle, case, in_bar, law_of, model_of
+from docs.paper.cases import Solvers, case, in_bar, law_of, model_of, unloaded
 from docs.paper.figures import MEASURED, label_outer, legend, panels, saved
 from docs.paper.published import published
 from docs.paper.text import NONE, figure, fixed, page_text, scenario_link, table, worded
-from softnlp import BAR, DEGREE, Design, run_scenario
+from softnlp import BAR, DEGREE, Design
 from softnlp.plots.design import design_figure
 from softnlp.plots.style import colour
 from softnlp.runner_design import run_design
-from softnlp.studies.arc import unloaded_arc
 from softnlp.studies.design_candidate import Candidate
 from softnlp.studies.design_task import DesignTask
-from softnlp.studies.step import Run
+from softnlp.studies.step import Step
 
 _HALF_DIGIT = 0.005
 
@@ -30,14 +29,31 @@ def names() -> dict[str, Mapping[str, Any]]:
     return {f"laparoscope_{p['material'].replace(' ', '_')}": p for p in published()["laparoscope"]}
 
 
-def bending(run: Run) -> np.ndarray[Any, np.dtype[np.float64]]:
+Runs = Mapping[str, Sequence[Step]]
+"""The steps of each published simulation by the name of its scenario."""
+
+
+def solved() -> dict[str, list[Step]]:
+    """Solve every pose of the published simulations; the robot is the same, so that one solver serves all."""
+    solvers = Solvers()
+    runs: dict[str, list[Step]] = {}
+    for name in names():
+        scenario = case(name)
+        poses, near, runs[name] = solvers.of(model_of(scenario), scenario), None, []
+        for pressure in scenario.pressures:
+            step, near = poses.solve(pressure, scenario.loads, near)
+            runs[name].append(step)
+    return runs
+
+
+def bending(steps: Sequence[Step]) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Return the bending angle of each step [deg], NaN where it has none."""
-    return np.array([np.nan if s.pose is None else s.pose.bending_angle / DEGREE for s in run.steps])
+    return np.array([np.nan if s.pose is None else s.pose.bending_angle / DEGREE for s in steps])
 
 
 def page(folder: Path) -> str:
     """Write the figures into a folder and return the page."""
-    runs = {name: run_scenario(case(name)) for name in names()}
+    runs = solved()
     first = case(next(iter(names())))
     _draw(runs, folder)
     done = run_design(case("laparoscope_paper", "design"))
@@ -61,7 +77,7 @@ def page(folder: Path) -> str:
     )
 
 
-def _angles(runs: Mapping[str, Run]) -> str:
+def _angles(runs: Runs) -> str:
     rows = []
     for name, known in names().items():
         ours = bending(runs[name])[-1]
@@ -70,11 +86,11 @@ def _angles(runs: Mapping[str, Run]) -> str:
     return table(["silicone", "pressure [bar]", "published [deg]", "here [deg]", "difference [deg]"], rows)
 
 
-def _settled(runs: Mapping[str, Run]) -> str:
+def _settled(runs: Runs) -> str:
     largest = max(abs(bending(runs[name])[-1] - p["bending_angle_deg"]) for name, p in names().items())
     scenario = case(next(iter(names())))
     c = scenario.coefficients
-    residual = max(s.residual for run in runs.values() for s in run.steps if s.residual is not None)
+    residual = max(s.residual for steps in runs.values() for s in steps if s.residual is not None)
     return (
         f"The largest difference is {largest:.2f} deg. A published angle is rounded to a decimal, and so are the "
         f"coefficients k_e = {c.elongation:g} and k_b = {c.bending:g}: half of their last digit moves these angles by "
@@ -94,7 +110,7 @@ def _by_rounding() -> float:
         for part in (-_HALF_DIGIT, 0.0, _HALF_DIGIT):
             near = replace(c, elongation=c.elongation + part, bending=c.bending + part)
             poses = solvers.of(model_of(scenario, None, near), scenario)
-            angles.append(arc_angle(poses, unloaded_arc(poses, scenario.pressures[-1])[1]) / DEGREE)
+            angles.append(unloaded(poses, scenario.pressures[-1])[0] / DEGREE)
         moved += [abs(angle - angles[1]) for angle in angles]
     return max(moved)
 
@@ -145,7 +161,7 @@ def _chosen(done: Design) -> str:
     )
 
 
-def _draw(runs: Mapping[str, Run], folder: Path) -> None:
+def _draw(runs: Runs, folder: Path) -> None:
     """Draw the angle against pressure for every silicone, and the published points."""
     first = case(next(iter(names())))
     canvas, (panel,) = panels(f"{first.robot.name}, one set", f"{law_of(first)}, by silicone", 1, 1, row_height=3.4)

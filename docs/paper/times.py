@@ -20,11 +20,11 @@ from benchmarks.paper_blocked import Weights, solve_blocked
 from benchmarks.paper_method import Rod, solve_pose
 from docs.paper.blocked import raised
 from docs.paper.cases import case, law_of, model_of
-from docs.paper.figures import legend, panels, saved
+from docs.paper.figures import legend, named, panels, saved
 from docs.paper.published import published
 from docs.paper.text import figure, fixed, page_text, table
 from softnlp import ContactSettings, Loads
-from softnlp.plots.style import COLOURS, GREY, INK, SMALL, plain
+from softnlp.plots.style import COLOURS, INK, PALE, SMALL, plain
 from softnlp.quantities import Model
 from softnlp.studies.blocked import BlockedSolver
 from softnlp.studies.statics import PoseSolver
@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 LOADS = Loads(tip_force=(0.02, 0.01, -0.03))
 WEIGHTS = Weights(L=2.0)
-REPEATS = 3
+REPEATS = 2
 _SOLVED = 1e-6  # scaled residual of a pose by the paper's method
 ARRAYS, FLOATS = "paper's, NumPy arrays", "paper's, Python floats"
 PLANE, SPACE = ", in the plane", ", in space"
@@ -208,7 +208,7 @@ def _pushes(solver: BlockedSolver, pressures: Array) -> bool:
 def _draw(poses: Mapping[str, float], pushes: Mapping[str, float], folder: Path) -> None:
     """Draw bars of both on a logarithmic axis, with the published ranges as bands."""
     known = published()["run_time_s"]
-    canvas, axes = panels("Time of one solve", f"{robot_name()}, one set; lower is faster", 1, 2, row_height=2.7)
+    canvas, axes = panels("Time of one solve", f"{robot_name()}, one set; lower is faster", 2, 1, left=2.6)
     groups = zip(axes, (poses, pushes), ("pose", "blocked_force"), strict=True)
     for panel, measured, key in groups:
         times = {name: seconds for name, seconds in measured.items() if np.isfinite(seconds)}
@@ -217,13 +217,14 @@ def _draw(poses: Mapping[str, float], pushes: Mapping[str, float], folder: Path)
         shades = [COLOURS[0] if name.startswith("this") else COLOURS[1] for name in times]
         panel.barh(places, list(times.values()), color=shades, height=0.62)
         low, high = known[key]
-        panel.axvspan(low, high, color=GREY, alpha=0.25, linewidth=0, label=f"published ({known['where']})")
+        panel.axvspan(low, high, color=PALE, linewidth=0, zorder=0, label=f"published ({known['where']})")
         panel.set_xscale("log")
         panel.set_xlim(min(times.values()) / 3, 3 * max(*times.values(), high))
-        panel.set_yticks([])
-        for place, (name, seconds) in enumerate(times.items()):
-            panel.text(panel.get_xlim()[0] * 1.1, place - 0.42, name, size=SMALL, color=INK, va="center")
+        panel.set_yticks(places, list(times), size=SMALL)
+        panel.grid(False, axis="y")
+        named(panel, key.replace("_", " "))
+        for place, seconds in enumerate(times.values()):
             panel.text(seconds * 1.1, place, f"{_milliseconds(seconds)} ms", size=SMALL, color=INK, va="center")
-        panel.set_ylim(len(times) - 0.4, -0.8)
+        panel.set_ylim(len(times) - 0.4, -0.6)
     legend(canvas, axes[0])
     saved(canvas, folder, "times")

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 _FIRST = (0.03, 0.2)  # of the weight that is given: where the search begins
 _HIGHEST = 2.0  # of it: where it gives up
 _CLOSE = 5e-4  # of the force
-_NARROW = 0.03  # of the square of the weight: a jump or a fold lies between
+_NARROW = 0.08  # of the square of the weight: a jump or a fold lies between
 _TRIES = 20
 ROUGH = 1e-3  # accuracy [L_0] that is enough to look for a weight
 

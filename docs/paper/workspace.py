@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 NAME = "workspace_260"
 _GRID = "#BBBBBB"
-LEVELS = 9
+LEVELS = 8
 """Pressures a set of the grid that the sequence is compared with."""
 
 
