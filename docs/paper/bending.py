@@ -64,7 +64,7 @@ def _along(poses: PoseSolver, scenario: Scenario, sets: int) -> Curve:
 def curves() -> dict[Key, Curve]:
     """Return every curve of the page."""
     solvers = Solvers()
-    found = {}
+    found: dict[Key, Curve] = {}
     for law, stiffened, robot in product(LAWS, (True, False), NAMES):
         scenario = case(f"bending_{robot}")
         poses = solvers.of(model_of(scenario, law, STIFFENED if stiffened else BARE), scenario)

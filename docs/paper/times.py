@@ -99,8 +99,8 @@ def _notes(pushes: Mapping[str, float]) -> str:
             "- A pose or force of this package includes stretch, stiffnesses, an error estimate with refinement of the "
             "grid, the stability test, warnings and the whole shape. The paper's method gets the stretch and the "
             "stiffnesses for nothing and computes none of the others.",
-            '- "first" is a new solver with everything compiled; "kept" one that has met the robot before, as in a '
-            "sequence or a design.",
+            '- "first" is a new solver, what it compiles shared out over its few poses; "kept" one that has met the '
+            "robot before, as in a longer sequence or a design.",
             "- NumPy arrays is how one writes the method, and what MATLAB has. Python floats is the same with every "
             "sum written by hand.",
             "- In the plane only four unknowns are left, which the paper's method does not do. In space its squares "
