@@ -86,7 +86,7 @@ _INTRODUCTION = (
     "differ, the page says why."
 )
 _CONTENTS = {
-    "bending": ("Bending and elongation", "all robots, one to three sets, every law, with and without stiffening"),
+    "bending": ("Bending and elongation", "the robots with one to three sets, every law, with and without stiffening"),
     "blocked": ("Blocked tip force", "all robots, hyperelastic laws, every closure, with RMSE and MAPE"),
     "constraint": ("The chamber constraint", "the blocked force with and without it"),
     "workspace": ("Workspace", "the tip along a sequence of pressures"),

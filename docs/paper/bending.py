@@ -1,4 +1,4 @@
-"""Bending and elongation of the eight robots: one, two and three sets, five laws, with and without stiffening."""
+"""Bending and elongation of the tested robots: one, two and three sets, five laws, with and without stiffening."""
 
 from __future__ import annotations
 

@@ -368,7 +368,7 @@ def _draw_parity(found: Forces, law: str, folder: Path) -> None:
     for closure in CLOSURES:
         y = [found[closure, law, name].force[-1] for name in measured]
         panel.scatter(known, y, color=_SHADE[closure], marker=marks[closure], s=42, label=closure, zorder=3)
-    panel.set(xscale="log", yscale="log", xlim=ends, ylim=(known.min() / 5, 5 * known.max()))
+    panel.set(xscale="log", yscale="log", xlim=ends, ylim=(known.min() / 8, 5 * known.max()))
     for name, force in measured.items():
         panel.text(force, 0.02, name, size=SMALL, color=GREY, rotation=90, ha="center", va="bottom",
                    transform=panel.get_xaxis_transform())  # fmt: skip

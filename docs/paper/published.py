@@ -24,7 +24,7 @@ def published() -> Mapping[str, Any]:
 def citation() -> str:
     """Return the source as one line of Markdown."""
     source = published()["source"]
-    return f"{source['authors']}, *{source['title']}*, {source['journal']}, [doi](https://doi.org/{source['doi']})"
+    return f"{source['authors']}, *{source['title']}*, {source['journal']}, [doi {source['doi']}](https://doi.org/{source['doi']})"
 
 
 def measured_angles() -> dict[tuple[str, int], float]:
