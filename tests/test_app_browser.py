@@ -462,12 +462,16 @@ def test_a_blocked_force_and_its_curve(tab: Watched, tmp_path: Path) -> None:
     tab.shows("blocked_force_N", 0.0)
 
 
-def test_a_workspace_is_swept_stopped_and_shown(tab: Watched) -> None:
+def test_a_workspace_is_swept_stopped_and_shown(tab: Watched, pictures: Path) -> None:
     tab.press("tab-workspace")
+    tab.type("workspace.workers", "1")
+    run(tab, "workspace")
+    tab.page.mouse.move(600, 700)
+    tab.page.wait_for_timeout(1500)  # still pictures are drawn smoothly
+    tab.page.screenshot(path=pictures / "app.png")
     tab.type("workspace.levels", "5")
     tab.type("workspace.from_bar", "0.1")
     tab.type("workspace.to_bar", "1")
-    tab.type("workspace.workers", "1")
     tab.settled()
     run(tab, "workspace")
     tab.choose("workspace.colour", "tretch")
@@ -539,14 +543,14 @@ def test_constants_are_identified_from_a_dropped_file(tab: Watched) -> None:
 
 
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-def test_nothing_is_cut_off_and_texts_can_be_read(tab: Watched, dark: bool, tmp_path: Path) -> None:
+def test_nothing_is_cut_off_and_texts_can_be_read(tab: Watched, dark: bool, pictures: Path) -> None:
     """Contrast of every text against its background, and no part wider than its column."""
     if dark:
         tab.press("dark")
     for name in ("kinematics", "blocked", "workspace", "inverse", "identify", "scenario"):
         tab.press(f"tab-{name}")
         tab.settled()
-        tab.page.screenshot(path=tmp_path / f"{name}.png")
+        tab.page.screenshot(path=pictures / f"app_{name}_{'dark' if dark else 'light'}.png")
         assert tab.evaluate(TOO_WIDE) == [], name
         assert tab.evaluate(FAINT) == [], name
 

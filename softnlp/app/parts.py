@@ -191,12 +191,6 @@ def _is_number(rows: Sequence[Sequence[Any]], column: int) -> bool:
     return all(row[column] is None or isinstance(row[column], int | float) for row in rows)
 
 
-# Plotly refuses to be resized while its tab is hidden, which nobody needs to know.
-_QUIET_RESIZE = """window.softnlpQuiet ??= window.addEventListener("unhandledrejection", event => {
-if (String(event.reason?.message ?? event.reason).startsWith("Resize must be passed")) event.preventDefault();
-}) ?? true"""
-
-
 class Chart:
     """A plotly chart with two labelled axes that follows the page from light to dark."""
 
@@ -208,7 +202,6 @@ class Chart:
         self._place = ui.element("div").classes("w-full").style(f"height: {height}")
         self._place.set_visibility(False)
         self._plot: ui.plotly | None = None
-        ui.run_javascript(_QUIET_RESIZE)
         self._dark = darkness()
         on_dark(self._draw)
 
