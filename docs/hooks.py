@@ -28,7 +28,9 @@ def on_files(files: Any, config: Any) -> Any:
     """Add generated pages and images, and a page for every file of the repository that a page links to."""
     pages = {path.name: path for path in DOCS.glob("*.md")}
     made = {**figures.made(), **notebooks.made(), **paper.made(), **links.root_pages()}
-    made |= links.source_pages([*pages.values(), *(DOCS / "how-to").glob("*.md"), *(DOCS / "notebooks").glob("*.ipynb")])
+    made |= links.source_pages(
+        [*pages.values(), *(DOCS / "how-to").glob("*.md"), *(DOCS / "notebooks").glob("*.ipynb")]
+    )
     from mkdocs.structure.files import File
 
     for uri, content in made.items():

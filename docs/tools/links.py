@@ -80,5 +80,5 @@ def _add(path: str, made: dict[str, str]) -> None:
         for p in inside:
             _add(f"{path}/{p.name}", made)
     elif place.is_file():
-        fence = f"````{LANGUAGES.get(place.suffix, 'text')} title=\"{path}\""
+        fence = f'````{LANGUAGES.get(place.suffix, "text")} title="{path}"'
         made[_page_of(path)] = f"# {place.name}\n\n{fence}\n{place.read_text().rstrip()}\n````\n"

@@ -1,4 +1,4 @@
-"""The pages that reproduce the paper, where the package docs.paper is there: `build(folder)` writes Markdown and PNG."""
+"""The pages that reproduce the paper, once the package docs.paper is there: `build(folder)` writes Markdown and PNG."""
 
 from __future__ import annotations
 
