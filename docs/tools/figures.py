@@ -1,8 +1,8 @@
 """Figures and tables that scripts of docs/figures make.
 
-A script has `figure()`, which returns a matplotlib figure, or `table()`, which returns Markdown. A page shows one by a
-link to the script that stands alone in a paragraph, `[What it shows](figures/name.py)`: readers of the repository
-reach the script, readers of the site see what it makes.
+A script has `figure()`, which returns a matplotlib figure or the path of a PNG file, or `text()`, which returns
+Markdown, or both. A page shows them by a link to the script that stands alone in a paragraph, `[What it
+shows](figures/name.py)`: readers of the repository reach the script, readers of the site see what it makes.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import re
 import runpy
+import shutil
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -26,14 +27,18 @@ def _folder(script: Path) -> Path:
 
 
 def make_one(script: Path) -> None:
-    """Run a script and keep what it makes: figure.png or table.md."""
+    """Run a script and keep what it makes: figure.png and text.md."""
 
     def build(folder: Path) -> None:
         names = runpy.run_path(str(script))
+        if "text" in names:
+            (folder / "text.md").write_text(names["text"]().strip() + "\n")
         if "figure" in names:
-            names["figure"]().savefig(folder / "figure.png", dpi=DPI)
-        else:
-            (folder / "table.md").write_text(names["table"]().strip() + "\n")
+            drawn = names["figure"]()
+            if isinstance(drawn, Path):
+                shutil.copyfile(drawn, folder / "figure.png")
+            else:
+                drawn.savefig(folder / "figure.png", dpi=DPI)
 
     cache.make(_folder(script), build)
 
@@ -63,8 +68,10 @@ def shown(markdown: str, uri: str) -> str:
 
     def replace(match: re.Match[str]) -> str:
         folder = _folder(cache.ROOT / "docs" / "figures" / f"{match['name']}.py")
-        if (folder / "figure.png").is_file():
-            return f"![{match['text']}]({match['up']}figures/{match['name']}.png)"
-        return (folder / "table.md").read_text()
+        text, image = folder / "text.md", folder / "figure.png"
+        parts = [text.read_text()] if text.is_file() else []
+        if image.is_file():
+            parts.append(f"![{match['text']}]({match['up']}figures/{match['name']}.png)")
+        return "\n".join(parts)
 
     return _LINK.sub(replace, markdown)
