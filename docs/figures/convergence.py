@@ -20,7 +20,7 @@ def solved(transcription: str, intervals: int):
 
 def figure():
     """Draw both on logarithmic axes."""
-    best = solved("multiple-shooting", 256).pose.tip_position
+    best = solved("collocation", 32).pose.tip_position
     drawn = new_figure(
         6.4, 3.9, "Error of the tip against the grid", "D25L60 under tip force and gravity, 0.8 and 0.4 bar"
     )

@@ -39,16 +39,14 @@ def text() -> str:
     found = {(name, sum(p > 0 for p in P)): value for name, P, value in rows_measured}
     rows = []
     for name in dict.fromkeys(name for name, _ in found):
-        row = [name, f"{found[name, 1]:.1f} / {found[name, 2]:.1f}"]
-        row += [f"{angles[label][name, 1]:.1f} / {angles[label][name, 2]:.1f}" for label in angles]
-        row += [f"{elongations[label][name]:.1f}" for label in elongations]
-        rows.append(row)
+        both = [f"{of[name, 1]:.1f}\u00a0/\u00a0{of[name, 2]:.1f}" for of in (found, *angles.values())]
+        rows.append([name, *both, *(f"{elongations[label][name]:.1f}" for label in elongations)])
     errors = [np.mean([abs(angles[label][key] - value) for key, value in found.items()]) for label in angles]
+    rows.append(["mean error", "", *(f"**{e:.1f}**" for e in errors), "", ""])
+    header = ["robot", "measured [deg]", *(f"{label} [deg]" for label in angles)]
+    header += [f"elongation, {label} [mm]" for label in elongations]
     low, high = MEASURED_ELONGATION["L60"]
-    rows.append(["mean error", "", *(f"**{e:.1f}**" for e in errors), f"measured: {low} to {high}", ""])
-    header = ["robot", "measured [deg]", *(f"`{label}` [deg]" for label in angles)]
-    header += [f"elongation, `{label}` [mm]" for label in elongations]
-    return markdown(header, rows)
+    return markdown(header, rows) + f"\n\nMeasured elongations of the robots of 60 mm: {low} to {high} mm."
 
 
 if __name__ == "__main__":

@@ -16,6 +16,18 @@ ROOT_PAGES = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.m
 LANGUAGES = {".toml": "toml", ".py": "python", ".csv": "text", ".cff": "yaml", ".yml": "yaml", "": "text"}
 _LINK = re.compile(r"(?P<head>\]\()(?P<target>[^)\s#]+)(?P<anchor>#[^)\s]*)?\)")
 
+_NAMED = re.compile(r"\[[\w./-]+\.md\]\((?P<link>(?P<target>[^)\s#]+\.md)(?:#(?P<anchor>[^)\s]*))?)\)")
+
+
+def _heading(uri: str, match: re.Match[str]) -> str:
+    """Return the heading to which a link leads, for a link whose text is the name of a file."""
+    page = ROOT / "docs" / posixpath.dirname(uri) / match["target"]
+    if not page.is_file():
+        return Path(match["target"]).stem
+    headings = re.findall(r"^#+ (.+)$", page.read_text(), re.MULTILINE)
+    wanted = [h for h in headings if re.sub(r"[^\w\- ]", "", h.lower()).replace(" ", "-") == match["anchor"]]
+    return str((wanted or headings)[0])
+
 
 def _target(uri: str, link: str) -> str | None:
     """Return the path in the repository to which a link of a page leads, where that is outside of docs/."""
@@ -33,7 +45,8 @@ def _page_of(path: str) -> str:
 
 
 def into_site(markdown: str, uri: str) -> str:
-    """Return a page with links into the repository in place led to pages of the site."""
+    """Return a page with links that leave docs/ led to pages of the site, and file names as link texts in words."""
+    markdown = _NAMED.sub(lambda match: f"[{_heading(uri, match)}]({match['link']})", markdown)
 
     def replace(match: re.Match[str]) -> str:
         path = _target(uri, match["target"])
