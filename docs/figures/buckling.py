@@ -25,7 +25,7 @@ def text() -> str:
         EI = float(at_rest.bending_stiffness[0])
         number = silicone.density * float(at_rest.area) * GRAVITY * body.length**3 / EI
         upright = Loads(gravity=(0.0, 0.0, -GRAVITY))
-        step, solved = poses.with_model(Model(body, silicone)).solve(np.zeros(3), upright)
+        step, _ = poses.with_model(Model(body, silicone)).solve(np.zeros(3), upright)
         leaning = float(np.linalg.norm(step.pose.tip_position[:2])) > 1e-6
         says = "stands" if step.pose.stable and not leaning else "leans, stable" if step.pose.stable else "not stable"
         rows.append([name, f"{number:.2f}", says])

@@ -20,7 +20,7 @@ MODELS = (
 
 def figure():
     """Draw force against pressure."""
-    P = np.linspace(0, 1.5, 11)
+    P = np.linspace(0, 1.5, 6)
     drawn = new_figure(7.2, 4.0, "Blocked force of D25L60", "Ecoflex 00-50, Mooney-Rivlin, one set, tip held at x = 0")
     axes = drawn.add_axes((0.09, 0.13, 0.88, 0.71))
     plain(axes, "pressure of set 1 [bar]", "blocked force [N]")
@@ -42,5 +42,6 @@ def figure():
     value = next(force for name, _, force in measured("measured_forces.csv", "blocked_force_N") if name == "D25L60")
     axes.plot([1.5], [value], "*", color=INK, markersize=13, label="measured", clip_on=False, zorder=5)
     axes.set_xlim(0, 1.52)
+    axes.set_ylim(0, 2.0)  # `rigid` goes far beyond
     axes.legend(frameon=False, fontsize=SMALL)
     return drawn

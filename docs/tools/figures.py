@@ -71,7 +71,8 @@ def shown(markdown: str, uri: str) -> str:
         text, image = folder / "text.md", folder / "figure.png"
         parts = [text.read_text()] if text.is_file() else []
         if image.is_file():
-            parts.append(f"![{match['text']}]({match['up']}figures/{match['name']}.png)")
+            link = f"{match['up']}figures/{match['name']}.png"
+            parts.append(f"[![{match['text']}]({link})]({link})")
         return "\n".join(parts)
 
     return _LINK.sub(replace, markdown)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -29,12 +30,13 @@ def run(path: Path) -> Any:
         Where a cell raises.
     """
     import nbformat
+    from jupyter_client import AsyncKernelManager
     from nbclient import NotebookClient
 
     notebook = nbformat.read(path, as_version=4)
-    NotebookClient(
-        notebook, timeout=120, kernel_name="python3", resources={"metadata": {"path": str(cache.ROOT)}}
-    ).execute()
+    kernel = AsyncKernelManager(kernel_name="python3", transport="ipc")
+    where = {"metadata": {"path": str(cache.ROOT)}}
+    NotebookClient(notebook, km=kernel, timeout=120, resources=where).execute()
     return notebook
 
 
@@ -42,7 +44,7 @@ def _build(path: Path, folder: Path) -> None:
     parts = []
     for number, cell in enumerate(run(path).cells):
         if cell.cell_type == "markdown":
-            parts.append(cell.source)
+            parts.append(re.sub(r"(\]\(\w+)\.ipynb\)", r"\1.md)", cell.source))
             continue
         parts.append(f"```python\n{cell.source}\n```")
         for k, output in enumerate(cell.outputs):
