@@ -66,6 +66,6 @@ def made() -> dict[str, bytes]:
     """Return pages and images by their place in the site."""
     found = {}
     for notebook in sorted((cache.ROOT / "docs" / "notebooks").glob("*.ipynb")):
-        for path in sorted(_folder(notebook).iterdir()):
+        for path in sorted(_folder(notebook).glob("*")):
             found[f"notebooks/{path.name}"] = path.read_bytes()
     return found
