@@ -18,14 +18,15 @@ class Closure:
     Both functions take a `softnlp.tip.AtTip` and return expressions of it, made of operators and casadi functions.
     Forces are in units of EI/L_0^2 and lengths in L_0, as everything in `AtTip` is.
 
-    Parameters
+    Attributes
     ----------
-    name : str
+    name
         How results call it.
-    reaction : Callable
-        Returns T_i, the reactions (N,) of the chambers, which act at the tip with P_i A_c.
-    equation : Callable, optional
-        Returns one residual that determines one more unknown force, `at.unknowns[-1]`, such as a common reaction.
+    reaction
+        Takes an `AtTip`, returns T_i, the reactions (N,) of the chambers, which act at the tip with P_i A_c.
+    equation
+        Takes an `AtTip`, returns one residual that determines one more unknown force, `at.unknowns[-1]`, such as a
+        common reaction; None where there is no such unknown.
     """
 
     name: str
@@ -66,7 +67,7 @@ class ContactSettings:
 
     @property
     def closure_name(self) -> str:
-        """The name of the closure, the package's or your own."""
+        """The name of the closure, one of the package's or your own."""
         return self.closure.name if isinstance(self.closure, Closure) else self.closure
 
 
