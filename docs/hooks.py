@@ -26,11 +26,10 @@ def on_config(config: Any) -> Any:
 
 def on_files(files: Any, config: Any) -> Any:
     """Add generated pages and images, and a page for every file of the repository that a page links to."""
-    pages = {path.name: path for path in DOCS.glob("*.md")}
-    made = {**figures.made(), **notebooks.made(), **paper.made(), **links.root_pages()}
-    made |= links.source_pages(
-        [*pages.values(), *(DOCS / "how-to").glob("*.md"), *(DOCS / "notebooks").glob("*.ipynb")]
-    )
+    made: dict[str, str | bytes] = {**figures.made(), **notebooks.made(), **paper.made(), **links.root_pages()}
+    texts = {path.relative_to(DOCS).as_posix(): path.read_text() for path in DOCS.rglob("*.md")}
+    texts |= {uri: _text(content) for uri, content in made.items() if uri.endswith(".md")}
+    made |= links.source_pages(texts)
     from mkdocs.structure.files import File
 
     for uri, content in made.items():
@@ -38,6 +37,10 @@ def on_files(files: Any, config: Any) -> Any:
             files.remove(old)
         files.append(File.generated(config, uri, content=content))
     return files
+
+
+def _text(content: str | bytes) -> str:
+    return content.decode() if isinstance(content, bytes) else content
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:

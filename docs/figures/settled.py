@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq, least_squares
 
 from docs.figures._shared import PUBLISHED, Simulated, markdown
-from softnlp import BAR, DEGREE, REPRODUCTION, Coefficients, Conventions, Material, forward, material, robot
+from softnlp import BAR, DEGREE, REPRODUCTION, Coefficients, Conventions, Material, material, robot
 from softnlp.section import deform, stretch_balance
 
 LAPAROSCOPE = robot("laparoscope-6")
@@ -107,14 +107,5 @@ def text() -> str:
     return markdown(header, rows)
 
 
-def check() -> float:
-    """Return the largest difference between `angle` and the package's own poses [deg]."""
-    found = []
-    for case in PUBLISHED:
-        step = forward(LAPAROSCOPE, material(case.silicone), [[case.pressure * BAR, 0, 0]]).steps[0]
-        found.append(abs(step.pose.bending_angle / DEGREE - angle(case, READINGS[0], 0.41, 1.23)))
-    return max(found)
-
-
 if __name__ == "__main__":
-    print(text(), check())
+    print(text())

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Iterable
+from collections.abc import Mapping
 from pathlib import Path
 
 from docs.tools.cache import ROOT
@@ -72,9 +72,11 @@ def root_pages() -> dict[str, str]:
     return {ROOT_PAGES[name]: _LINK.sub(moved, (ROOT / name).read_text()) for name in names}
 
 
-def source_pages(pages: Iterable[Path]) -> dict[str, str]:
-    """Return a page for each file and folder of the repository that pages link to, and for the files of a folder."""
-    texts = {path.relative_to(ROOT / "docs").as_posix(): path.read_text() for path in pages} | root_pages()
+def source_pages(texts: Mapping[str, str]) -> dict[str, str]:
+    """Return a page for each file and folder of the repository that pages link to, and for the files of a folder.
+
+    texts : the Markdown of every page by its place in the site.
+    """
     wanted = {_target(uri, match["target"]) for uri, text in texts.items() for match in _LINK.finditer(text)}
     made: dict[str, str] = {}
     for path in sorted(filter(None, wanted)):
