@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-GENERATED = ("contributing.md", "changelog.md")
-COMING = ("compare.md", "app.md", "benchmarks.md", "robustness.md", "mutation.md", "mesh.md", "peers.md")
+COMING = (
+    *("compare.md", "app.md", "mesh.md", "view.md", "mutation.md", "peers.md"),
+    *("benchmarks.md", "benchmarks/table.md", "robustness.md", "benchmarks/robustness.md"),
+)
 """Pages that the navigation has a place for before they are written."""
 
 
