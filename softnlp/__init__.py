@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from softnlp.errors import MaterialError as MaterialError
     from softnlp.errors import RobotError as RobotError
     from softnlp.errors import SoftnlpError as SoftnlpError
+    from softnlp.evaluation.compare import compare as compare
+    from softnlp.evaluation.variants import Variant as Variant
     from softnlp.laws import formula_law as formula_law
     from softnlp.laws import function_law as function_law
     from softnlp.materials import Material as Material
@@ -78,6 +80,8 @@ _HOMES = {
     "contact_settings": ("Closure", "ClosureWeights", "ContactSettings"),
     "conventions": ("AS_PRINTED", "COEFFICIENT_SETS", "REPRODUCTION", "Coefficients", "Conventions"),
     "errors": ("IllPosedError", "InputError", "MaterialError", "RobotError", "SoftnlpError"),
+    "evaluation.compare": ("compare",),
+    "evaluation.variants": ("Variant",),
     "laws": ("formula_law", "function_law"),
     "materials": ("Material", "load_materials", "material"),
     "numerics": ("Numerics",),

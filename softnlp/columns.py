@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from softnlp.errors import InputError
 from softnlp.pressures import csv_rows
-from softnlp.reading import LONGEST_NAME, one_line, read_text, shown
+from softnlp.reading import LONGEST_NAME, did_you_mean, one_line, read_text, shown
 
 Array = NDArray[np.float64]
 
@@ -72,14 +72,17 @@ def read_columns(folder: Path, file: str, needed: Collection[str] = ()) -> Colum
     except InputError as error:
         raise InputError(f"{label}: {error.message}", key="file") from None
     if len(rows) < 2:
-        raise InputError(f"{label}: expected a header and rows of numbers", key="file")
+        got = "the header alone" if rows else "an empty file"
+        raise InputError(f"{label}: expected a header and rows of numbers, at least one row, got {got}", key="file")
     header = tuple(one_line(name.strip(), LONGEST_NAME) for name in rows[0][1])
     for name in header:
         if name and header.count(name) > 1:
-            raise InputError(f"{label}: expected each column once, got {shown(name)} twice", key="file")
+            times = header.count(name)
+            raise InputError(f"{label}: expected each column once, got {shown(name)} {times} times", key="file")
     for name in needed:
         if name not in header:
-            raise InputError(f"{label}: missing column {name!r}; it has {', '.join(header)}", key="file")
+            near = did_you_mean(name, header)
+            raise InputError(f"{label}: missing column {name!r}; it has {', '.join(header)}{near}", key="file")
     for line, row in rows[1:]:
         if len(row) != len(header):
             raise InputError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -15,30 +15,24 @@ from softnlp.conventions import Coefficients
 from softnlp.errors import InputError, nearest
 from softnlp.laws import LAWS, Law
 from softnlp.materials import Material
-from softnlp.pressures import HIGHEST_BAR, UNIT_HINT
+from softnlp.measured_rows import SCALARS, RobotRows, rows_by_robot
 from softnlp.reading import shown
-from softnlp.robot import ROBOTS, Robot
+from softnlp.robot import Robot
 from softnlp.scenario_schema import ContactTable, RobotTable
 from softnlp.schema_identify import IdentifyFile, MeasurementsTable, SigmaTable, TensileTable
 from softnlp.studies.free_constants import free_constants
 from softnlp.studies.identify_task import RobotTask, TensileTask
 from softnlp.studies.measurements import Measurements, checked_measurements
-from softnlp.units import BAR, DEGREE, MEGAPASCAL, MILLIMETRE
+from softnlp.units import MEGAPASCAL, MILLIMETRE
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
 RobotMaker = Callable[[RobotTable], Robot]
 
-_TIP = ("x_mm", "y_mm", "z_mm")
-_SCALARS: Mapping[str, tuple[str, float]] = {
-    "bending_angle": ("bending_angle_deg", DEGREE),
-    "elongation": ("elongation_mm", MILLIMETRE),
-    "blocked_force": ("blocked_force_N", 1.0),
-}
-FILE_KEYS: Mapping[str, tuple[str, float]] = {"tip_position": ("tip_position_mm", MILLIMETRE), **_SCALARS}
+FILE_KEYS: Mapping[str, tuple[str, float]] = {"tip_position": ("tip_position_mm", MILLIMETRE), **SCALARS}
 """What an observable is called in files, and its unit there."""
 
-_UNUSED_BY_TENSILE = ("robots", "sigma", "contact", "gravity", "tip_load", "stiffening", "corrections", "solver")
+UNUSED_BY_TENSILE = ("robots", "sigma", "contact", "gravity", "tip_load", "stiffening", "corrections", "solver")
 _UNUSED_CONTACT = ("offsets_mm", "offset_ramp", "target_force_N")
 
 
@@ -64,7 +58,7 @@ def identify_task(given: Given) -> TensileTask | RobotTask:
     file = given.file
     tensile, measured = file.tensile, file.measurements
     if tensile is not None and measured is None:
-        for name in _UNUSED_BY_TENSILE:
+        for name in UNUSED_BY_TENSILE:
             if name in given.written:
                 raise InputError("this table is not used by a tensile test; remove it", table=name)
         return _located("tensile", lambda: _tensile(given, tensile))
@@ -178,17 +172,19 @@ def _robots(given: Given, table: MeasurementsTable) -> RobotTask:
     tables = [read_columns(given.folder, file) for file in _files(table)]
     own = {name: _located(f"robots.{name}", partial(given.make_robot, t)) for name, t in given.file.robots.items()}
     header = tuple(dict.fromkeys(name for columns in tables for name in columns.header))
-    rows: dict[str, list[tuple[Columns, int]]] = {}
     for columns in tables:
         if "robot" not in columns and "robot" not in given.written:
             raise InputError(f"{columns.file}: expected a column robot, or a table [robot] for every row", key="file")
-        for k, name in enumerate(columns.text("robot")):
-            rows.setdefault(name, []).append((columns, k))
+
+    def unnamed(columns: Columns, row: int) -> Robot:
+        if "robot" in given.written:
+            return given.robot
+        raise columns.wrong(row, "robot", "expected a name, or a table [robot] for rows without one")
+
     made, cells = [], []
-    for name, places in rows.items():
-        robot = _robot_named(name, own, given, places[0])
-        made.append(_measurements(robot, name or robot.name, places, given.file.sigma))
-        cells.append(tuple(tuple(_cell(c, k, column) for column in header) for c, k in places))
+    for rows in rows_by_robot(tables, own, unnamed):
+        made.append(_measurements(rows, given.file.sigma))
+        cells.append(tuple(tuple(_cell(c, k, column) for column in header) for c, k in rows.places))
     free, bounds = _free(table, given.material)
     return RobotTask(tuple(made), free, bounds, header, tuple(cells))
 
@@ -197,89 +193,42 @@ def _cell(columns: Columns, row: int, name: str) -> str:
     return columns.rows[row][columns.header.index(name)].strip() if name in columns else ""
 
 
-def _robot_named(name: str, own: Mapping[str, Robot], given: Given, place: tuple[Columns, int]) -> Robot:
-    """Return a robot of [robots], of the library, or that of [robot] where the cell is blank."""
-    if name == "":
-        if "robot" in given.written:
-            return given.robot
-        raise place[0].wrong(place[1], "robot", "expected a name, or a table [robot] for rows without one")
-    if name in own:
-        return own[name]
-    if name in ROBOTS:
-        return ROBOTS[name]
-    raise place[0].wrong(
-        place[1], "robot", f"expected a table of [robots] or a robot of the library, got {shown(name)}"
-        f"{nearest(name, [*own, *ROBOTS])}"
-    )  # fmt: skip
-
-
-def _measurements(robot: Robot, label: str, places: Sequence[tuple[Columns, int]], sigmas: SigmaTable) -> Measurements:
+def _measurements(rows: RobotRows, sigmas: SigmaTable) -> Measurements:
     """Return the measurements of one robot."""
-
-    def column(name: str, *, blank: bool = True) -> Array:
-        kept: dict[int, Array] = {}
-        for columns, _ in places:
-            if id(columns) not in kept:
-                kept[id(columns)] = columns.numbers(name, blank=blank)
-        return np.array([kept[id(columns)][k] for columns, k in places])
-
-    pressure = []
-    for k in range(robot.chamber_sets):
-        name = f"p{k + 1}_bar"
-        values = column(name)
-        for row, value in enumerate(values):
-            if not 0 <= value <= HIGHEST_BAR:
-                where, line = places[row]
-                expected = f"expected a pressure from 0 to {HIGHEST_BAR:g} bar, got "
-                raise where.wrong(
-                    line, name, f"{expected}{'nothing' if np.isnan(value) else f'{value:g}'}; {UNIT_HINT}"
-                )
-        pressure.append(values * BAR)
-    _refuse_more_sets(robot, label, places)
-    tip = np.column_stack([column(name) for name in _TIP]) * MILLIMETRE
-    seen = {key: column(name) * unit for key, (name, unit) in _SCALARS.items()}
+    pressure = rows.pressure()
+    seen = rows.scalars()
+    count = len(pressure)
     sigma: dict[str, Array] = {}
     for key, (name, unit) in FILE_KEYS.items():
-        measured = seen.get(key, np.full(len(places), np.nan))
-        per_row = column(f"sigma_{name}") * unit
+        measured = seen.get(key, np.full(count, np.nan))
+        per_row = rows.column(f"sigma_{name}") * unit
         percent = getattr(sigmas, f"{key}_percent", None)
         absolute = getattr(sigmas, name)
         if percent is not None and absolute is not None:
             raise InputError(f"expected one of {name}, {key}_percent", table="sigma", key=name)
-        general = np.full(len(places), np.nan)
+        general = np.full(count, np.nan)
         if absolute is not None:
-            general = np.full(len(places), absolute * unit)
+            general = np.full(count, absolute * unit)
         elif percent is not None:
             general = percent / 100 * np.abs(measured)
         values = np.where(np.isnan(per_row), general, per_row)
         if not np.all(np.isnan(values)):
             sigma[key] = values
-    weight = column("weight")
+    weight = rows.column("weight")
     made = Measurements(
-        robot,
-        np.column_stack(pressure),
-        tip_position=tip,
+        rows.robot,
+        pressure,
+        tip_position=rows.tip_position(),
         **seen,
         sigma=sigma,
         weight=np.where(np.isnan(weight), 1.0, weight),
-        label=label,
+        label=rows.label,
     )
     try:
         checked_measurements(made)
     except InputError as error:
-        raise InputError(f"{label}: {error}", table="measurements", key="file") from None
+        raise InputError(f"{rows.label}: {error}", table="measurements", key="file") from None
     return made
-
-
-def _refuse_more_sets(robot: Robot, label: str, places: Sequence[tuple[Columns, int]]) -> None:
-    """Refuse a pressure in a set that the robot does not have."""
-    for columns, row in places:
-        for name in columns.header:
-            number = name.removeprefix("p").removesuffix("_bar")
-            if name == f"p{number}_bar" and number.isdecimal() and int(number) > robot.chamber_sets:
-                value = columns.numbers(name, blank=True)[row]
-                if value != 0 and not np.isnan(value):
-                    raise columns.wrong(row, name, f"expected 0 or nothing: {label} has {robot.chamber_sets} sets")
 
 
 def _free(table: MeasurementsTable, material: Material) -> tuple[tuple[str, ...], dict[str, tuple[float, float]]]:

@@ -13,6 +13,7 @@ from arc_workspaces import MODEL, arcs, grid, workspace_dataset, write_workspace
 
 from softnlp.cli import main
 from softnlp.errors import InputError
+from softnlp.evaluation.statistics import groups, statistics
 from softnlp.plots import comparison_figure
 from softnlp.units import BAR, MILLIMETRE
 from softnlp.workspace.again import model_of
@@ -20,8 +21,6 @@ from softnlp.workspace.comparison import (
     compare_measured,
     compare_workspaces,
     comparison_rows,
-    groups,
-    statistics,
 )
 from softnlp.workspace.measured import load_measured
 from softnlp.workspace.read import Workspace, column_names, load_workspace, read_column
@@ -141,7 +140,7 @@ def test_the_error_of_measured_tips_is_found_exactly(space: Workspace, tmp_path:
         pytest.approx(2e-3),
         pytest.approx(5e-3),
     )
-    assert told.root_mean_square == pytest.approx((34 / 5) ** 0.5 * 1e-3)
+    assert told.rmse == pytest.approx((34 / 5) ** 0.5 * 1e-3)
     assert statistics(np.zeros(0)).count == 0
 
 
@@ -213,7 +212,7 @@ def test_blanks_are_counted_and_other_columns_kept(space: Workspace, tmp_path: P
         (HEADER + ",p4_bar\n0,0,0,0,0,0,60,0\n", "pressures of 3 chamber sets, got a column 'p4_bar'"),
         (HEADER + ",x_mm\n0,0,0,0,0,0,60,0\n", "each column once, got 'x_mm' 2 times"),
         (HEADER + "\n0,0,0,0,0,60\n", "line 2: expected 7 values as in the header, got 6"),
-        (HEADER + "\n0,0,0,0,0,0,60\n1,0,0,0,0,up,60\n", "line 3: y_mm: expected a finite number, got 'up'"),
+        (HEADER + "\n0,0,0,0,0,0,60\n1,0,0,0,0,up,60\n", "line 3: y_mm: expected a number, got 'up'"),
         (HEADER + "\n0,0,0,0,nan,0,60\n", "x_mm: expected a finite number"),
         (HEADER + "\n0,0,-0.1,0,0,0,60\n", "p2_bar: expected a gauge pressure of at least 0, got -0.1"),
         (HEADER + "\n0,0,500,0,0,0,60\n", "p2_bar: expected at most 100 bar, got 500"),

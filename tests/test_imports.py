@@ -22,6 +22,7 @@ LAYERS = (
     *("formula", "laws", "materials", "robot", "section", "rod", "tip", "transcription"),
     *("quantities", "loadcase", "unloaded", "problem", "branch", "solver", "condensed", "continuation", "stability"),
     "implicit",
+    *("evaluation", "evaluation.statistics"),
     *(
         "studies",
         "studies.step",
@@ -64,19 +65,23 @@ LAYERS = (
     *("batch.shooting", "batch.grids", "batch.reduced", "batch.reduced_contact", "batch.stretches", "batch.*"),
     *("workspace", "workspace.poses", "workspace.plan", "workspace.pose_lane", "workspace.blocked_lane"),
     *("workspace.chunk", "workspace.task", "workspace.table", "workspace.manufacture"),
+    *("evaluation.variants", "evaluation.observed", "evaluation.simulated", "evaluation.comparison"),
+    "evaluation.compare",
     "scenario_schema",
     *("schema_workspace", "schema_inverse", "schema_identify", "schema_design"),
-    *("scenario_check", "pressures", "columns", "scenario_contact"),
+    *("scenario_check", "pressures", "columns", "measured_rows", "scenario_contact"),
     *("scenario_workspace", "scenario_inverse", "scenario_identify", "scenario_design"),
     "scenario",
     *("workspace.planning", "workspace.journal", "workspace.worker", "workspace.pool"),
-    *("runner_blocked", "runner_inverse", "runner", "runner_design", "results"),
+    *("runner_blocked", "runner_inverse", "runner", "runner_design", "runner_identify", "runner_compare", "results"),
     *("workspace.columns", "workspace.sink", "workspace.dataset", "workspace.run"),
     *("workspace.read", "workspace.boundary", "workspace.dexterity", "workspace.summary", "workspace.export"),
     *("workspace.measured", "workspace.again", "workspace.comparison"),
-    *("plots", "cli", "__main__"),
+    "palette",
+    "mesh",
+    *("plots", "app", "cli", "__main__"),
 )
-MIXED = ("results", "plots", "cli")
+MIXED = ("results", "mesh", "plots", "app", "cli")
 LONGEST_FILE = 400
 HEAVY = ("casadi", "numpy", "scipy", "matplotlib", "pydantic", "cyclopts", "rich", "xarray", "h5netcdf", "h5py")
 

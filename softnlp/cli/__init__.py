@@ -54,10 +54,13 @@ def _app() -> App:
     from cyclopts import App, Parameter
 
     from softnlp import __version__
+    from softnlp.cli.compare import compare
     from softnlp.cli.design import design
+    from softnlp.cli.gui import gui
     from softnlp.cli.identify import identify
     from softnlp.cli.inverse import inverse
     from softnlp.cli.library import materials, robots
+    from softnlp.cli.mesh import mesh
     from softnlp.cli.plot import plot_material, plot_run, plot_section
     from softnlp.cli.run import run
     from softnlp.cli.sensitivity import sensitivity
@@ -79,7 +82,10 @@ def _app() -> App:
     app.command(inverse)
     app.command(sensitivity)
     app.command(identify)
+    app.command(compare)
     app.command(design)
+    app.command(gui)
+    app.command(mesh)
     app.command(robots)
     app.command(materials)
     plot = App(name="plot", help="Draw a cross-section, silicones, or the results of a run.")

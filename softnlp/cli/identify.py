@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from softnlp.scenario import Scenario
     from softnlp.studies.identified import Identified
-    from softnlp.studies.identify_task import RobotTask, TensileTask
+    from softnlp.studies.identify_task import TensileTask
     from softnlp.studies.tensile import TensileFit
 
 
@@ -69,12 +69,12 @@ def _tensile(asked: Scenario, folder: Path | None, json: bool) -> int:
         tensile_document,
         tensile_table_text,
     )
+    from softnlp.runner_identify import run_tensile
     from softnlp.studies.identify_task import TensileTask
-    from softnlp.studies.tensile import fit_tensile
 
     task = asked.task
     assert isinstance(task, TensileTask)
-    fit = fit_tensile(task.stretch, task.stress, task.laws, name=task.name, density=task.density, start=task.start)
+    fit = run_tensile(asked)
     document = document_text(tensile_document(asked, task, fit))
     if folder is not None:
         from softnlp.plots import tensile_figure
@@ -126,7 +126,7 @@ def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
     task = asked.task
     assert isinstance(task, RobotTask)
     try:
-        found = _identified(asked, task)
+        found = _identified(asked)
     except _Stop:
         complain("stopped; an identification that is not finished leaves no constants")
         return STOPPED
@@ -150,10 +150,9 @@ def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
     return SOLVED if solved else SOME_UNSOLVED
 
 
-def _identified(asked: Scenario, task: RobotTask) -> Identified:
+def _identified(asked: Scenario) -> Identified:
     """Identify with a progress bar, which counts evaluations up to a guess of how many there will be."""
-    from softnlp.contact_settings import ContactSettings
-    from softnlp.studies.identify import identify
+    from softnlp.runner_identify import run_robots
 
     with progress(_GUESS, asked.title) as (advance, stop_asked):
 
@@ -162,18 +161,7 @@ def _identified(asked: Scenario, task: RobotTask) -> Identified:
             if stop_asked():
                 raise _Stop
 
-        return identify(
-            task.measurements,
-            asked.material,
-            task.free,
-            coefficients=asked.coefficients,
-            bounds=task.bounds,
-            contact=asked.contact or ContactSettings(),
-            loads=asked.loads,
-            conventions=asked.conventions,
-            numerics=asked.numerics,
-            progress=tell,
-        )
+        return run_robots(asked, tell)
 
 
 _GUESS = 40

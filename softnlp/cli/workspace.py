@@ -217,13 +217,13 @@ def _body(body: Boundary) -> str:
 
 def _comparison_lines(compared: Comparison) -> list[str]:
     """Return the table of the distances, by group and in all, and what was left out."""
-    from softnlp.workspace.comparison import groups, statistics
+    from softnlp.evaluation.statistics import groups, statistics
 
     every = np.ones(len(compared.row), bool)
     table = [["pressurised", "pairs", "mean", "median", "RMSE", "max [mm]", "mean [%]"]]
     for name, mask in [*groups(compared.pressure), ("all", every)]:
         s = statistics(compared.distance[mask] / MILLIMETRE)
-        numbers = [s.mean, s.median, s.root_mean_square, s.largest, 100 * s.mean * MILLIMETRE / compared.length]
+        numbers = [s.mean, s.median, s.rmse, s.largest, 100 * s.mean * MILLIMETRE / compared.length]
         table.append([name, f"{s.count:,}", *(f"{v:.3f}" for v in numbers)])
     widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
     lines = [f"tip against {compared.against}; % of the length {compared.length / MILLIMETRE:.4g} mm"]
@@ -232,9 +232,7 @@ def _comparison_lines(compared: Comparison) -> list[str]:
         lines.append("  ".join(cells))
     if compared.angle is not None:
         s = statistics(compared.angle / DEGREE)
-        lines.append(
-            f"bending angle: mean difference {s.mean:.3f} deg, RMSE {s.root_mean_square:.3f}, max {s.largest:.3f}"
-        )
+        lines.append(f"bending angle: mean difference {s.mean:.3f} deg, RMSE {s.rmse:.3f}, max {s.largest:.3f}")
     counts = (
         (int(compared.solved_again.sum()), "pairs whose pose was solved for this"),
         (compared.skipped, "rows with blanks skipped"),

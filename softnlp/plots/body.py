@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.mesh.rings import circle, placed
 from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, colour, step_colours
 from softnlp.results import Body, RunView
 from softnlp.units import MILLIMETRE, NEWTON_MILLIMETRE
@@ -36,12 +37,10 @@ def tube(body: Body, radius: float, offset: tuple[float, float], facets: int, st
     M = len(body.position)
     chosen = np.unique(np.linspace(0, M - 1, min(stations, M)).round().astype(int))
     p, R = body.position[chosen], body.rotation[chosen]
-    angle = np.linspace(0, 2 * np.pi, facets + 1)
-    around = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
-    local = radius * around + np.array([*offset, 0.0])
-    rings = (p[:, None, :] + np.einsum("sij,fj->sfi", R, local)) / MILLIMETRE
+    local = radius * circle(facets) + np.array(offset)
+    rings = placed(p[:, None], R[:, None], np.concatenate([local, local[:1]])[None]) / MILLIMETRE
     quads = np.stack([rings[:-1, :-1], rings[1:, :-1], rings[1:, 1:], rings[:-1, 1:]], axis=2)
-    middle = (angle[:-1] + angle[1:]) / 2
+    middle = 2 * np.pi * (np.arange(facets) + 0.5) / facets
     outward = np.column_stack([np.cos(middle), np.sin(middle), 0 * middle])
     normals = np.einsum("sij,fj->sfi", R[:-1], outward)
     return quads.reshape(-1, 4, 3), normals.reshape(-1, 3)

@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.evaluation.statistics import groups, statistics
+from softnlp.plots.boxes import draw_boxes
 from softnlp.plots.cloud import mark_size
-from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, colour, new_figure, plain
+from softnlp.plots.space import around, space_axes
+from softnlp.plots.style import GREY, INK, SMALL, TEXT, colour, new_figure, plain
 from softnlp.units import DEGREE, MILLIMETRE
 from softnlp.workspace.boundary import thinned
-from softnlp.workspace.comparison import Comparison, groups, statistics
+from softnlp.workspace.comparison import Comparison
 from softnlp.workspace.read import Workspace
 
 if TYPE_CHECKING:
@@ -77,24 +80,9 @@ def _tips(figure: Figure, comparison: Comparison, norm: Any) -> int:
     from matplotlib.cm import ScalarMappable
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-    axes: Any = figure.add_axes((-0.02, 0.05, 0.56, 0.84), projection="3d", computed_zorder=False)
-    axes.patch.set_visible(False)
-    axes.set_proj_type("ortho")
-    axes.view_init(elev=18, azim=-58)
     k = thinned(comparison.other, _MOST_LINES)
     other, mine = comparison.other[k] / MILLIMETRE, comparison.tip_position[k] / MILLIMETRE
-    both = np.vstack([other, mine])
-    low, high = both.min(axis=0), both.max(axis=0)
-    margin = max(0.05 * float((high - low).max()), 1e-3)
-    low, high = low - margin, high + margin
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=0.94)
-    for name, pane in zip("xyz", (axes.xaxis, axes.yaxis, axes.zaxis), strict=True):
-        pane.set_pane_color((1, 1, 1, 0))
-        pane._axinfo["grid"].update(color=PALE, linewidth=0.6)
-        pane.line.set_color(GREY)
-        getattr(axes, f"set_{name}label")(f"{name} [mm]", size=TEXT, color=INK)
-    axes.tick_params(labelsize=SMALL, colors=INK)
+    axes = space_axes(figure, (-0.02, 0.05, 0.56, 0.84), around(np.vstack([other, mine])))
     distance = comparison.distance[k] / MILLIMETRE
     lines = Line3DCollection(np.stack([other, mine], axis=1), cmap=_MAP, norm=norm, linewidths=0.9, zorder=2)
     lines.set_array(distance)
@@ -149,20 +137,8 @@ def _boxes(axes: Axes, comparison: Comparison, values: Array, label: str) -> Non
     """Draw a box for the whole and one for each group of rows, the whole on top."""
     plain(axes, label, "")
     named = [(_ALL, np.ones(len(values), bool)), *groups(comparison.pressure)][::-1]
-    drawn = axes.boxplot(
-        [values[mask] for _, mask in named],
-        orientation="horizontal",
-        widths=0.6,
-        showmeans=True,
-        patch_artist=True,
-        medianprops={"color": INK, "linewidth": 1.5},
-        whiskerprops={"color": GREY},
-        capprops={"color": GREY},
-        meanprops={"marker": "D", "markerfacecolor": "white", "markeredgecolor": INK, "markersize": 4},
-        flierprops={"marker": ".", "markersize": 3, "markeredgecolor": GREY, "rasterized": True},
-    )
-    for box, (name, _) in zip(drawn["boxes"], named, strict=True):
-        box.set(facecolor=colour(0) if name == _ALL else colour(5), edgecolor=GREY, alpha=0.75)
+    faces = [colour(0) if name == _ALL else colour(5) for name, _ in named]
+    draw_boxes(axes, [values[mask] for _, mask in named], faces, mean=True)
     axes.set_yticks(range(1, len(named) + 1), [f"{name}  ({mask.sum():,})" for name, mask in named])
     axes.tick_params(labelsize=SMALL)
 

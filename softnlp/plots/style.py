@@ -11,24 +11,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softnlp.errors import InputError
+from softnlp.palette import COLOURS as COLOURS
+from softnlp.palette import colour as colour
 from softnlp.results import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe and Ito's palette, the darker ones first; a chamber set keeps its colour in every figure.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
 INK, GREY, PALE = "#222222", "#767676", "#DDDDDD"
 WRONG = "#C1121F"
 DPI = 120
 TEXT, SMALL = 9.0, 8.0
 FORMATS = ("png", "pdf", "svg")
-
-
-def colour(index: int) -> str:
-    """Return the colour of a chamber set (from 0) or of a silicone; they repeat after seven."""
-    return COLOURS[index % len(COLOURS)]
 
 
 def ink_on(background: str) -> str:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from softnlp.plots.body import disc
 from softnlp.plots.cloud import VIEWS, Outline, mark_size, outline, seen, shown
-from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, WRONG, new_figure, plain
+from softnlp.plots.space import space_axes
+from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, new_figure, plain
 from softnlp.units import MILLIMETRE
 from softnlp.workspace.read import Column, Workspace, read_column
 from softnlp.workspace.summary import parameters
@@ -24,7 +25,6 @@ COLOUR = "bending_angle_deg"
 _MAP = "viridis"
 _LOGARITHMIC = ("residual", "discretisation_error")
 _ROUND_OFF = 1e-20
-_ELEVATION, _AZIMUTH = 18.0, -58.0
 _AXES = "xyz"
 _WIDTH, _HEIGHT = 11.0, 7.6
 
@@ -108,19 +108,8 @@ def _cloud_panel(
     """Draw the cloud in 3-D with the outlines on the walls behind it; return how many poses are drawn."""
     from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-    axes: Any = figure.add_axes((-0.025, 0.05, 0.56, 0.86), projection="3d", computed_zorder=False)
-    axes.patch.set_visible(False)
-    axes.set_proj_type("ortho")
-    axes.view_init(elev=_ELEVATION, azim=_AZIMUTH)
     low, high = limits
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=0.96)
-    for name, pane in zip(_AXES, (axes.xaxis, axes.yaxis, axes.zaxis), strict=True):
-        pane.set_pane_color((1, 1, 1, 0))
-        pane._axinfo["grid"].update(color=PALE, linewidth=0.6)
-        pane.line.set_color(GREY)
-        getattr(axes, f"set_{name}label")(f"{name} [mm]", size=TEXT, color=INK)
-    axes.tick_params(labelsize=SMALL, colors=INK)
+    axes = space_axes(figure, (-0.025, 0.05, 0.56, 0.86), limits, zoom=0.96)
     # the walls that the viewer sees behind the cloud, one for each projection
     for (first, second, sight, _), wall, found in zip(VIEWS, (low[2], high[1], low[0]), outlines, strict=True):
         for edges, style in ((found.boundary, _BOUNDARY), (found.hull, _HULL)):

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softnlp.evaluation.statistics import Statistics
 from softnlp.materials import Material
 from softnlp.results.inputs import package_version, tidy
-from softnlp.studies.fit_statistics import Misfit
 from softnlp.studies.free_constants import COEFFICIENTS
 from softnlp.studies.measurements import OBSERVABLES, column_slice
 from softnlp.units import BAR, DEGREE, MEGAPASCAL, MILLIMETRE
@@ -54,7 +54,7 @@ def _head(asked: Scenario) -> dict[str, Any]:
     }
 
 
-def _misfit(found: Misfit, unit: float) -> dict[str, Any]:
+def _misfit(found: Statistics, unit: float) -> dict[str, Any]:
     return {"count": found.count, "rmse": number(found.rmse / unit), "mape_percent": number(found.mape)}
 
 
@@ -234,17 +234,21 @@ def scenario_tables(found: Identified) -> dict[str, Any]:
         if table != "contact" or "k_c" in found.free.names:
             tables[table] = {COEFFICIENTS[n].field: values[n] for n in names}
     if any(q.startswith("material.") for q in found.free.quantities):
-        material = found.material
-        formula = formula_of(material.law)
-        tables["material"] = {
-            "name": material.name,
-            "model": material.law.name,
-            "density_kg_m3": tidy(material.density),
-            "fitted_stretch": [tidy(v) for v in material.fitted_stretch],
-            **({} if formula is None else {"formula": formula}),
-            "constants": {c.file_key: float(material.constants[c.name]) / c.scale for c in material.law.constants},
-        }
+        tables["material"] = material_table(found.material)
     return tables
+
+
+def material_table(material: Material) -> dict[str, Any]:
+    """Return [material] of a scenario with the constants of a material."""
+    formula = formula_of(material.law)
+    return {
+        "name": material.name,
+        "model": material.law.name,
+        "density_kg_m3": tidy(material.density),
+        "fitted_stretch": [tidy(v) for v in material.fitted_stretch],
+        **({} if formula is None else {"formula": formula}),
+        "constants": {c.file_key: float(material.constants[c.name]) / c.scale for c in material.law.constants},
+    }
 
 
 def identified_text(asked: Scenario, found: Identified) -> str:

@@ -13,7 +13,6 @@ Array = NDArray[np.float64]
 CLOSE = 0.99  # two constants whose estimates are correlated more than this are hardly told apart
 POORLY_CONDITIONED = 1e4  # of the Jacobian with columns of length one
 _LEAST_UNUSED = 0.1
-_NOTHING = 1e-6  # of the largest size: such as the angle of a straight shape
 SINGULAR = 1e10  # beyond it a combination of constants is open altogether
 
 
@@ -30,26 +29,6 @@ class Uncertainty:
     correlation: Array
     condition: float
     warnings: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Misfit:
-    """How far a model is from data.
-
-    count : of values. rmse : in the data's unit. mape : mean absolute error [%] of what each value is compared with;
-    nan where there is nothing to compare with.
-    """
-
-    count: int
-    rmse: float
-    mape: float
-
-
-def misfit(errors: Array, sizes: Array) -> Misfit:
-    """Return the misfit of errors, each compared with a size; where that is next to nothing, for the rmse alone."""
-    compared = np.abs(sizes) > _NOTHING * np.max(np.abs(sizes))
-    percent = 100 * np.mean(np.abs(errors[compared]) / np.abs(sizes[compared])) if np.any(compared) else np.nan
-    return Misfit(errors.size, float(np.sqrt(np.mean(errors**2))), float(percent))
 
 
 def uncertainty(names: Sequence[str], J: Array, residuals: Array, held: Sequence[bool] | None = None) -> Uncertainty:

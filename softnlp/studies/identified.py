@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.conventions import Coefficients
+from softnlp.evaluation.statistics import Statistics, statistics
 from softnlp.materials import Material
 from softnlp.status import Status
-from softnlp.studies.fit_statistics import Misfit, Uncertainty, misfit
+from softnlp.studies.fit_statistics import Uncertainty
 from softnlp.studies.free_constants import FreeConstants
 from softnlp.studies.measurements import OBSERVABLES, Data, column_slice
 
@@ -43,7 +44,7 @@ class Identified:
     evaluations: int
     warnings: tuple[str, ...]
 
-    def errors(self, after: bool = True) -> dict[str, Misfit]:
+    def errors(self, after: bool = True) -> dict[str, Statistics]:
         """Return the misfit by observable over all robots [m, rad, N].
 
         A tip position's error is a distance, compared with the robot's length; others are compared with the number
@@ -52,7 +53,7 @@ class Identified:
         return observable_misfits(self.data, self.after if after else self.before)
 
 
-def observable_misfits(data: Sequence[Data], predicted: Sequence[Array]) -> dict[str, Misfit]:
+def observable_misfits(data: Sequence[Data], predicted: Sequence[Array]) -> dict[str, Statistics]:
     """Return the misfit of predictions by observable, see `Identified.errors`."""
     found = {}
     for observable in OBSERVABLES:
@@ -64,5 +65,5 @@ def observable_misfits(data: Sequence[Data], predicted: Sequence[Array]) -> dict
             length = np.full(int(np.sum(rows)), float(d.robot.length))
             sizes.append(length if observable == "tip_position" else d.of(observable)[rows, 0])
         if sum(e.size for e in errors):
-            found[observable] = misfit(np.concatenate(errors), np.concatenate(sizes))
+            found[observable] = statistics(np.concatenate(errors), np.concatenate(sizes))
     return found

@@ -35,7 +35,8 @@ class Measurements:
 
     robot : whose it is. pressure : (rows, sets) [Pa]. tip_position : (rows, 3) [m]. bending_angle : (rows,) integral of
     the curvature over the backbone [rad]. elongation : (rows,) backbone length - L_0 [m]. blocked_force : (rows,) [N];
-    the tip is free in the other observables of the same row.
+    the tip is free in the other observables of the same row. tilt : (rows,) angle between the tip's axis and +z [rad];
+    it can be compared, not fitted.
     sigma : standard deviation of an observable by name, a number or (rows,); by default 1 % of each number, where
     those below a tenth of the observable's root mean square over this robot's rows count as that tenth does.
     weight : (rows,) of the squared misfit, 1 by default. label : of the robot in results.
@@ -50,6 +51,7 @@ class Measurements:
     sigma: Mapping[str, Any] = field(default_factory=dict)
     weight: Any = None
     label: str = ""
+    tilt: Any = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +87,8 @@ def column_slice(observable: str) -> slice:
 
 def checked_measurements(given: Measurements) -> Data:
     """Return measurements as arrays, or raise `InputError` naming what is not right."""
+    if given.tilt is not None:
+        raise InputError("expected none: a tilt can be compared, not fitted", key="tilt")
     check(given.robot, allow=LOWERABLE_RULES)
     P = pressure_table(given.pressure, given.robot.chamber_sets)
     rows = len(P)
@@ -94,11 +98,11 @@ def checked_measurements(given: Measurements) -> Data:
         if value is None:
             continue
         shape = (rows,) if len(parts) == 1 else (rows, len(parts))
-        column = _numbers(value, shape, observable)
+        column = number_array(value, shape, observable)
         values[:, column_slice(observable)] = column.reshape(rows, -1)
     if not np.any(np.isfinite(values)):
         raise InputError(f"expected at least one number of {', '.join(OBSERVABLES)}", key="measurements")
-    weight = np.ones(rows) if given.weight is None else _numbers(given.weight, (rows,), "weight")
+    weight = np.ones(rows) if given.weight is None else number_array(given.weight, (rows,), "weight")
     if not np.all(weight >= 0):
         raise InputError("expected weights that are not negative", key="weight")
     data = Data(given.robot, given.label or given.robot.name, P, values, np.ones_like(values), np.sqrt(weight))
@@ -129,7 +133,7 @@ def _sigmas(data: Data, given: Mapping[str, Any]) -> Array:
     return sigma
 
 
-def _numbers(value: Any, shape: tuple[int, ...], key: str) -> Array:
+def number_array(value: Any, shape: tuple[int, ...], key: str) -> Array:
     """Return an array of a shape whose entries are finite or nan."""
     try:
         array = np.asarray(value, dtype=float)

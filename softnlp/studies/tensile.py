@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.errors import InputError, MaterialError, nearest
+from softnlp.evaluation.statistics import Statistics, statistics
 from softnlp.laws import LAWS, Law
 from softnlp.materials import DENSITY, Material
-from softnlp.studies.fit_statistics import Misfit, misfit, uncertainty
+from softnlp.studies.fit_statistics import uncertainty
 
 Array = NDArray[np.float64]
 
@@ -50,7 +51,7 @@ class LawFit:
     correlation: Array
     condition: float
     r_squared: float
-    misfit: Misfit
+    misfit: Statistics
     fitted_stretch: tuple[float, float]
     unstable_from: float | None
     material: Material | None
@@ -126,9 +127,9 @@ def fit_tensile(
     return TensileFit(x, y, fits)
 
 
-def tensile_misfit(material: Material, stretch: Array, stress: Array) -> Misfit:
+def tensile_misfit(material: Material, stretch: Array, stress: Array) -> Statistics:
     """Return how far a material is from engineering stresses [Pa]."""
-    return misfit(np.asarray(material.engineering_stress(stretch)) - stress, stress)
+    return statistics(np.asarray(material.engineering_stress(stretch)) - stress, stress)
 
 
 def _checked(stretch: Any, stress: Any) -> tuple[Array, Array]:
@@ -226,7 +227,7 @@ def _fit(law: Law, x: Array, y: Array, name: str, density: float, start: Mapping
         correlation=known.correlation,
         condition=known.condition,
         r_squared=1 - float(residuals @ residuals) / total if total > 0 else float("nan"),
-        misfit=misfit(residuals, y),
+        misfit=statistics(residuals, y),
         fitted_stretch=fitted,
         unstable_from=None,
         material=None,

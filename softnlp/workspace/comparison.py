@@ -18,9 +18,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 WITHIN = 1.0  # pressures that differ by no more are equal [Pa]
-_USED = 100.0  # a set at less has no pressure, in naming groups [Pa]
 _SAME_TIP = 1e-3  # of L_0: poses at one pressure with tips farther apart differ in something else
-MOST_GROUPS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,46 +55,6 @@ class Comparison:
     def distance(self) -> Array:
         """Between the two tips (M,) [m]."""
         return np.asarray(np.linalg.norm(self.error, axis=1))
-
-
-@dataclass(frozen=True)
-class Statistics:
-    """Of distances, or of sizes of angles: how many, and in their unit; NaN for none."""
-
-    count: int
-    mean: float
-    median: float
-    root_mean_square: float
-    largest: float
-
-
-def statistics(values: Array) -> Statistics:
-    """Return the statistics of the sizes of values (M,)."""
-    sizes = np.abs(values)
-    if not len(sizes):
-        return Statistics(0, *[float("nan")] * 4)
-    found = (sizes.mean(), np.median(sizes), np.sqrt(np.mean(sizes**2)), sizes.max())
-    return Statistics(len(sizes), *map(float, found))
-
-
-def groups(pressure: Array) -> list[tuple[str, NDArray[np.bool_]]]:
-    """Return rows (M, sets) grouped by which sets have pressure, each with its name; by their number where many."""
-    used = pressure > _USED
-    kinds, owner = np.unique(used, axis=0, return_inverse=True)
-    owner = owner.ravel()
-    if len(kinds) > MOST_GROUPS:
-        count = used.sum(axis=1)
-        return [(_sets_named(int(n)), count == n) for n in np.unique(count)]
-    order = sorted(range(len(kinds)), key=lambda k: (int(kinds[k].sum()), (~kinds[k]).tolist()))
-    return [(_named(np.flatnonzero(kinds[k]) + 1), owner == k) for k in order]
-
-
-def _sets_named(count: int) -> str:
-    return "none" if count == 0 else f"{count} set{'s' if count > 1 else ''}"
-
-
-def _named(sets: Index) -> str:
-    return "none" if not len(sets) else f"set{'s' if len(sets) > 1 else ''} {'+'.join(map(str, sets))}"
 
 
 def compare_measured(

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from dataclasses import dataclass
-from math import isfinite
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.columns import Columns, read_columns
 from softnlp.errors import InputError
 from softnlp.pressures import HIGHEST_BAR, TIME_COLUMN, UNIT_HINT
-from softnlp.reading import did_you_mean, one_line, read_text, shown
 from softnlp.units import BAR, MILLIMETRE
 
 Array = NDArray[np.float64]
@@ -51,68 +48,38 @@ def load_measured(path: str | PathLike[str], sets: int) -> Measured:
     """
     file = Path(path)
     try:
-        return _measured(file, read_text(file), sets)
+        return _measured(file, sets)
     except InputError as error:
-        raise error.located(source=one_line(str(file))) from None
+        raise InputError(error.message) from None  # which names the file
 
 
-def _measured(file: Path, text: str, sets: int) -> Measured:
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    try:
-        rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except csv.Error as error:
-        raise InputError(f"line {reader.line_num}: not valid CSV: {one_line(str(error))}") from None
-    expected = [*(f"p{k + 1}_bar" for k in range(sets)), *TIP_COLUMNS]
-    if not rows:
-        raise InputError(f"expected a header {', '.join(expected)} and rows of numbers, got an empty file")
-    (line, first), *rows = rows
-    header = [name.strip() for name in first]
-    for name in expected:
-        if name not in header:
-            near = did_you_mean(name, header)
-            raise InputError(f"line {line}: missing column {name!r}; expected {', '.join(expected)}{near}")
-    for name in header:
-        if name and header.count(name) > 1:
-            raise InputError(f"line {line}: expected each column once, got {shown(name)} {header.count(name)} times")
-    extra_set = f"p{sets + 1}_bar"
-    if extra_set in header:
-        raise InputError(f"line {line}: expected pressures of {sets} chamber sets, got a column {extra_set!r}")
-    needed = expected + [TIME_COLUMN] * (TIME_COLUMN in header)
-    places = [header.index(name) for name in needed]
-    values, cells, skipped = [], [], 0
-    for line, row in rows:
-        if len(row) != len(header):
-            raise InputError(f"line {line}: expected {len(header)} values as in the header, got {len(row)}")
-        if any(not row[place].strip() for place in places):
-            skipped += 1
-            continue
-        values.append([_number(line, name, row[place]) for name, place in zip(needed, places, strict=True)])
-        cells.append(tuple(row))
-    if not values:
-        blank = f"; {skipped} rows have blanks" if skipped else ""
-        raise InputError(f"expected at least one row of numbers below the header, got none{blank}")
-    table = np.array(values)
+def _measured(file: Path, sets: int) -> Measured:
+    needed = [*(f"p{k + 1}_bar" for k in range(sets)), *TIP_COLUMNS]
+    columns = read_columns(Path(), str(file), needed)
+    if (extra_set := f"p{sets + 1}_bar") in columns:
+        raise InputError(f"{columns.file}: expected pressures of {sets} chamber sets, got a column {extra_set!r}")
+    needed += [TIME_COLUMN] * (TIME_COLUMN in columns)
+    table = np.column_stack([columns.numbers(name, blank=True) for name in needed])
+    _require_possible(columns, table[:, :sets])
+    full = np.isfinite(table).all(axis=1)
+    skipped = int(np.sum(~full))
+    if not full.any():
+        raise InputError(f"{columns.file}: expected at least one row of numbers, got none; {skipped} rows have blanks")
     return Measured(
         file=file,
-        pressure=table[:, :sets] * BAR,
-        tip_position=table[:, sets : sets + 3] * MILLIMETRE,
-        time=table[:, sets + 3] if TIME_COLUMN in header else None,
-        header=tuple(header),
-        cells=tuple(cells),
+        pressure=table[full, :sets] * BAR,
+        tip_position=table[full, sets : sets + 3] * MILLIMETRE,
+        time=table[full, sets + 3] if TIME_COLUMN in columns else None,
+        header=columns.header,
+        cells=tuple(columns.rows[k] for k in np.flatnonzero(full)),
         skipped=skipped,
     )
 
 
-def _number(line: int, name: str, cell: str) -> float:
-    """Return a cell as a number that its column may hold."""
-    try:
-        value = float(cell)
-    except ValueError:
-        value = float("nan")
-    if "_" in cell or not isfinite(value):  # Python reads 1_5 as 15
-        raise InputError(f"line {line}: {name}: expected a finite number, got {shown(cell.strip())}")
-    if name.endswith("_bar") and value < 0:
-        raise InputError(f"line {line}: {name}: expected a gauge pressure of at least 0, got {value:g}")
-    if name.endswith("_bar") and value > HIGHEST_BAR:
-        raise InputError(f"line {line}: {name}: expected at most {HIGHEST_BAR:g} bar, got {value:g}; {UNIT_HINT}")
-    return value
+def _require_possible(columns: Columns, pressure: Array) -> None:
+    """Refuse the first pressure [bar] that is negative or far too high."""
+    for row, k in np.argwhere((pressure < 0) | (pressure > HIGHEST_BAR))[:1]:
+        value = pressure[row, k]
+        expected = f"at most {HIGHEST_BAR:g} bar" if value > 0 else "a gauge pressure of at least 0"
+        hint = f"; {UNIT_HINT}" if value > 0 else ""
+        raise columns.wrong(int(row), f"p{k + 1}_bar", f"expected {expected}, got {value:g}{hint}")

@@ -1,0 +1,196 @@
+"""The scenario on the screen: a TOML document that keeps its comments while controls change single keys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from copy import deepcopy
+from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import InlineTable, Table
+
+from softnlp.errors import InputError
+from softnlp.reading import one_line
+from softnlp.robot import ROBOTS
+from softnlp.scenario_check import SCHEMAS
+from softnlp.scenario_identify import UNUSED_BY_TENSILE
+
+START = """\
+title = "D25L60, one chamber set"
+study = "forward"
+
+[robot]
+name = "D25L60"
+
+[material]
+name = "Ecoflex 00-50"
+model = "mooney-rivlin"
+
+[pressure]
+sequence_bar = [[0.8, 0.0, 0.0]]
+"""
+"""What a new tab shows."""
+
+_NEEDED: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
+    "workspace": {"workspace": {"levels": 8, "to_bar": 1.2}},
+    "inverse": {"target": {"tip_position_mm": [[-20.0, 0.0, 62.0]]}, "bounds": {"pressure_bar": [0.0, 1.5]}},
+}
+"""Tables without which a study cannot start, as the app first shows them."""
+_TOP = ""
+MOST_SETS = 24
+
+
+class Document:
+    """Every table of the scenario, also those of studies that are not on the screen now.
+
+    `text` writes the file of one study: with the tables that this study has, and with its comments.
+
+    sweeps_wall : whether a workspace pushes against the wall of the blocked force, which may be there for that alone.
+    """
+
+    def __init__(self, text: str = START) -> None:
+        """Parse a scenario; raises `InputError` for text that is not TOML or has a table where a value belongs."""
+        try:
+            self._tables = tomlkit.parse(text)
+        except (TOMLKitError, ValueError, RecursionError) as error:
+            raise InputError(f"not valid TOML: {one_line(str(error)) or 'nested too deeply'}") from None
+        study = self._tables.get("study")
+        self.study = str(study) if isinstance(study, str) else "forward"
+        self.sweeps_wall = self.study == "workspace" and "contact" in self._tables
+
+    def get(self, table: str, key: str, default: Any = None) -> Any:
+        """Return a value as plain Python, or the default; the table "" is the top level."""
+        found = self._tables if table == _TOP else self._tables.get(table)
+        value = found.get(key) if isinstance(found, Mapping) else None
+        return default if value is None else getattr(value, "unwrap", lambda: value)()
+
+    def table(self, name: str) -> dict[str, Any]:
+        """Return a whole table as plain Python; empty where there is none."""
+        found = self._tables.get(name)
+        return dict(found.unwrap()) if isinstance(found, Table | InlineTable) else {}
+
+    def source(self) -> str:
+        """Return everything that the document holds, of every study."""
+        return tomlkit.dumps(self._tables)
+
+    def files(self) -> list[str]:
+        """Return the files that the scenario names, in any of its tables."""
+        found = []
+        for name in self._tables:
+            values = self.table(name)
+            found += [values["file"]] if isinstance(values.get("file"), str) else []
+            found += [f for f in values.get("files", []) if isinstance(f, str)]
+        return found
+
+    def rename_files(self, rename: Callable[[str], str]) -> None:
+        """Give the files that the scenario names other names."""
+        for name in self._tables:
+            values = self.table(name)
+            if isinstance(values.get("file"), str):
+                self.set(name, "file", rename(values["file"]))
+            if isinstance(values.get("files"), list):
+                self.set(name, "files", [rename(f) if isinstance(f, str) else f for f in values["files"]])
+
+    def set(self, table: str, key: str, value: Any) -> None:
+        """Set a key, or remove it for None; a table that this leaves empty is removed too."""
+        if value is not None:
+            if table == _TOP:
+                self._tables[key] = value
+                return
+            if not isinstance(self._tables.get(table), Table | InlineTable):
+                self._tables[table] = tomlkit.table()
+            self._table(table)[key] = value
+            return
+        if table == _TOP:
+            self._tables.pop(key, None)
+        elif isinstance(self._tables.get(table), Table | InlineTable):
+            self._table(table).pop(key, None)
+            if not self._table(table):
+                self._tables.remove(table)
+
+    def replace(self, table: str, values: Mapping[str, Any] | None) -> None:
+        """Put these keys in place of those that the table has; None removes it. Comments of kept keys stay."""
+        if not values:
+            self._tables.pop(table, None)
+            return
+        for key in self.table(table):
+            if key not in values:
+                self.set(table, key, None)
+        for key, value in values.items():
+            if self.get(table, key) != value:
+                self.set(table, key, value)
+
+    def text(self, study: str | None = None) -> str:
+        """Return the scenario file of a study (of the one on the screen), without the tables that it does not use."""
+        study = study or self.study
+        wanted = deepcopy(self._tables)
+        schema = SCHEMAS.get(study)
+        if schema is not None:
+            every = {name for known in SCHEMAS.values() for name in known.model_fields}
+            for name in [key for key in wanted if key in every and key not in schema.model_fields]:
+                wanted.remove(name)
+            for name, values in _NEEDED.get(study, {}).items():
+                if name not in wanted and not (name == "workspace" and "pressure" in wanted):
+                    wanted[name] = _new_table(values)
+            _without_second_source(study, wanted)
+            _without_a_robots_tables(study, wanted)
+            if study == "workspace" and not self.sweeps_wall:
+                wanted.pop("contact", None)
+        if wanted.get("study") != study:
+            wanted["study"] = study
+        return tomlkit.dumps(wanted)
+
+    def start(self, study: str) -> None:
+        """Turn to a study, and add the tables that it cannot do without."""
+        self.study = study
+        for name, values in _NEEDED.get(study, {}).items():
+            if name not in self._tables:
+                self._tables[name] = _new_table(values)
+        schema = SCHEMAS.get(study)
+        if schema is not None and "pressure" in schema.model_fields and "pressure" not in self._tables:
+            self._tables["pressure"] = _new_table({"sequence_bar": [[0.0]]})
+            self.fit_pressures()
+
+    def fit_pressures(self) -> None:
+        """Give each row of pressures as many columns as the robot has sets: zeros are added, columns left out."""
+        rows = self.get("pressure", "sequence_bar")
+        sets = self.get("robot", "chamber_sets") or _sets_of(self.get("robot", "name"))
+        if not isinstance(sets, int) or isinstance(sets, bool) or not 1 <= sets <= MOST_SETS:
+            return
+        rows = rows if isinstance(rows, list) and all(isinstance(row, list) for row in rows) else []
+        if any(len(row) != sets for row in rows):
+            self.set("pressure", "sequence_bar", [(row + [0.0] * sets)[:sets] for row in rows])
+        ramp = self.get("pressure", "ramp")
+        if isinstance(ramp, dict) and isinstance(ramp.get("sets"), list):
+            kept = [k for k in ramp["sets"] if not isinstance(k, int) or k <= sets]
+            if kept != ramp["sets"]:
+                self.set("pressure", "ramp", ramp | {"sets": kept or [1]})
+
+    def _table(self, name: str) -> Any:
+        return self._tables[name]
+
+
+def _sets_of(name: Any) -> int | None:
+    return ROBOTS[name].chamber_sets if isinstance(name, str) and name in ROBOTS else None
+
+
+def _new_table(values: Mapping[str, Any]) -> Table:
+    table = tomlkit.table()
+    table.update(values)
+    return table
+
+
+def _without_second_source(study: str, tables: tomlkit.TOMLDocument) -> None:
+    """Take the pressures of another tab out of a workspace that has a grid or samples of its own."""
+    if study == "workspace":
+        own = tables.get("workspace")
+        if isinstance(own, Mapping) and ("levels" in own or "samples" in own):
+            tables.pop("pressure", None)
+
+
+def _without_a_robots_tables(study: str, tables: tomlkit.TOMLDocument) -> None:
+    """Take what a tensile test does not use out of it."""
+    if study == "identify" and "tensile" in tables and "measurements" not in tables:
+        for name in UNUSED_BY_TENSILE:
+            tables.pop(name, None)

@@ -1,0 +1,125 @@
+"""Opening scenario files, saving what is on the screen, and bodies as meshes."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from nicegui import events, ui
+
+from softnlp.app.session import LARGEST_FILE, Session
+from softnlp.errors import InputError, SoftnlpError
+from softnlp.results import Body
+from softnlp.robot import Robot
+from softnlp.studies.step import Pose
+
+
+def saved(session: Session) -> tuple[str, bytes]:
+    """Return the name and content of what a person saves: the scenario, zipped with the files that it names."""
+    text = session.text().encode()
+    stem = session.name.removesuffix(".toml") or "scenario"
+    files = session.document.files()
+    if not files:
+        return f"{stem}.toml", text
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(f"{stem}.toml", text)
+        for name in files:
+            archive.writestr(name, (session.folder / name).read_bytes())
+    return f"{stem}.zip", packed.getvalue()
+
+
+def save(session: Session) -> None:
+    """Offer the scenario on the screen as a download; what is wrong with it is said instead."""
+    if session.problem is not None:
+        ui.notify(f"not saved: {session.problem}", type="negative", close_button="Close", timeout=0)
+        return
+    name, content = saved(session)
+    ui.download.content(content, name)
+
+
+def open_dialog(session: Session) -> ui.dialog:
+    """Return a dialog that takes a scenario and the files that it names."""
+
+    async def taken(event: events.MultiUploadEventArguments) -> None:
+        upload.reset()
+        try:
+            open_files(session, [(file.name, await file.read()) for file in event.files])
+        except SoftnlpError as error:
+            ui.notify(f"not opened: {error}", type="negative", close_button="Close", timeout=0)
+            return
+        dialog.close()
+        ui.notify(f"opened {session.name}", type="positive")
+
+    def refused() -> None:
+        ui.notify(f"not opened: expected .toml and .csv files of at most {LARGEST_FILE / 1e6:.0f} MB", type="negative")
+
+    with ui.dialog() as dialog, ui.card().classes("w-96"):
+        ui.label("Open a scenario").classes("text-lg")
+        ui.label("A .toml file; drop the CSV and material files that it names together with it.").classes("text-sm")
+        # Files that belong together come together only where their handler is given here
+        upload = ui.upload(
+            multiple=True, auto_upload=True, max_file_size=LARGEST_FILE, on_multi_upload=taken, on_rejected=refused
+        )
+        upload.props('flat bordered accept=".toml,.csv,.txt" data-testid=open-upload').classes("w-full")
+        ui.button("Cancel", on_click=dialog.close).props("flat no-caps data-testid=open-cancel")
+    return dialog
+
+
+def open_files(session: Session, files: Sequence[tuple[str, bytes]]) -> None:
+    """Show the one scenario among some files.
+
+    Raises
+    ------
+    InputError
+        Where there is not exactly one, or it cannot be read.
+    """
+    scenarios = [(name, content) for name, content in files if name.lower().endswith(".toml") and b"study" in content]
+    if len(scenarios) != 1:
+        raise InputError(f"expected one scenario (.toml with study = …), got {len(scenarios)}")
+    name, content = scenarios[0]
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError("expected text in UTF-8", source=name) from None
+    session.open(text, name, {other: data for other, data in files if other != name})
+
+
+def mesh_menu(session: Session, pose: Callable[[], Pose | None]) -> None:
+    """Build menu entries that offer the body as a mesh. pose : a function that gives the pose shown, or None."""
+
+    def offer(kind: str, deformed: bool) -> None:
+        shown = pose()
+        scenario = session.scenario
+        if scenario is None or (deformed and shown is None):
+            ui.notify("no solved pose to export", type="warning")
+            return
+        try:
+            name = f"{'deformed' if deformed else 'undeformed'}.{kind}"
+            ui.download.content(mesh_bytes(scenario.robot, shown if deformed else None, session.folder / name), name)
+        except SoftnlpError as error:
+            ui.notify(str(error), type="negative")
+
+    for deformed, words in ((True, "Deformed body"), (False, "Undeformed body for the mould")):
+        for kind in ("stl", "glb"):
+            item = ui.menu_item(f"{words}, {kind.upper()}", on_click=lambda k=kind, d=deformed: offer(k, d))
+            item.props(f"data-testid=mesh-{'deformed' if deformed else 'undeformed'}-{kind}")
+
+
+def mesh_bytes(robot: Robot, pose: Pose | None, file: Path) -> bytes:
+    """Return the body of a pose, or the body as it is moulded for None, in the format of a file's suffix.
+
+    Raises
+    ------
+    InputError
+        Where the extra mesh is not installed, or the body passes through itself so that it cannot be made solid.
+    """
+    from softnlp.mesh import body_solid, mould_body, write_solids
+
+    if pose is None:
+        solid = mould_body(robot)
+    else:
+        solid = body_solid(robot, Body(pose.shape.position, pose.shape.rotation, pose.radii))
+    return write_solids([solid], robot, file).read_bytes()

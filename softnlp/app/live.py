@@ -1,0 +1,126 @@
+"""One pose after another as a slider moves: the solvers of a session, kept between poses."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from threading import Lock
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.contact_settings import ContactSettings, ContactTask
+from softnlp.quantities import Model
+from softnlp.rod import Loads
+from softnlp.scenario import Scenario
+from softnlp.studies.arc import arc_pose, unloaded_arc
+from softnlp.studies.blocked import BlockedSolver
+from softnlp.studies.pose_grid import Solved
+from softnlp.studies.statics import PoseSolver
+from softnlp.studies.step import Pose, Run, Step
+from softnlp.studies.wall import standing_wall
+
+Array = NDArray[np.float64]
+
+
+def model_of(scenario: Scenario) -> Model:
+    """Return the model of a scenario."""
+    return Model(scenario.robot, scenario.material, scenario.coefficients, scenario.conventions)
+
+
+class LivePoses:
+    """Solves single poses of changing scenarios, each from the last; what is compiled is kept while it fits.
+
+    CasADi's solvers are not to be used by two threads at once, so calls wait for each other.
+    """
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._poses: dict[Hashable, PoseSolver] = {}
+        self._blocked: dict[Hashable, BlockedSolver] = {}
+        self._near: Solved | None = None
+        self._near_kind: Hashable = None
+
+    def pose(self, scenario: Scenario, pressure: Array) -> tuple[Run, Pose | None]:
+        """Return a run of one step at a pressure (sets,) [Pa], and the shape there without loads where loads act.
+
+        The step is that of `softnlp.forward` with these settings. Never raises for a pose that cannot be solved.
+        """
+        with self._lock:
+            solver = self._solver(scenario)
+            step, solved = solver.solve(pressure, scenario.loads, self._start(scenario))
+            self._near, self._near_kind = solved or self._near, _kind(scenario)
+            return _run("forward", scenario, step), self._ghost(solver, scenario, step)
+
+    def blocked(self, scenario: Scenario, pressure: Array) -> tuple[Run, Pose | None]:
+        """Return a run of one step of the blocked force at a pressure (sets,) [Pa], and the free shape there.
+
+        The step is that of `softnlp.blocked_force`, or of `softnlp.constrained_pose` where there is no wall.
+
+        Raises
+        ------
+        InputError
+            Where the wall does not fit the pressures.
+        """
+        assert scenario.contact is not None
+        constrained = isinstance(scenario.task, ContactTask) and scenario.task.constrained
+        with self._lock:
+            solver = self._blocked_solver(scenario, scenario.contact, not constrained)
+            wall = None
+            if not constrained:
+                wall = standing_wall(solver.poses, scenario.contact, np.atleast_2d(pressure), scenario.loads)
+            step, _ = solver.solve(pressure, scenario.loads, wall)
+        free = None if step.contact is None else step.contact.free
+        return _run("blocked-force", scenario, step), free
+
+    def _start(self, scenario: Scenario) -> Solved | None:
+        """Return the last pose, where it is one of the same kind of problem."""
+        return self._near if self._near_kind == _kind(scenario) else None
+
+    def _solver(self, scenario: Scenario) -> PoseSolver:
+        kind = _kind(scenario)
+        if kind not in self._poses:
+            self._poses.clear()  # one kind at a time: a compiled grid is some megabytes
+            self._poses[kind] = PoseSolver(model_of(scenario), scenario.numerics)
+        return self._poses[kind].with_model(model_of(scenario))
+
+    def _blocked_solver(self, scenario: Scenario, contact: ContactSettings, wall: bool) -> BlockedSolver:
+        kind = (_kind(scenario), contact.closure, wall)
+        if kind not in self._blocked:
+            self._blocked.clear()
+            self._blocked[kind] = BlockedSolver(model_of(scenario), scenario.numerics, contact, wall=wall)
+        return self._blocked[kind].with_contact(contact).with_model(model_of(scenario))
+
+    def _ghost(self, solver: PoseSolver, scenario: Scenario, step: Step) -> Pose | None:
+        if step.pose is None or not np.any(_loads(scenario.loads)):
+            return None
+        return arc_pose(solver, unloaded_arc(solver, step.pressure)[1])
+
+
+def _loads(loads: Loads) -> Array:
+    return np.array([loads.tip_force, loads.tip_moment, loads.gravity], dtype=float)
+
+
+def _kind(scenario: Scenario) -> Hashable:
+    """Return what a compiled solver is made for; numbers may differ."""
+    robot, law = scenario.robot, scenario.material.law
+    return (
+        (robot.chamber_sets, robot.chambers_per_set),
+        (law.name, law.constants, law.formula),
+        scenario.conventions,
+        scenario.numerics,
+    )
+
+
+def _run(study: str, scenario: Scenario, step: Step) -> Run:
+    return Run(
+        study=study,
+        robot=scenario.robot,
+        material=scenario.material,
+        coefficients=scenario.coefficients,
+        conventions=scenario.conventions,
+        loads=scenario.loads,
+        steps=(step,),
+        title=scenario.title,
+        warnings=scenario.warnings,
+        contact=scenario.contact if study == "blocked-force" else None,
+    )

@@ -1,0 +1,123 @@
+"""The pose on the screen follows the controls: the newest wish is solved, those in between are left out."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+import numpy as np
+from nicegui import background_tasks, ui
+from numpy.typing import NDArray
+
+from softnlp.app.stage import Stage
+from softnlp.app.view import frame_of
+from softnlp.errors import InputError
+from softnlp.results import Body
+from softnlp.scenario import Scenario
+from softnlp.studies.step import Contact, Pose, Run
+from softnlp.studies.wall import Wall
+from softnlp.units import BAR
+
+Array = NDArray[np.float64]
+
+
+_PATIENCE_S = 0.6  # of a person, before the page says that it works
+_SOLVING = "Solving …"
+
+
+class LiveView:
+    """Solves the pose of the session in a thread whenever it changes, and hands it to the view and the panels.
+
+    shown : called with each run of one step. say : called with a line about what is not shown, "" when all is well.
+    """
+
+    def __init__(self, stage: Stage, shown: Callable[[Run], None], say: Callable[[str], None]) -> None:
+        self._stage = stage
+        self._shown = shown
+        self._say = say
+        self._wanted = False
+        self._working = False
+        self._last: tuple[Scenario, Array] | None = None
+        self._client = ui.context.client
+        stage.session.on_scenario(self.request)
+        stage.session.on_pressure(self.request)
+
+    def request(self) -> None:
+        """Ask for the pose of the session as it is now."""
+        self._wanted = True
+        if not self._working:
+            self._working = True
+            background_tasks.create(self._work(), name="live pose")
+
+    async def _work(self) -> None:
+        try:
+            while self._wanted and not self._client.is_deleted:
+                self._wanted = False
+                await self._once()
+        finally:
+            self._working = False
+
+    async def _once(self) -> None:
+        session = self._stage.session
+        scenario, pressure = session.scenario, session.pressure.copy()
+        if scenario is None or len(pressure) != scenario.robot.chamber_sets:
+            return
+        solve = session.live.blocked if scenario.study == "blocked-force" else session.live.pose
+        task = asyncio.create_task(asyncio.to_thread(solve, scenario, pressure))
+        if not (await asyncio.wait({task}, timeout=_PATIENCE_S))[0]:
+            with self._client:
+                self._say(_SOLVING)
+        try:
+            run, ghost = await task
+        except InputError as error:
+            with self._client:
+                self._say(str(error))
+            return
+        with self._client:
+            self._show(scenario, pressure, run, ghost)
+
+    def _show(self, scenario: Scenario, pressure: Array, run: Run, ghost: Pose | None) -> None:
+        step = run.steps[0]
+        if not step.status.has_solution and self._stays(scenario, pressure):
+            assert self._last is not None
+            self._say(f"{step.message}. The sliders stay at {_listed(self._last[1])} bar.")
+            self._stage.session.set_pressure(self._last[1])
+            return
+        self._shown(run)
+        if step.pose is None or not step.status.has_solution:
+            self._say(f"{step.message}. The picture is of the last pose that was solved.")
+            return
+        if self._last is None or not np.array_equal(self._last[1], pressure) or self._last[0] is not scenario:
+            self._say("")
+        self._last = (scenario, pressure)
+        self._stage.view.show(
+            frame_of(
+                scenario.robot,
+                _body(step.pose),
+                pressure,
+                ghost=None if ghost is None else _body(ghost),
+                tip_force=scenario.loads.tip_force,
+                tip_moment=scenario.loads.tip_moment,
+                gravity=scenario.loads.gravity,
+                wall=_wall(step.contact),
+                wall_force=0.0 if step.contact is None else step.contact.force,
+                tip_cap=0.0 if step.contact is None else step.contact.tip_cap,
+            )
+        )
+
+    def _stays(self, scenario: Scenario, pressure: Array) -> bool:
+        """Whether only the pressures changed since the last pose that was solved, so that they can go back there."""
+        return self._last is not None and self._last[0] is scenario and not np.array_equal(self._last[1], pressure)
+
+
+def _body(pose: Pose) -> Body:
+    return Body(pose.shape.position, pose.shape.rotation, pose.radii)
+
+
+def _wall(contact: Contact | None) -> Wall | None:
+    """Return the wall of a step; None where the chambers alone are held."""
+    return Wall(contact.wall_point, contact.normal) if contact is not None and contact.normal.any() else None
+
+
+def _listed(pressure: Array) -> str:
+    return ", ".join(f"{p / BAR:.3g}" for p in pressure)

@@ -1,0 +1,162 @@
+"""Stress and modulus of a silicone against stretch, as a plotly figure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.app.theme import figure_config, figure_layout
+from softnlp.materials import Material
+from softnlp.plots.style import colour
+
+KILOPASCAL = 1e3
+MEASURES = {
+    "engineering_stress": ("Engineering", "engineering stress [kPa]"),
+    "true_stress": ("True", "true stress [kPa]"),
+    "tangent_modulus": ("Modulus", "tangent modulus [kPa]"),
+}
+"""What may be drawn, a method of `Material`: what the switch calls it, and the axis."""
+LAW_NAMES = {
+    "linear": "Linear",
+    "neo-hookean": "Neo-Hookean",
+    "mooney-rivlin": "Mooney–Rivlin",
+    "yeoh": "Yeoh",
+    "ogden": "Ogden",
+}
+POINTS = 101
+WIDTH, HEIGHT = 306, 300
+"""Of the figure [px]. A fixed size, so that it is right where it was drawn while nobody saw it."""
+_DASHES = {"linear": "dot", "neo-hookean": "dash", "mooney-rivlin": "solid", "yeoh": "dashdot", "ogden": "longdash"}
+_COLOURS = {law: colour(k) for k, law in enumerate(("mooney-rivlin", "neo-hookean", "yeoh", "ogden", "linear"))}
+_OWN = colour(5)
+_ON_DARK = {colour(0): colour(5), colour(5): colour(6)}
+"""Lines too dark for a dark page, and what takes their place."""
+_LEGEND = {"orientation": "h", "x": 0, "y": -0.24, "yanchor": "top", "font": {"size": 11}}
+_CLIP = 1.25  # the figure reaches this far beyond the values in the fitted range
+_LARGEST = 1e12  # kPa; beyond it nothing is drawn
+
+
+def law_name(law: str) -> str:
+    """Return what a law is called on the page."""
+    return LAW_NAMES.get(law, law)
+
+
+def material_figure(
+    chosen: Material | None, others: Mapping[str, Material], measure: str, stretch: float | None, dark: bool
+) -> dict[str, Any]:
+    """Return a plotly figure of a silicone's laws, the chosen one bold, and where a pose stands on it.
+
+    chosen : None where the scenario has no silicone that can be drawn. others : more laws to compare, by name.
+    measure : of `MEASURES`. stretch : of the pose, None for none. The last trace is that of the pose (`mark_pose`).
+    """
+    thin = {law: m for law, m in others.items() if chosen is None or not same(m, chosen)}
+    fitted = next((m.fitted_stretch for m in (chosen, *others.values()) if m is not None), (1.0, 2.0))
+    high = max(1.0 + 1.15 * (fitted[1] - 1.0), 1.03 * (stretch or 1.0))
+    x = np.linspace(min(1.0, fitted[0]), min(high, 1e3), POINTS)
+    curves = [_curve(m, law_name(law), x, measure, dark=dark, bold=False) for law, m in thin.items()]
+    if chosen is not None:
+        own = f"{law_name(chosen.law.name)}, own" if chosen.law.name in others and chosen.law.name in thin else ""
+        curves.append(_curve(chosen, own or law_name(chosen.law.name), x, measure, dark=dark, bold=True))
+    layout = figure_layout(dark)
+    layout |= {"margin": {"l": 8, "r": 8, "t": 8, "b": 8}, "legend": dict(_LEGEND)}
+    layout |= {"width": WIDTH, "height": HEIGHT, "shapes": _fit(fitted), "showlegend": True, "hovermode": "closest"}
+    drawn = [*([] if chosen is None else [chosen]), *thin.values()]
+    layout["xaxis"] |= _axis("stretch [-]", [float(x[0]), float(x[-1])])
+    layout["yaxis"] |= _axis(MEASURES[measure][1], _reach(drawn, x, measure))
+    layout["annotations"] = [
+        {
+            "text": f"fitted {fitted[0]:.3g} to {fitted[1]:.3g}",
+            "x": fitted[1], "y": 0, "yref": "paper", "xanchor": "right", "yanchor": "bottom", "showarrow": False,
+            "font": {"size": 10}, "opacity": 0.8,
+        }
+    ]  # fmt: skip
+    layout["uirevision"] = measure
+    figure = {"data": [*curves, _pose()], "layout": layout, "config": figure_config() | {"responsive": False}}
+    mark_pose(figure, chosen, measure, stretch)
+    return figure
+
+
+def mark_pose(figure: dict[str, Any], chosen: Material | None, measure: str, stretch: float | None) -> None:
+    """Move the point of the pose in a figure; without a silicone or a stretch it is not drawn."""
+    trace = figure["data"][-1]
+    values = [] if chosen is None or stretch is None else _values(chosen, np.array([stretch]), measure)
+    shown = bool(values) and values[0] is not None
+    trace["x"], trace["y"] = ([stretch], values) if shown else ([], [])
+
+
+def same(a: Material, b: Material) -> bool:
+    """Return whether two materials are the same law with the same constants."""
+    return a.law.name == b.law.name and dict(a.constants) == dict(b.constants)
+
+
+def _curve(
+    material: Material, name: str, x: NDArray[np.float64], measure: str, *, dark: bool, bold: bool
+) -> dict[str, Any]:
+    law = material.law.name
+    line = _COLOURS.get(law, _OWN)
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "name": f"<b>{_plain(name)}</b>" if bold else _plain(name),
+        "x": [float(f"{v:.5g}") for v in x],
+        "y": _values(material, x, measure),
+        "line": {
+            "color": _ON_DARK.get(line, line) if dark else line,
+            "width": 3.5 if bold else 1.4,
+            "dash": "solid" if bold else _DASHES.get(law, "solid"),
+        },
+        "opacity": 1.0 if bold or dark else 0.85,
+        "hovertemplate": "%{y:.4g} kPa at %{x:.3f}<extra>" + _plain(name) + "</extra>",
+    }
+
+
+def _axis(title: str, reach: list[float] | None) -> dict[str, Any]:
+    return {"title": {"text": title, "font": {"size": 12}, "standoff": 6}, "range": reach}
+
+
+def _pose() -> dict[str, Any]:
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "name": "pose",
+        "x": [],
+        "y": [],
+        "marker": {"size": 11, "color": "#E5383B", "line": {"color": "#FFFFFF", "width": 1.5}},
+        "hovertemplate": "%{y:.4g} kPa at %{x:.3f}<extra>pose</extra>",
+        "cliponaxis": False,
+    }
+
+
+def _fit(fitted: tuple[float, float]) -> list[dict[str, Any]]:
+    """Shade the range that the constants were fitted on, and mark its ends."""
+    band = {"type": "rect", "xref": "x", "yref": "paper", "x0": fitted[0], "x1": fitted[1], "y0": 0, "y1": 1}
+    end = {"type": "line", "xref": "x", "yref": "paper", "x0": fitted[1], "x1": fitted[1], "y0": 0, "y1": 1}
+    return [
+        band | {"fillcolor": "rgba(128,128,128,0.13)", "line": {"width": 0}, "layer": "below"},
+        end | {"line": {"color": "rgba(128,128,128,0.9)", "width": 1, "dash": "dot"}, "layer": "below"},
+    ]
+
+
+def _reach(materials: list[Material], x: NDArray[np.float64], measure: str) -> list[float] | None:
+    """Return the range of the values within the fitted ranges, so that a law that runs away hides no other."""
+    inside = [
+        value
+        for m in materials
+        for stretch, value in zip(x, _values(m, x, measure), strict=True)
+        if value is not None and m.fitted_stretch[0] - 1e-9 <= stretch <= m.fitted_stretch[1] + 1e-9
+    ]
+    low, high = (min(0.0, _CLIP * min(inside)), _CLIP * max(inside)) if inside else (0.0, 0.0)
+    return [low, high] if low < high else None
+
+
+def _values(material: Material, x: NDArray[np.float64], measure: str) -> list[float | None]:
+    values = np.asarray(getattr(material, measure)(x)) / KILOPASCAL
+    return [float(f"{v:.5g}") if np.isfinite(v) and abs(v) < _LARGEST else None for v in np.ravel(values)]
+
+
+def _plain(text: str) -> str:
+    """Return a person's text without what plotly would read as markup."""
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace("%", "％")[:40]

@@ -1,0 +1,177 @@
+"""The page: panels on the left, the robot in the middle, results and the study on the right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from nicegui import ui
+
+from softnlp.app.files import mesh_menu, open_dialog, save
+from softnlp.app.live_view import LiveView
+from softnlp.app.panels.coefficients import coefficients_panel
+from softnlp.app.panels.loads import loads_panel
+from softnlp.app.panels.material import material_panel
+from softnlp.app.panels.pressure import pressure_panel
+from softnlp.app.panels.results import ResultsPanel
+from softnlp.app.panels.robot import robot_panel
+from softnlp.app.panels.solver import solver_panel
+from softnlp.app.session import Session
+from softnlp.app.stage import Stage
+from softnlp.app.tabs.blocked import blocked_tab
+from softnlp.app.tabs.identify import identify_tab
+from softnlp.app.tabs.inverse import inverse_tab
+from softnlp.app.tabs.scenario import scenario_tab
+from softnlp.app.tabs.sequence import sequence_tab
+from softnlp.app.tabs.workspace import workspace_tab
+from softnlp.app.theme import style_page
+from softnlp.app.view import RobotView
+
+
+@dataclass(frozen=True)
+class Study:
+    """A tab of the page. study : of the scenario while it is open."""
+
+    label: str
+    study: str
+    build: Callable[[Stage], None]
+
+
+STUDIES: Mapping[str, Study] = {
+    "kinematics": Study("Kinematics", "forward", sequence_tab),
+    "blocked": Study("Blocked force", "blocked-force", blocked_tab),
+    "workspace": Study("Workspace", "workspace", workspace_tab),
+    "inverse": Study("Inverse", "inverse", inverse_tab),
+    "identify": Study("Identification", "identify", identify_tab),
+}
+_TAB_OF = {study.study: name for name, study in STUDIES.items()}
+SCENARIO = "scenario"
+_LINE = "border-neutral-300 dark:border-neutral-700"
+_HEADER = f"h-12 px-3 py-0 items-center no-wrap gap-2 border-b softnlp-surface {_LINE}"
+_COLUMN = "softnlp-column shrink-0 h-full overflow-y-auto overflow-x-hidden p-3"
+_MESSAGE = "absolute bottom-2 left-2 right-2 text-sm rounded px-3 py-2 bg-orange-100 text-orange-950"
+_NOT_USED = "Not used:"
+
+
+def build_page(session: Session) -> None:
+    """Build one browser tab for a session."""
+    dark = ui.dark_mode()
+    style_page()
+    chosen = _TAB_OF.get(session.document.study, SCENARIO)
+    with ui.header(elevated=False).classes(_HEADER):
+        ui.label("softnlp").classes("text-lg font-semibold mr-2")
+        with ui.tabs().props("dense no-caps inline-label shrink").classes("min-w-0") as tabs:
+            for name, study in STUDIES.items():
+                ui.tab(name, label=study.label).props(f"data-testid=tab-{name}")
+            ui.tab(SCENARIO, label="Scenario").props("data-testid=tab-scenario")
+        tabs.set_value(chosen)
+        ui.space()
+        exports = _files(session, dark)
+    with ui.row().classes("w-full no-wrap gap-0").style("height: calc(100vh - 48px)"):
+        with ui.element("div").classes(f"w-[330px] border-r {_COLUMN} {_LINE}"):
+            _panels(session)
+        with ui.column().classes("grow min-w-0 h-full gap-0 relative"):
+            view = RobotView().classes("w-full grow min-h-0").props("data-testid=view")
+            _view_buttons(view)
+            message = ui.label().classes(_MESSAGE).props("data-testid=message role=status").mark("message")
+            message.set_visibility(False)
+        stage = Stage(session, view)
+        with ui.element("div").classes(f"w-[390px] border-l {_COLUMN} {_LINE}"):
+            results = ResultsPanel()
+            ui.separator()
+            _studies(stage, tabs, chosen)
+            ui.separator()
+            results.details()
+
+    def say(words: str) -> None:
+        message.set_text(words)
+        message.set_visibility(bool(words))
+
+    live = LiveView(stage, results.show, say)
+    with exports:
+        mesh_menu(session, lambda: None if results.run is None else results.run.steps[0].pose)
+
+    def read_again() -> None:
+        if session.problem is not None and not awaits_data(session):
+            say(f"{_NOT_USED} {session.problem}")
+        elif message.text.startswith(_NOT_USED):
+            say("")
+        opened = _TAB_OF.get(session.document.study, SCENARIO)
+        if tabs.value != opened and tabs.value != SCENARIO:
+            tabs.set_value(opened)
+
+    session.on_scenario(read_again)
+    live.request()
+
+
+def awaits_data(session: Session) -> bool:
+    """Whether all that is missing is the file that an identification starts from."""
+    tables = ("measurements", "tensile")
+    return session.document.study == "identify" and not any(session.document.table(name) for name in tables)
+
+
+def _files(session: Session, dark: ui.dark_mode) -> ui.menu:
+    """Build the buttons for files and return the menu of exports."""
+    dialog = open_dialog(session)
+    ui.button("Open", icon="folder_open", on_click=dialog.open).props("flat dense no-caps data-testid=open")
+    ui.button("Save", icon="save", on_click=lambda: save(session)).props("flat dense no-caps data-testid=save")
+    with ui.button("Export", icon="view_in_ar").props("flat dense no-caps data-testid=export"), ui.menu() as exports:
+        pass
+    turn = ui.button(icon="contrast", on_click=dark.toggle).props(
+        'flat dense round data-testid=dark aria-label="light or dark"'
+    )
+    turn.tooltip("Light or dark")
+    return exports
+
+
+def _panels(session: Session) -> None:
+    """Build what describes the robot, its silicone, its loads and the equations."""
+    for name, label, opened, build in (
+        ("pressures", "Pressures", True, pressure_panel),
+        ("robot", "Robot", True, robot_panel),
+        ("material", "Silicone", False, material_panel),
+        ("loads", "Gravity and tip load", False, loads_panel),
+        ("coefficients", "Coefficients", False, coefficients_panel),
+        ("solver", "Solver", False, solver_panel),
+    ):
+        panel = ui.expansion(label, value=opened).classes("w-full softnlp-panel")
+        panel.props(f"dense header-class=font-semibold data-testid=panel-{name}")
+        with panel, ui.column().classes("w-full gap-2 pb-3"):
+            build(session)
+
+
+def _view_buttons(view: RobotView) -> None:
+    """Build what stands over the 3-D view."""
+
+    async def picture() -> None:
+        ui.download.content(await view.picture(), "softnlp.png", "image/png")
+
+    with ui.row().classes("absolute top-2 right-2 gap-1 z-10"):
+        for name, icon, words, act in (
+            ("reset", "center_focus_strong", "Look at the robot from the start position", view.reset),
+            ("trail", "timeline", "Forget the trail of the tip", view.clear_trail),
+            ("picture", "photo_camera", "Save a picture", picture),
+        ):
+            button = ui.button(icon=icon, on_click=act).props(
+                f'flat dense round data-testid=view-{name} aria-label="{words}"'
+            )
+            button.tooltip(words)
+
+
+def _studies(stage: Stage, tabs: ui.tabs, chosen: str) -> None:
+    """Build the study on the right; each is built when it is first opened."""
+    built: set[str] = set()
+    with ui.tab_panels(tabs, value=chosen, animated=False).classes("w-full bg-transparent") as panels:
+        slots = {name: ui.tab_panel(name).classes("p-0") for name in (*STUDIES, SCENARIO)}
+
+    def opened() -> None:
+        name = str(panels.value)
+        if name in STUDIES:
+            stage.session.choose(STUDIES[name].study)
+        if name not in built:
+            built.add(name)
+            with slots[name]:
+                STUDIES[name].build(stage) if name in STUDIES else scenario_tab(stage)
+
+    panels.on_value_change(opened)
+    opened()

@@ -1,0 +1,139 @@
+"""A slider and a number for each chamber set, in the unit that a person chooses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, isfinite
+from typing import Any
+
+import numpy as np
+from nicegui import ui
+
+from softnlp.app.pressure_units import PRESSURE_UNITS, PressureUnit
+from softnlp.app.session import Session
+from softnlp.plots.style import colour
+from softnlp.pressures import HIGHEST_BAR
+from softnlp.units import BAR
+
+FIRST_LIMIT = 1.5 * BAR  # of the sliders
+
+
+class _Slider(ui.slider):
+    """A slider whose own moves are not sent back to it: under load they would come late and pull it back."""
+
+    LOOPBACK = False
+
+
+@dataclass
+class _Shown:
+    """unit : of the controls. limit : right end of the sliders [Pa]."""
+
+    unit: PressureUnit
+    limit: float
+
+
+def pressure_panel(session: Session) -> None:
+    """Build the controls of the pressures."""
+    state = _Shown(PRESSURE_UNITS["bar"], _limit(session, FIRST_LIMIT))
+    with ui.row().classes("w-full items-center justify-between no-wrap"):
+        ui.toggle(list(PRESSURE_UNITS), value="bar", on_change=lambda e: turn(e.value)).props(
+            "dense no-caps unelevated size=sm data-testid=pressure-unit"
+        ).mark("pressure.unit")
+        ui.button("All to zero", on_click=lambda: session.set_pressure(0 * session.pressure)).props(
+            "flat dense no-caps size=sm data-testid=pressure-zero"
+        )
+    rows = ui.column().classes("w-full gap-1")
+
+    def turn(name: str) -> None:
+        state.unit = PRESSURE_UNITS[name]
+        rebuild()
+
+    def rebuild() -> None:
+        rows.clear()
+        with rows:
+            for k in range(len(session.pressure)):
+                refreshers[k] = _row(session, state, k)
+            with ui.row().classes("w-full items-center no-wrap"):
+                ui.label("Sliders reach to").classes("text-xs opacity-70 grow")
+                limit = ui.number(value=_round(state.limit / state.unit.pascal, state.unit), min=0, on_change=reach)
+                limit.props(f'dense borderless suffix="{state.unit.name}" data-testid=pressure-limit')
+                limit.props("debounce=400 input-class=text-right").classes("w-28")
+                limit.tooltip("Right end of the sliders; a number typed beside a slider may be higher")
+
+    def reach(event: Any) -> None:
+        value = event.value
+        if isinstance(value, int | float) and isfinite(value) and 0 < value * state.unit.pascal <= HIGHEST_BAR * BAR:
+            state.limit = max(value * state.unit.pascal, float(np.max(session.pressure, initial=0.0)))
+            rebuild()
+        else:
+            ui.notify(f"expected a pressure above 0 and up to {HIGHEST_BAR:g} bar", type="warning")
+
+    refreshers: dict[int, Any] = {}
+
+    def follow() -> None:
+        highest = _limit(session, state.limit)
+        if len(refreshers) != len(session.pressure) or highest > state.limit:
+            state.limit = highest
+            refreshers.clear()
+            rebuild()
+        for refresh in refreshers.values():
+            refresh()
+
+    rebuild()
+    session.on_pressure(follow)
+    session.on_scenario(follow)
+
+
+def _row(session: Session, state: _Shown, k: int) -> Any:
+    """Build the controls of one set and return what brings them up to date."""
+    unit = state.unit
+
+    def shown() -> float:
+        return _round(float(session.pressure[k]) / unit.pascal, unit)
+
+    def entered(event: Any) -> None:
+        value = event.value
+        is_number = isinstance(value, int | float) and isfinite(value)
+        if not is_number or not 0 <= value * unit.pascal <= HIGHEST_BAR * BAR:
+            most = _round(HIGHEST_BAR * BAR / unit.pascal, unit)
+            field.props(f'error error-message="expected a pressure from 0 to {most:g} {unit.name}"')
+            return
+        field.props(remove="error error-message")
+        if value != shown():
+            pressure = session.pressure.copy()
+            pressure[k] = value * unit.pascal
+            session.set_pressure(pressure)
+
+    with ui.row().classes("w-full items-center no-wrap gap-2"):
+        ui.element("div").classes("shrink-0 rounded-full").style(f"width:12px;height:12px;background:{colour(k)}")
+        ui.label(f"Set {k + 1}").classes("text-sm shrink-0 w-9")
+        slider = _Slider(min=0, max=_ceil(state.limit, unit), step=unit.step, value=shown(), on_change=entered)
+        slider.props(f'dense data-testid=pressure-slider-{k + 1} aria-label="pressure of set {k + 1}"')
+        slider.classes("grow min-w-0").style(f"--q-primary: {colour(k)}").mark(f"pressure.slider.{k + 1}")
+        field = ui.number(value=shown(), step=unit.step, on_change=entered, min=0)
+        field.props(f'dense outlined hide-bottom-space debounce=250 suffix="{unit.name}"')
+        field.props(f"data-testid=pressure-number-{k + 1}").without_auto_validation()
+        field.classes("w-24 shrink-0").mark(f"pressure.number.{k + 1}")
+
+    def refresh() -> None:
+        value = shown()
+        for control in (slider, field):
+            if control.value != value:
+                control.set_value(value)
+
+    return refresh
+
+
+def _limit(session: Session, at_least: float) -> float:
+    """Return a right end of the sliders that shows every pressure of the scenario [Pa]."""
+    scenario = session.scenario
+    steps = scenario.pressures if scenario is not None else session.pressure
+    return max(at_least, float(np.max(session.pressure, initial=0.0)), float(np.max(steps, initial=0.0)))
+
+
+def _round(value: float, unit: PressureUnit) -> float:
+    return round(value, unit.decimals)
+
+
+def _ceil(limit: float, unit: PressureUnit) -> float:
+    return round(ceil(limit / unit.pascal / unit.step - 1e-9) * unit.step, unit.decimals)

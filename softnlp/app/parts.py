@@ -1,0 +1,326 @@
+"""What the tabs share: a run that can be stopped, numbers that can be taken away, a chart, a dropped file."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from math import isfinite
+from typing import Any, TypeVar
+
+from nicegui import events, ui
+
+from softnlp.app.fields import tell_problem
+from softnlp.app.job import Progress, Stopped, in_background
+from softnlp.app.session import LARGEST_FILE, Session
+from softnlp.app.theme import darkness, figure_config, figure_layout, on_dark
+from softnlp.errors import InputError, SoftnlpError
+
+T = TypeVar("T")
+
+MOST_ROWS = 400
+"""Rows of a table on the page; the CSV has all."""
+
+
+def plain_words(error: SoftnlpError) -> str:
+    """Return an error in one line without the file that it is about: on the page there is but one."""
+    if isinstance(error, InputError):
+        return str(type(error)(error.message, table=error.table, key=error.key))
+    return str(error)
+
+
+MOST_MARKS = 2000
+"""Of a line of a chart."""
+
+
+class RunRow:
+    """A run button, a stop button, a progress bar, and a line that says how it went. One run at a time."""
+
+    def __init__(self, marker: str, label: str, begin: Callable[[], Awaitable[None]]) -> None:
+        """Build the row; `begin` is called by the button, and calls `do`."""
+        self.progress = Progress()
+        self.running = False
+        self._watch: Callable[[], None] | None = None
+        with ui.row().classes("w-full items-center gap-2 no-wrap"):
+            self._start = ui.button(label, icon="play_arrow", on_click=begin).props("dense unelevated no-caps")
+            self._start.classes("px-3 shrink-0").mark(f"{marker}.run").props(f"data-testid={marker}.run")
+            self._end = ui.button("Stop", icon="stop", on_click=self.stop).props("dense outline no-caps")
+            self._end.classes("px-3 shrink-0").mark(f"{marker}.stop").props(f"data-testid={marker}.stop")
+            self._bar = ui.linear_progress(0.0, show_value=False, size="8px").props("rounded instant-feedback")
+        self._words = ui.label("").classes("text-sm break-words w-full").mark(f"{marker}.message")
+        self._words.props(f"data-testid={marker}.message")
+        self._timer = ui.timer(0.25, self._look, active=False)
+        self._end.set_visibility(False)
+        self._bar.set_visibility(False)
+        ui.context.client.on_delete(self.stop)
+
+    async def do(self, work: Callable[[Progress], T], watch: Callable[[], None] | None = None) -> T | None:
+        """Do work in the background and return its result; None where it was stopped or is not possible, which is said.
+
+        watch : called now and then meanwhile, to draw what there is already.
+        """
+        if self.running:
+            return None
+        self.running, self.progress, self._watch = True, Progress(), watch
+        self._show(True)
+        self.say("Starting…")
+        try:
+            return await in_background(work, self.progress)
+        except Stopped:
+            self.say("Stopped.")
+        except SoftnlpError as error:
+            self.warn(plain_words(error))
+        except Exception as error:  # the page stays alive whatever a study does, and says that it went wrong
+            self.warn(f"This did not work: {type(error).__name__}: {' '.join(str(error).split())[:300]}")
+        finally:
+            self.running = False
+            self._show(False)
+        return None
+
+    def stop(self) -> None:
+        """Ask the run to end."""
+        self.progress.stop()
+
+    def say(self, words: str) -> None:
+        """Say something about the run."""
+        self._words.set_text(words)
+        self._words.classes(remove="text-negative")
+
+    def warn(self, words: str) -> None:
+        """Say what went wrong."""
+        self._words.set_text(words)
+        self._words.classes(add="text-negative")
+
+    def _show(self, running: bool) -> None:
+        self._start.set_enabled(not running)
+        self._end.set_visibility(running)
+        self._bar.set_visibility(running)
+        self._bar.set_value(0.0)
+        self._timer.active = running
+
+    def _look(self) -> None:
+        begun = self.progress.fraction > 0
+        self._bar.props(remove="indeterminate") if begun else self._bar.props("indeterminate")
+        self._bar.set_value(self.progress.fraction)
+        self.say("Stopping after this step…" if self.progress.stopping else self.progress.text or "Working…")
+        if self._watch is not None:
+            self._watch()
+
+
+def number_text(value: Any, digits: int = 5) -> str:
+    """Return a number as a table on the page has it; other things as text, nothing for None and nan."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value + 0.0:.{digits}g}" if isfinite(value) else ""
+    return "" if value is None else str(value)
+
+
+def csv_text(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """Return rows as CSV, numbers in full, empty where there is none."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    for row in rows:
+        writer.writerow(["" if v is None or v != v else v for v in row])
+    return text.getvalue()
+
+
+class NumberTable:
+    """Rows of numbers, with their CSV to copy and to download. A row that failed is marked."""
+
+    def __init__(self, marker: str, on_row: Callable[[int], None] | None = None, height: str = "16rem") -> None:
+        """Build the table, hidden until there is something to show; `on_row` is called with the row clicked."""
+        self._csv, self._name = "", "table.csv"
+        with ui.column().classes("w-full gap-1") as self._box:
+            self._table = ui.table(columns=[], rows=[], row_key="row").props("dense flat bordered wrap-cells")
+            self._table.classes("w-full softnlp-numbers").style(f"max-height: {height}").mark(marker)
+            self._table.props(f"data-testid={marker} hide-bottom :rows-per-page-options=[0]")
+            self._table.add_slot(
+                "body-cell",
+                "<q-td :props=\"props\" :class=\"props.row.failed ? 'text-negative' : ''\">{{ props.value }}</q-td>",
+            )
+            if on_row is not None:
+                self._table.classes("cursor-pointer")
+                self._table.on("rowClick", lambda event: on_row(int(event.args[1]["row"])), args=[None, ["row"], None])
+            with ui.row().classes("gap-1 items-center"):
+                self._more = ui.label("").classes("text-xs opacity-70")
+                copy = ui.button("Copy", icon="content_copy", on_click=self._copy)
+                take = ui.button("CSV", icon="download", on_click=self._take)
+                for button, word in ((copy, "copy"), (take, "download")):
+                    button.props(f"dense flat no-caps size=sm data-testid={marker}.{word}").mark(f"{marker}.{word}")
+        self._box.set_visibility(False)
+
+    def show(
+        self,
+        header: Sequence[str],
+        rows: Sequence[Sequence[Any]],
+        name: str,
+        *,
+        csv: str | None = None,
+        failed: Sequence[bool] = (),
+    ) -> None:
+        """Show rows under a header with units. csv : the whole text to take away, by default these rows."""
+        self._csv, self._name = csv_text(header, rows) if csv is None else csv, name
+        self._table.columns = [
+            {"name": f"c{k}", "label": label, "field": f"c{k}", "align": "right" if _is_number(rows, k) else "left"}
+            for k, label in enumerate(header)
+        ]
+        self._table.rows = [
+            {"row": j, "failed": bool(failed[j]) if failed else False}
+            | {f"c{k}": number_text(value) for k, value in enumerate(row)}
+            for j, row in enumerate(rows[:MOST_ROWS])
+        ]
+        self._table.update()
+        self._more.set_text(f"first {MOST_ROWS} of {len(rows)} rows" if len(rows) > MOST_ROWS else "")
+        self._box.set_visibility(True)
+
+    def hide(self) -> None:
+        """Show nothing."""
+        self._box.set_visibility(False)
+
+    def _copy(self) -> None:
+        ui.clipboard.write(self._csv)
+        ui.notify("Copied as CSV", position="bottom-right", timeout=1500)
+
+    def _take(self) -> None:
+        ui.download.content(self._csv, self._name, "text/csv")
+
+
+def _is_number(rows: Sequence[Sequence[Any]], column: int) -> bool:
+    return all(row[column] is None or isinstance(row[column], int | float) for row in rows)
+
+
+# Plotly refuses to be resized while its tab is hidden, which nobody needs to know.
+_QUIET_RESIZE = """window.softnlpQuiet ??= window.addEventListener("unhandledrejection", event => {
+if (String(event.reason?.message ?? event.reason).startsWith("Resize must be passed")) event.preventDefault();
+}) ?? true"""
+
+
+class Chart:
+    """A plotly chart with two labelled axes that follows the page from light to dark."""
+
+    def __init__(self, marker: str, x_label: str, y_label: str, height: str = "15rem") -> None:
+        """Build the chart, hidden until there is something to show."""
+        self._labels = (x_label, y_label)
+        self._traces: list[dict[str, Any]] = []
+        self._marker = marker
+        self._place = ui.element("div").classes("w-full").style(f"height: {height}")
+        self._place.set_visibility(False)
+        self._plot: ui.plotly | None = None
+        ui.run_javascript(_QUIET_RESIZE)
+        self._dark = darkness()
+        on_dark(self._draw)
+
+    def show(
+        self, traces: Sequence[Mapping[str, Any]], *, x_label: str | None = None, y_label: str | None = None
+    ) -> None:
+        """Show traces, as plotly has them."""
+        self._traces = [dict(trace) for trace in traces]
+        self._labels = (x_label or self._labels[0], y_label or self._labels[1])
+        self._place.set_visibility(bool(traces))
+        if traces and self._plot is None:  # plotly cannot draw where nothing is shown
+            with self._place:
+                self._plot = ui.plotly({"data": [], "layout": {}}).classes("w-full h-full").mark(self._marker)
+                self._plot.props(f"data-testid={self._marker}")
+        self._draw()
+
+    def _draw(self) -> None:
+        if self._plot is None:
+            return
+        layout = figure_layout(self._dark())
+        for axis, label in zip(("xaxis", "yaxis"), self._labels, strict=True):
+            layout[axis]["title"] = {"text": label, "standoff": 6}
+        layout["legend"] = {"orientation": "h", "yanchor": "bottom", "y": 1.02, "xanchor": "left", "x": 0.0}
+        layout["showlegend"] = len([t for t in self._traces if t.get("name")]) > 1
+        self._plot.update_figure({"data": self._traces, "layout": layout, "config": figure_config()})
+
+
+def line(x: Sequence[float], y: Sequence[float], colour: str, name: str = "", **more: Any) -> dict[str, Any]:
+    """Return a trace of a line with marks; there is a gap where there is no number. A long one is thinned evenly."""
+    every = -(-len(x) // MOST_MARKS) if x else 1
+    kept = sorted({*range(0, len(x), every), len(x) - 1} if x else set())
+    return {
+        "type": "scatter",
+        "mode": "lines+markers",
+        "x": [_number(x[k]) for k in kept],
+        "y": [_number(y[k]) for k in kept],
+        "name": name,
+        "line": {"color": colour, "width": 2},
+        "marker": {"color": colour, "size": 6},
+        **more,
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if isfinite(value) else None
+
+
+def csv_drop(marker: str, label: str, take: Callable[[str, bytes], None]) -> ui.upload:
+    """Show where a CSV file is dropped; `take` gets its name and content, and what it raises is told."""
+
+    async def arrived(event: events.UploadEventArguments) -> None:
+        box.reset()
+        if event.file.size() > LARGEST_FILE:
+            ui.notify(_too_large(event.file.name), type="warning")
+            return
+        content = await event.file.read()
+        try:
+            take(event.file.name, content)
+        except SoftnlpError as error:
+            ui.notify(plain_words(error), type="warning", multi_line=True)
+
+    ui.add_css(_DROP)
+    box = ui.upload(
+        label=label,
+        on_upload=arrived,
+        on_rejected=lambda: ui.notify(_too_large("This file"), type="warning"),
+        max_file_size=LARGEST_FILE,
+        auto_upload=True,
+    )
+    box.props(f"accept=.csv,text/csv flat bordered color=transparent text-color=primary data-testid={marker}")
+    return box.classes("w-full softnlp-drop").mark(marker)
+
+
+# The list of files is empty at once: a dropped one is named by the tab.
+_DROP = """
+.softnlp-drop .q-uploader__list, .softnlp-drop .q-uploader__subtitle { display: none }
+.softnlp-drop .q-uploader__header { background: transparent !important; color: inherit !important }
+.softnlp-drop .q-uploader__title { font-size: 0.85rem; font-weight: 400; line-height: 1.3 }
+"""
+
+
+def _too_large(name: str) -> str:
+    return f"{name} is not taken: expected a CSV table of at most {LARGEST_FILE / 1e6:.0f} MB"
+
+
+def vector_field(
+    session: Session, table: str, key: str, labels: Sequence[str], unit: str, default: Sequence[float]
+) -> ui.row:
+    """Show a list of numbers of the scenario, a field for each."""
+
+    def value() -> list[Any]:
+        found = session.document.get(table, key)
+        return found if isinstance(found, list) and len(found) == len(labels) else list(default)
+
+    def entered(k: int, new: float | None) -> None:
+        if new is not None and isfinite(new) and new != value()[k]:
+            session.change(table, key, [new if j == k else v for j, v in enumerate(value())])
+
+    fields: list[ui.number] = []
+    with ui.row().classes("w-full gap-2 no-wrap") as row:
+        for k, label in enumerate(labels):
+            field = ui.number(label, value=value()[k], on_change=lambda event, k=k: entered(k, event.value))
+            field.props(f'dense outlined debounce=250 hide-bottom-space suffix="{unit}"').classes("grow")
+            field.mark(f"{table}.{key}.{k}").props(f"data-testid={table}.{key}.{k}")
+            field.without_auto_validation()  # it would take away what `tell_problem` says
+            fields.append(field)
+
+    def refresh() -> None:
+        for field, number in zip(fields, value(), strict=True):
+            if field.value != number:
+                field.set_value(number)
+        tell_problem(session, fields[0], table, key)
+
+    session.on_scenario(refresh)
+    return row

@@ -1,0 +1,202 @@
+"""One browser tab: the scenario on its screen, what reading it gave, and who wants to know of changes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path, PurePath
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.app.document import START, Document
+from softnlp.app.live import LivePoses
+from softnlp.errors import InputError
+from softnlp.reading import one_line, read_text, shown
+from softnlp.scenario import Scenario, scenario_from_text
+from softnlp.units import BAR
+
+Array = NDArray[np.float64]
+Listener = Callable[[], None]
+
+LARGEST_FILE = 5_000_000
+"""Bytes of a file that is taken in."""
+
+
+class Session:
+    """The state of one tab. Controls call `change`, `set_pressure`, `open`; panels listen and draw what is there.
+
+    document : what is on the screen, also where it does not make sense yet. scenario : what the last text that did
+    says, SI. problem : why the text does not, or None; it names table and key. pressure : (sets,) shown [Pa].
+    follows_file : whether a saved file has the pressures of the opened one, or else the pose shown as its only step.
+    """
+
+    def __init__(self, text: str = START, name: str = "scenario.toml") -> None:
+        """Start with a scenario; raises `InputError` where that cannot be read."""
+        self._scratch = TemporaryDirectory(prefix="softnlp-")
+        self.folder = Path(self._scratch.name)
+        self.live = LivePoses()
+        self._scenario_listeners: list[Listener] = []
+        self._pressure_listeners: list[Listener] = []
+        self.problem: InputError | None = None
+        self.name = name
+        self.document = Document(text)
+        self.follows_file = True
+        self.scenario = self._read()
+        self.pressure = self._last_pressure()
+
+    def on_scenario(self, listener: Listener) -> None:
+        """Call a function after each change of the scenario or of what is wrong with it."""
+        self._scenario_listeners.append(listener)
+
+    def on_pressure(self, listener: Listener) -> None:
+        """Call a function after each change of the pressures of the pose shown."""
+        self._pressure_listeners.append(listener)
+
+    def open(self, text: str, name: str, files: Mapping[str, bytes] | None = None) -> None:
+        """Show another scenario; `files` are those that it names, by their names.
+
+        Raises
+        ------
+        InputError
+            Where it cannot be read; the screen stays as it was.
+        """
+        for key, content in (files or {}).items():
+            self.keep(key, content)
+        name = PurePath(name).name or "scenario.toml"
+        document = Document(text)
+        for file in document.files():
+            if PurePath(file).is_absolute() or ".." in PurePath(file).parts:
+                raise InputError(f"expected the name of a file beside the scenario, got {shown(file)}", key="file")
+            if not (self.folder / file).exists():
+                raise InputError(f"names the file {shown(file)}; open both together", source=one_line(name), key="file")
+        scenario = scenario_from_text(document.text(), self.folder / name)
+        self.document, self.scenario, self.problem = document, scenario, None
+        self.name, self.follows_file = name, True
+        self.pressure = self._last_pressure()
+        self._tell(self._scenario_listeners)
+        self._tell(self._pressure_listeners)
+
+    def open_path(self, path: Path) -> None:
+        """Show the scenario of a file, with the files that it names; raises `InputError` where one cannot be read."""
+        document = Document(read_text(path))
+        files = {}
+        for file in document.files():
+            try:
+                files[PurePath(file).name] = (path.parent / file).read_bytes()
+            except OSError as error:
+                raise InputError(f"{file}: {error.strerror}", source=one_line(str(path)), key="file") from None
+        document.rename_files(lambda file: PurePath(file).name)
+        self.open(document.source(), path.name, files)
+
+    def keep(self, name: str, content: bytes) -> str:
+        """Put a file beside the scenario and return the name it has there; raises `InputError` for one too large."""
+        if len(content) > LARGEST_FILE:
+            size = len(content) / 1e6
+            raise InputError(
+                f"{shown(name)} has {size:.0f} MB; expected a table of at most {LARGEST_FILE / 1e6:.0f} MB"
+            )
+        plain = PurePath(name.replace("\\", "/")).name
+        if not plain or plain.startswith("."):
+            raise InputError(f"expected a file with a name, got {shown(name)}")
+        (self.folder / plain).write_bytes(content)
+        return plain
+
+    def change(self, table: str, key: str, value: object) -> None:
+        """Set a key of the scenario, or take it out for None; what is wrong with it then is in `problem`."""
+        self.document.set(table, key, value)
+        self.reread()
+
+    def change_all(self, table: str, values: Mapping[str, object] | None) -> None:
+        """Put these keys in place of a whole table's, or take it out for None."""
+        self.document.replace(table, values)
+        self.reread()
+
+    def choose(self, study: str) -> None:
+        """Turn to another study of the same robot."""
+        if study != self.document.study:
+            self.document.start(study)
+            self.reread()
+
+    def set_pressure(self, pressure: Array) -> None:
+        """Show the pose at a pressure (sets,) [Pa]; from now on that is the one step of the scenario."""
+        self.pressure = np.asarray(pressure, dtype=float)
+        self.follows_file = False
+        self._tell(self._pressure_listeners)
+
+    def show_step(self, index: int) -> None:
+        """Show a step of the scenario's own pressures."""
+        if self.scenario is not None and len(self.scenario.pressures):
+            self.pressure = self.scenario.pressures[index % len(self.scenario.pressures)]
+            self.follows_file = True
+            self._tell(self._pressure_listeners)
+
+    def text(self) -> str:
+        """Return the scenario file of what is on the screen."""
+        document = Document(self.document.text())
+        if self.follows_file or not document.table("pressure"):
+            return document.text()
+        document.replace("pressure", {"sequence_bar": [[float(f"{p / BAR:.12g}") for p in self.pressure]]})
+        return document.text()
+
+    def kept(self) -> str:
+        """Return all that is on the screen as text, for `recall`."""
+        kept = {"name": self.name, "source": self.document.source(), "study": self.document.study}
+        return json.dumps(kept | {"pressure": None if self.follows_file else self.pressure.tolist()})
+
+    def recall(self, text: str) -> None:
+        """Show again what `kept` returned; raises `InputError` where that cannot be read."""
+        try:
+            kept = json.loads(text)
+            name, source, study, pressure = (kept[key] for key in ("name", "source", "study", "pressure"))
+        except (ValueError, KeyError, TypeError):
+            raise InputError("expected what a tab of this app had kept") from None
+        self.open(str(source), str(name))
+        self.choose(str(study))
+        if pressure is not None and len(pressure) == len(self.pressure):
+            self.set_pressure(np.asarray(pressure, dtype=float))
+
+    def asked(self) -> Scenario:
+        """Return the scenario of `text`, as a run of the saved file would have it; raises `InputError`."""
+        return scenario_from_text(self.text(), self.folder / self.name)
+
+    def reread(self) -> None:
+        """Read the document again, fit the pressures to the robot's sets, and tell who listens."""
+        before = len(self.pressure)
+        scenario = self._read()
+        if scenario is not None:
+            self.scenario = scenario
+        sets = self.scenario.robot.chamber_sets if self.scenario is not None else before
+        if sets != before:
+            self.pressure = np.resize(np.append(self.pressure, np.zeros(sets)), sets)
+        self._tell(self._scenario_listeners)
+
+    def close(self) -> None:
+        """Remove what the session kept on disk."""
+        self._scratch.cleanup()
+
+    def _read(self) -> Scenario | None:
+        """Return what the document says; of a study that lacks something of its own, the pose without it."""
+        self.problem = None
+        self.document.fit_pressures()
+        for study in dict.fromkeys((self.document.study, "forward")):
+            try:
+                return scenario_from_text(self.document.text(study), self.folder / self.name)
+            except InputError as error:
+                self.problem = self.problem or type(error)(error.message, table=error.table, key=error.key)
+        return None
+
+    def _last_pressure(self) -> Array:
+        """Return the pressures of the last step, of which a sequence is read first."""
+        if self.scenario is None:
+            return np.zeros(3)
+        if len(self.scenario.pressures):
+            last: Array = self.scenario.pressures[-1]
+            return last
+        return np.zeros(self.scenario.robot.chamber_sets)
+
+    @staticmethod
+    def _tell(listeners: list[Listener]) -> None:
+        for listener in tuple(listeners):
+            listener()

@@ -1,0 +1,1 @@
+"""What each study shows beside the robot, one module a study."""

@@ -1,0 +1,225 @@
+"""A sweep as the workspace tab shows it: run and kept, its colours, its numbers, the pose nearest to a place."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.app.job import Progress, Stopped
+from softnlp.errors import InputError
+from softnlp.scenario import Scenario
+from softnlp.units import BAR, MILLIMETRE
+from softnlp.workspace.planning import plan_of
+from softnlp.workspace.read import Workspace, column_names, load_workspace, read_column
+from softnlp.workspace.run import WORKSPACE_FILE, SweepProgress, SweepSummary, run_sweep
+from softnlp.workspace.summary import Summary, summarise
+from softnlp.workspace.task import WorkspaceTask
+
+Array = NDArray[np.float64]
+
+MOST_POSES = 1_000_000
+"""Of a sweep that is run from the page; `softnlp sweep` takes more."""
+MANIPULABILITY = "manipulability"
+QUANTITIES: Mapping[str, tuple[str, str]] = {
+    "bending_angle_deg": ("Bending angle", "deg"),
+    "tilt_deg": ("Tip tilt", "deg"),
+    "stretch": ("Stretch", "-"),
+    "backbone_length_mm": ("Backbone length", "mm"),
+    "blocked_force_N": ("Blocked force", "N"),
+    MANIPULABILITY: ("Manipulability, by differences", "mm³/bar³"),
+}
+Point = tuple[float, float, float]
+_ALIKE = 0.004  # angle between points that the eye cannot tell apart [rad]
+_CHUNK_OF_FORCES = 32
+_CUBIC_CENTIMETRE = 1e-6
+_SQUARE_CENTIMETRE = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Swept:
+    """A sweep of the page. workspace, summary : None where it was stopped before the end. task : what was asked."""
+
+    asked: Scenario
+    news: SweepSummary
+    workspace: Workspace | None
+    summary: Summary | None
+
+
+class Line(NamedTuple):
+    """A number of a sweep."""
+
+    label: str
+    value: str
+    unit: str
+
+
+def processors() -> int:
+    """Return how many processors this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on Linux
+        return os.cpu_count() or 1
+
+
+def sweep(asked: Scenario, folder: Path, workers: int, progress: Progress) -> Swept:
+    """Run a sweep in worker processes. Stopped, it keeps what is solved, and goes on from there when run again.
+
+    folder : for the sweeps of a page; each has its own in it.
+
+    Raises
+    ------
+    InputError
+        For more poses than a page should wait for.
+    SweepError
+        As `run_sweep`.
+    """
+    if asked.step_count > MOST_POSES:
+        raise InputError(
+            f"{asked.step_count} poses are too many for this page, which runs {MOST_POSES}; save the scenario and "
+            "use softnlp sweep",
+            table="workspace",
+        )
+    plan = plan_of(asked)
+    if plan.contact is not None:  # a force takes a hundred times as long: pieces that a person can wait for
+        plan = replace(plan, chunk=_CHUNK_OF_FORCES)
+    place = folder / plan.fingerprint()[:16]
+
+    def report(news: SweepProgress) -> None:
+        rate = (news.done - news.already) / news.seconds if news.seconds > 0 else 0.0
+        failed = f", {news.failed} failed" if news.failed else ""
+        try:
+            progress(news.done, news.poses, f"{news.done} of {news.poses} poses{failed}, {rate:.0f} poses/s")
+        except Stopped:  # the sweep asks for itself whether to stop, and then keeps what its workers finish
+            return
+
+    about = {"title": asked.title, "scenario": asked.text, "warnings": json.dumps(asked.warnings)}
+    news = run_sweep(
+        plan, place, workers=workers, resume=True, progress=report, stop=lambda: progress.stopping, about=about
+    )
+    if news.stopped:
+        return Swept(asked, news, None, None)
+    workspace = load_workspace(place / WORKSPACE_FILE)
+    return Swept(asked, news, workspace, summarise(workspace))
+
+
+def quantities(swept: Swept) -> dict[str, str]:
+    """Return what the points may be coloured by: key and label."""
+    if swept.workspace is None:
+        return {}
+    known = set(column_names(swept.workspace))
+    if manipulability_of_grid(swept) is not None:
+        known.add(MANIPULABILITY)
+    return {key: label for key, (label, _) in QUANTITIES.items() if key in known}
+
+
+def values_of(swept: Swept, quantity: str) -> Array:
+    """Return a quantity of every pose (N,) in its unit, nan where there is none."""
+    assert swept.workspace is not None
+    if quantity == MANIPULABILITY:
+        found = manipulability_of_grid(swept)
+        assert found is not None
+        return found
+    return read_column(swept.workspace, quantity).values
+
+
+def manipulability_of_grid(swept: Swept) -> Array | None:
+    """Return sqrt(det J J^T) of the tip position by the pressures (N,) [mm^3/bar^3], by differences over the grid.
+
+    nan at poses with an unsolved neighbour; None where the poses are no grid of at least 3 levels over 3 sets or more.
+    """
+    workspace, task = swept.workspace, swept.asked.task
+    if workspace is None or not isinstance(task, WorkspaceTask) or task.vary or (task.levels or 0) < 3:
+        return None
+    sets, levels = len(task.sets), task.levels or 0
+    if sets < 3 or levels**sets != workspace.poses or task.highest <= task.lowest:
+        return None
+    tips = (workspace.tip_position / MILLIMETRE).reshape(*[levels] * sets, 3)
+    step = (task.highest - task.lowest) / BAR / (levels - 1)
+    slopes: Any = np.gradient(tips, step, axis=tuple(range(sets)), edge_order=2)
+    J = np.stack(slopes, axis=-1).reshape(-1, 3, sets)
+    determinant = np.full(len(J), np.nan)
+    known = np.isfinite(J).all(axis=(1, 2))
+    determinant[known] = np.linalg.det(J[known] @ J[known].transpose(0, 2, 1))
+    return np.asarray(np.sqrt(np.maximum(determinant, 0.0)))
+
+
+def limits(values: Array) -> tuple[float, float]:
+    """Return the smallest and the largest number, both 0 without any."""
+    known = values[np.isfinite(values)]
+    return (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
+
+
+def colours_of(values: Array) -> Array:
+    """Return (N, 3) colours from 0 to 1, from dark for the smallest number to light; grey where there is none."""
+    from matplotlib import colormaps
+
+    low, high = limits(values)
+    known = np.isfinite(values)
+    part = np.where(known, (values - low) / (high - low) if high > low else 0.5, 0.0)
+    return np.where(known[:, None], np.asarray(colormaps["viridis"](part))[:, :3], 0.5)
+
+
+def gradient() -> str:
+    """Return the colours of `colours_of` from smallest to largest, as CSS has a bar of them."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    return f"linear-gradient(to right, {', '.join(to_hex(c) for c in colormaps['viridis'](np.linspace(0, 1, 12)))})"
+
+
+def in_sight(workspace: Workspace, viewer_mm: Point, along: Point) -> int | None:
+    """Return the number (from 0) of the solved pose whose tip is nearest to a line of sight; None without any.
+
+    Of those that the eye cannot tell apart it is the one in front. along : a unit vector.
+    """
+    offset = workspace.tip_position / MILLIMETRE - np.asarray(viewer_mm)
+    depth = offset @ np.asarray(along)
+    seen = np.flatnonzero(np.isfinite(depth) & (depth > 0))
+    if not seen.size:
+        return None
+    aside = np.linalg.norm(offset[seen] - depth[seen, None] * np.asarray(along), axis=1) / depth[seen]
+    near = seen[aside <= aside.min() + _ALIKE]
+    return int(near[np.argmin(depth[near])])
+
+
+def lines(swept: Swept) -> list[Line]:
+    """Return a finished sweep in numbers."""
+    summary, news = swept.summary, swept.news
+    if summary is None:
+        return []
+    found = [Line("Poses", str(summary.poses), ""), Line("Solved", str(summary.solved), "")]
+    found += [Line(f"Ended {status.value.replace('_', ' ')}", str(n), "") for status, n in summary.failed.items()]
+    if news.done > news.already:
+        found += [Line("Time", f"{news.seconds:.2f}", "s"), Line("Rate", f"{news.rate:.0f}", "poses/s")]
+    if not summary.solved:
+        return found
+    if summary.unstable:
+        found.append(Line("Not stable", str(summary.unstable), ""))
+    reach, boundary, hull = summary.reach, summary.boundary, summary.hull
+    found += [
+        Line("Distance from the axis", _range(reach.nearest_to_axis, reach.farthest_from_axis), "mm"),
+        Line("Distance from the base", _range(reach.nearest_to_base, reach.farthest_from_base), "mm"),
+        Line("Height", _range(reach.lowest, reach.highest), "mm"),
+        Line("Shape of the workspace", boundary.extent.meaning, ""),
+    ]
+    if boundary.volume:
+        found.append(Line("Volume", f"{boundary.volume / _CUBIC_CENTIMETRE:.4g}", "cm³"))
+    if hull.volume:
+        found.append(Line("Volume of the convex hull", f"{hull.volume / _CUBIC_CENTIMETRE:.4g}", "cm³"))
+    if boundary.area:
+        found.append(Line("Area", f"{boundary.area / _SQUARE_CENTIMETRE:.4g}", "cm²"))
+    if summary.dexterity is not None:
+        found.append(Line("Directions of the tip", f"{100 * summary.dexterity.overall:.3g}", "% of all"))
+    found.append(Line("Largest residual", f"{summary.worst_residual:.1e}", ""))
+    return found
+
+
+def _range(low: float, high: float) -> str:
+    return f"{low / MILLIMETRE:.4g} to {high / MILLIMETRE:.4g}"

@@ -1,0 +1,67 @@
+"""How the page and its plots look, light and dark."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from nicegui import ElementFilter, ui
+
+from softnlp.plots.style import COLOURS, WRONG
+
+_BLUE, _VERMILION, _GREEN, _, _ORANGE, _SKY, _ = COLOURS
+_STYLE = f"""
+body {{ overflow: hidden; }}
+.nicegui-content {{ padding: 0; gap: 0; }}
+.softnlp-surface {{ background: white !important; color: #222 !important; }}
+.body--dark .softnlp-surface {{ background: #1d1d1d !important; color: #e6e6e6 !important; }}
+.body--dark {{ --q-primary: {_SKY} !important; }}
+.body--dark {{ --q-negative: #FF8A80 !important; }}
+@layer overrides {{ .body--dark .bg-primary {{ color: #111 !important; }} }}
+.softnlp-panel .q-item {{ padding: 2px 0; min-height: 32px; }}
+.softnlp-panel .nicegui-expansion-content {{ padding: 0; }}
+"""
+
+
+def style_page() -> None:
+    """Give the page its colours and spacing; the accents are those of the figures."""
+    ui.colors(primary=_BLUE, secondary=_VERMILION, accent=_GREEN, warning=_ORANGE, negative=WRONG)
+    ui.add_css(_STYLE)
+
+
+def figure_layout(dark: bool) -> dict[str, Any]:
+    """Return the layout that plotly figures start from: no box, a pale grid, texts for the page's background."""
+    ink, grid = ("#E6E6E6", "#4A4A4A") if dark else ("#222222", "#DDDDDD")
+    axis = {"gridcolor": grid, "zerolinecolor": grid, "linecolor": grid, "automargin": True}
+    return {
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
+        "font": {"color": ink, "size": 11},
+        "xaxis": dict(axis),
+        "yaxis": dict(axis),
+        "legend": {"orientation": "h", "y": 1.12},
+        "margin": {"l": 48, "r": 8, "t": 8, "b": 40},
+    }
+
+
+def figure_config() -> dict[str, Any]:
+    """Return plotly's settings: tools while the pointer is over the figure, nothing that leads out of the page."""
+    return {
+        "displaylogo": False,
+        "showLink": False,
+        "plotlyServerURL": "",
+        "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"],
+        "toImageButtonOptions": {"format": "png", "scale": 3},
+    }
+
+
+def darkness() -> Callable[[], bool]:
+    """Return what tells whether the page of the current slot is dark."""
+    modes = list(ElementFilter(kind=ui.dark_mode))
+    return lambda: any(bool(mode.value) for mode in modes)
+
+
+def on_dark(redraw: Callable[[], None]) -> None:
+    """Call a function after each turn of the page of the current slot from light to dark or back."""
+    for mode in ElementFilter(kind=ui.dark_mode):
+        mode.on_value_change(lambda: redraw())

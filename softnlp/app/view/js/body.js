@@ -1,0 +1,175 @@
+// A robot's body: one buffer of vertices that all its surfaces share, written again for every frame.
+import { THREE } from "nicegui-scene";
+import { expand } from "./expand.js";
+import { unpack } from "./unpack.js";
+
+// Silicone is clear where one looks straight at it and milky at its edges.
+const VERTEX = `
+  varying vec3 vNormal;
+  varying vec3 vToEye;
+  void main() {
+    vec4 seen = modelViewMatrix * vec4(position, 1.0);
+    vNormal = normalMatrix * normal;
+    vToEye = -seen.xyz;
+    gl_Position = projectionMatrix * seen;
+  }`;
+const FRAGMENT = `
+  uniform vec3 face;
+  uniform vec3 rim;
+  uniform vec2 alpha;
+  varying vec3 vNormal;
+  varying vec3 vToEye;
+  void main() {
+    vec3 n = normalize(vNormal);
+    float edge = pow(1.0 - abs(dot(n, normalize(vToEye))), 2.2);
+    float light = 0.86 + 0.14 * abs(dot(n, normalize(vec3(0.3, 0.7, 0.6))));
+    gl_FragColor = vec4(mix(face, rim, edge) * light, mix(alpha.x, alpha.y, edge));
+    #include <colorspace_fragment>
+  }`;
+
+function silicone(alphaFacing, alphaEdge, side) {
+  return new THREE.ShaderMaterial({
+    vertexShader: VERTEX,
+    fragmentShader: FRAGMENT,
+    uniforms: {
+      face: { value: new THREE.Color() },
+      rim: { value: new THREE.Color() },
+      alpha: { value: new THREE.Vector2(alphaFacing, alphaEdge) },
+    },
+    transparent: true,
+    depthWrite: false,
+    side,
+  });
+}
+
+export function readRobot(message) {
+  const mesh = {
+    station: unpack(message.station, Uint16Array),
+    centre: unpack(message.centre, Float32Array),
+    around: unpack(message.around, Float32Array),
+    radius: unpack(message.radius, Uint8Array),
+    normal: unpack(message.normal, Int8Array),
+  };
+  const Index = message.wide ? Uint32Array : Uint16Array;
+  const parts = message.parts.map((part) => ({ ...part, faces: unpack(part.faces, Index) }));
+  return { mesh, parts, sets: message.sets };
+}
+
+export class Body {
+  constructor(robot, theme) {
+    this.robot = robot;
+    this.group = new THREE.Group();
+    const count = robot.mesh.station.length;
+    this.position = new THREE.BufferAttribute(new Float32Array(3 * count), 3).setUsage(THREE.DynamicDrawUsage);
+    this.normal = new THREE.BufferAttribute(new Float32Array(3 * count), 3).setUsage(THREE.DynamicDrawUsage);
+    this.silicone = {
+      back: silicone(0.26, 0.62, THREE.BackSide),
+      front: silicone(0.07, 0.72, THREE.FrontSide),
+      lumen: silicone(0.06, 0.4, THREE.DoubleSide),
+    };
+    this.sets = robot.sets.map(
+      () =>
+        // In front of the end faces, in which the discs of the chambers lie.
+        new THREE.MeshPhongMaterial({ shininess: 40, polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -2 }),
+    );
+    this.level = robot.sets.map(() => 0);
+    for (const part of robot.parts) this.addPart(part);
+    this.paint(theme);
+  }
+
+  addPart({ kind, set, faces }) {
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", this.position);
+    geometry.setAttribute("normal", this.normal);
+    geometry.setIndex(new THREE.BufferAttribute(faces, 1));
+    const add = (material, order) => {
+      const mesh = new THREE.Mesh(geometry, material);
+      mesh.renderOrder = order;
+      mesh.frustumCulled = false; // its bounds are not followed
+      mesh.name = kind;
+      this.group.add(mesh);
+    };
+    if (kind === "chamber") add(this.sets[set], 2);
+    else if (kind === "lumen") add(this.silicone.lumen, 3);
+    else {
+      add(this.silicone.back, 1);
+      add(this.silicone.front, 4);
+    }
+  }
+
+  update(tube, level) {
+    expand(this.robot.mesh, tube, this.position.array, this.normal.array);
+    this.position.needsUpdate = true;
+    this.normal.needsUpdate = true;
+    this.level = level;
+    this.paintSets();
+  }
+
+  paint(theme) {
+    this.theme = theme;
+    for (const material of Object.values(this.silicone)) {
+      material.uniforms.face.value.set(theme.silicone);
+      material.uniforms.rim.value.set(theme.rim);
+    }
+    this.paintSets();
+  }
+
+  // A chamber without pressure is pale; with it the colour of its set comes out.
+  paintSets() {
+    const idle = new THREE.Color(this.theme.idle);
+    this.sets.forEach((material, k) => {
+      const level = this.level[k];
+      const full = new THREE.Color(this.robot.sets[k].colour);
+      material.color.copy(idle).lerp(full, level > 0 ? 0.42 + 0.58 * level : 0.3);
+      material.emissive.copy(full).multiplyScalar(0.22 * level);
+    });
+  }
+
+  dispose() {
+    this.group.removeFromParent();
+    for (const mesh of this.group.children) mesh.geometry.dispose();
+    for (const material of [...Object.values(this.silicone), ...this.sets]) material.dispose();
+  }
+}
+
+// Another shape of the same robot: its outer surface alone, faint.
+export class Ghost {
+  constructor(robot, theme) {
+    this.robot = robot;
+    this.position = new THREE.BufferAttribute(new Float32Array(3 * robot.mesh.station.length), 3);
+    this.normal = new THREE.BufferAttribute(new Float32Array(3 * robot.mesh.station.length), 3);
+    this.material = silicone(0.1, 0.6, THREE.FrontSide);
+    this.group = new THREE.Group();
+    for (const part of robot.parts.filter((p) => p.kind === "outer" || p.kind === "end")) {
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute("position", this.position);
+      geometry.setAttribute("normal", this.normal);
+      geometry.setIndex(new THREE.BufferAttribute(part.faces, 1));
+      const mesh = new THREE.Mesh(geometry, this.material);
+      mesh.frustumCulled = false;
+      mesh.renderOrder = 0;
+      this.group.add(mesh);
+    }
+    this.group.visible = false;
+    this.paint(theme);
+  }
+
+  update(tube) {
+    this.group.visible = tube !== null;
+    if (tube === null) return;
+    expand(this.robot.mesh, tube, this.position.array, this.normal.array);
+    this.position.needsUpdate = true;
+    this.normal.needsUpdate = true;
+  }
+
+  paint(theme) {
+    this.material.uniforms.face.value.set(theme.ghost);
+    this.material.uniforms.rim.value.set(theme.ghost);
+  }
+
+  dispose() {
+    this.group.removeFromParent();
+    for (const mesh of this.group.children) mesh.geometry.dispose();
+    this.material.dispose();
+  }
+}

@@ -1,0 +1,240 @@
+// The scene, its camera, and when it is drawn: once for each change, on the browser's next animation frame.
+import { OrbitControls, THREE } from "nicegui-scene";
+import { Arrows, TipFrame } from "./arrows.js";
+import { Body, Ghost, readRobot } from "./body.js";
+import { stationFrames } from "./expand.js";
+import { Marks } from "./marks.js";
+import { Surroundings } from "./surroundings.js";
+import { followTheme } from "./theme.js";
+import { unpack } from "./unpack.js";
+
+const FIELD = 28; // of view [deg]
+const AZIMUTH = -60;
+const ELEVATION = 17; // of the first view [deg]
+const STEEP = 60; // above this the plane that is picked on lies level [deg]
+const CLICK = 4; // a pointer that moves further is dragging [px]
+const PICTURE_SCALE = 2;
+const REST = 400; // after which a picture is smoothed, where that is not done for each frame [ms]
+
+const radians = (degrees) => (degrees * Math.PI) / 180;
+
+function drawnInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const known = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = known ? gl.getParameter(known.UNMASKED_RENDERER_WEBGL) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
+
+function readTube(message) {
+  return message === null ? null : { ...message, axis: unpack(message.axis, Float32Array) };
+}
+
+export class Stage {
+  constructor(element, emit) {
+    this.element = element;
+    this.emit = emit;
+    // Without a graphics card smoothing doubles the time of a frame: what moves is drawn plain, what rests is smoothed.
+    this.software = drawnInSoftware();
+    this.renderer = new THREE.WebGLRenderer({ antialias: !this.software });
+    this.ratio = this.software ? 1 : Math.min(window.devicePixelRatio, 2);
+    this.renderer.setPixelRatio(this.ratio);
+    const canvas = this.renderer.domElement;
+    canvas.style.cssText = "position:absolute;inset:0;display:block";
+    element.appendChild(canvas);
+    this.scene = new THREE.Scene();
+    this.camera = new THREE.PerspectiveCamera(FIELD, 1, 1, 1e4);
+    this.camera.up.set(0, 0, 1);
+    this.light = new THREE.DirectionalLight(0xffffff, 1.6);
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0xb8bcc4, 1.5), this.light);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = true;
+    this.controls.dampingFactor = 0.15;
+    this.controls.addEventListener("change", () => this.request());
+    this.labels = new Set();
+    this.surroundings = new Surroundings(this.labels);
+    this.arrows = new Arrows(this.labels);
+    this.tipFrame = new TipFrame(this.labels);
+    this.tipFrame.group.visible = false;
+    this.marks = new Marks(() => this.request());
+    this.scene.add(this.surroundings.group, this.arrows.group, this.tipFrame.group, this.marks.group);
+    this.followed = followTheme((theme) => this.paint(theme));
+    this.paint(this.followed.theme);
+    this.listen(canvas);
+    this.sizes = new ResizeObserver(() => this.resize());
+    this.sizes.observe(element);
+    this.resize();
+  }
+
+  setRobot(message) {
+    this.body?.dispose();
+    this.ghost?.dispose();
+    this.robot = readRobot(message);
+    this.palette = message.palette;
+    this.body = new Body(this.robot, this.theme);
+    this.ghost = new Ghost(this.robot, this.theme);
+    this.scene.add(this.body.group, this.ghost.group);
+  }
+
+  // Only kept here: of several that come before the next animation frame the last is drawn, and the tip of each.
+  show(frame) {
+    this.next = { ...frame, body: readTube(frame.body), ghost: readTube(frame.ghost) };
+    this.marks.addToTrail(this.next.body.axis.subarray(-7, -4), frame.length);
+    this.request();
+  }
+
+  apply(frame) {
+    const tip = stationFrames(frame.body.axis.subarray(-7));
+    this.body.update(frame.body, frame.level);
+    this.ghost.update(frame.ghost);
+    this.tipFrame.group.visible = true;
+    this.tipFrame.update(tip, 0.16 * frame.length, this.theme);
+    this.arrows.update(frame.arrows, this.theme);
+    this.marks.update(frame, tip, this.palette, this.theme);
+    this.surroundings.build(frame.length, frame.width, this.robot.sets, this.theme);
+    const before = this.frame;
+    this.frame = frame;
+    this.tip = [...tip.subarray(0, 3)];
+    if (before === undefined) this.reset();
+    else if (before.length !== frame.length) this.grow(frame.length / before.length);
+    this.rescale();
+  }
+
+  // A longer robot is seen from further away, in the direction in which the user left the camera.
+  grow(factor) {
+    this.camera.position.multiplyScalar(factor);
+    this.controls.target.multiplyScalar(factor);
+    this.limit(this.frame.length);
+  }
+
+  limit(size) {
+    this.camera.near = size / 50;
+    this.camera.far = 60 * size;
+    this.camera.updateProjectionMatrix();
+    this.controls.minDistance = 0.3 * size;
+    this.controls.maxDistance = 25 * size;
+  }
+
+  reset() {
+    if (this.frame === undefined) return;
+    // What is left of the swing of a drag would go on after it.
+    this.controls.enableDamping = false;
+    this.controls.update();
+    this.controls.enableDamping = true;
+    const size = this.frame.length;
+    const [a, e] = [radians(AZIMUTH), radians(ELEVATION)];
+    const narrow = Math.max(1, 1.5 / this.camera.aspect);
+    const away = 4.8 * size * narrow;
+    this.controls.target.set(0, 0, 0.45 * size);
+    this.camera.position.set(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e));
+    this.camera.position.multiplyScalar(away).add(this.controls.target);
+    this.limit(size);
+    this.controls.update();
+    this.request();
+  }
+
+  paint(theme) {
+    this.theme = theme;
+    this.scene.background = new THREE.Color(theme.background);
+    this.body?.paint(theme);
+    this.ghost?.paint(theme);
+    this.marks.paint(theme);
+    if (this.frame !== undefined) this.next ??= this.frame;
+    this.request();
+  }
+
+  request() {
+    this.pending ??= requestAnimationFrame(() => this.draw());
+  }
+
+  draw() {
+    this.pending = undefined;
+    const frame = this.next;
+    this.next = undefined;
+    if (frame !== undefined && this.body !== undefined) this.apply(frame);
+    this.controls.update();
+    this.render(this.ratio);
+    if (frame !== undefined) this.element.dataset.frame = frame.id;
+    if (!this.software) return;
+    clearTimeout(this.rest);
+    this.rest = setTimeout(() => this.render(PICTURE_SCALE), REST);
+  }
+
+  render(ratio) {
+    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
+    this.light.position.copy(this.camera.position).add(new THREE.Vector3(0, 0, this.camera.position.length()));
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.element;
+    if (width === 0 || height === 0) return;
+    this.renderer.setSize(width, height);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.rescale();
+    this.request();
+  }
+
+  // Labels keep their size on the screen.
+  rescale() {
+    const unit = (2 * Math.tan(radians(FIELD / 2))) / Math.max(1, this.element.clientHeight);
+    for (const label of this.labels) label.scale(unit);
+  }
+
+  picture() {
+    this.draw();
+    this.render(PICTURE_SCALE);
+    const url = this.renderer.domElement.toDataURL("image/png");
+    this.request();
+    return url;
+  }
+
+  listen(canvas) {
+    let start = null;
+    canvas.addEventListener("pointerdown", (event) => {
+      start = event.button === 0 ? [event.clientX, event.clientY] : null;
+    });
+    canvas.addEventListener("pointerup", (event) => {
+      if (start === null || Math.hypot(event.clientX - start[0], event.clientY - start[1]) > CLICK) return;
+      const box = canvas.getBoundingClientRect();
+      const picked = this.pick(
+        (2 * (event.clientX - box.left)) / box.width - 1,
+        1 - (2 * (event.clientY - box.top)) / box.height,
+      );
+      if (picked !== null) this.emit("pick", picked);
+    });
+    canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+    canvas.addEventListener("webglcontextrestored", () => this.request());
+  }
+
+  // Screen coordinates from -1 to 1 to a point on the plane through the robot that faces the viewer, and the line of sight.
+  pick(x, y) {
+    const towards = this.camera.getWorldDirection(new THREE.Vector3());
+    const steep = Math.abs(towards.z) > Math.sin(radians(STEEP));
+    const normal = steep ? new THREE.Vector3(0, 0, 1) : new THREE.Vector3(towards.x, towards.y, 0).normalize();
+    const through = new THREE.Vector3(0, 0, steep ? (this.tip?.[2] ?? 0) : 0);
+    const caster = new THREE.Raycaster();
+    caster.setFromCamera(new THREE.Vector2(x, y), this.camera);
+    const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(normal, through);
+    const point = caster.ray.intersectPlane(plane, new THREE.Vector3());
+    if (point === null) return null;
+    const { origin, direction } = caster.ray;
+    return { x: point.x, y: point.y, z: point.z, from: origin.toArray(), along: direction.toArray() };
+  }
+
+  dispose() {
+    cancelAnimationFrame(this.pending);
+    clearTimeout(this.rest);
+    this.followed.stop();
+    this.sizes.disconnect();
+    this.controls.dispose();
+    this.surroundings.clear();
+    this.body?.dispose();
+    this.ghost?.dispose();
+    for (const label of this.labels) label.dispose();
+    this.renderer.dispose();
+    this.renderer.forceContextLoss(); // a browser has few of them
+    this.renderer.domElement.remove();
+  }
+}

@@ -1,0 +1,167 @@
+"""`softnlp compare`: a scenario's robot simulated at measured pressures, and how far it is from what was measured."""
+
+from __future__ import annotations
+
+import io
+import json as json_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
+
+if TYPE_CHECKING:
+    from softnlp.evaluation.comparison import Comparison
+    from softnlp.runner_compare import CompareTask
+
+
+def compare(
+    scenario: Path,
+    measured: Path,
+    /,
+    *,
+    law: tuple[str, ...] = (),
+    coefficients: tuple[str, ...] = (),
+    conventions: tuple[str, ...] = (),
+    closure: tuple[str, ...] = (),
+    shape: str = "free",
+    out: Path | None = None,
+    json: bool = False,
+) -> int:
+    """Compare a model with measured tips, bending angles, elongations, tilts or blocked forces.
+
+    Prints RMSE, MAPE, mean, median and maximum of the errors, and writes them with every row, figures, versions.json
+    and copies of both files. The exit status is 0, 3 when rows have no solution, 2 for bad input, 130 when stopped.
+
+    Parameters
+    ----------
+    scenario
+        TOML file of study forward, blocked-force or workspace: silicone, loads, wall, and the robot of rows that name
+        none. The pressures are those of the measurements; its own are not solved.
+    measured
+        CSV file with columns p1_bar, p2_bar, ... and what was measured: x_mm, y_mm, z_mm, bending_angle_deg,
+        elongation_mm, tilt_deg, blocked_force_N; docs/compare.md has the others.
+    law
+        A stress-stretch law of the scenario's silicone, or all; may be repeated.
+    coefficients
+        reproduction, calibrated, none (no stiffening) or scenario; may be repeated.
+    conventions
+        reproduction or as_printed; may be repeated.
+    closure
+        Of blocked forces: free, compliant, weighted or rigid; may be repeated.
+    shape
+        Whether tips, angles and elongations are those of the free robot, or those of the blocked one.
+    out
+        Folder for the results; by default results/NAME_compare, where NAME is that of the scenario file.
+    json
+        Print one JSON document and nothing else; no files are written unless --out is given.
+    """
+    from softnlp.cli.folder import require_writable
+    from softnlp.results.comparison import comparison_document, require_free_names
+    from softnlp.results.identify_document import document_text
+    from softnlp.runner_compare import Asked, compare_task
+    from softnlp.scenario import load_scenario
+
+    asked = load_scenario(scenario)
+    task = compare_task(asked, measured, Asked(law, coefficients, conventions, closure, shape))
+    folder = out if out is not None or json else Path("results") / f"{scenario.stem}_compare"
+    if folder is not None:
+        require_writable(folder)
+        require_free_names(task)
+    found = _compared(task)
+    document = document_text(comparison_document(task, found))
+    if folder is not None:
+        _write(folder, task, found, document)
+    if json:
+        say(document.rstrip("\n"))
+    else:
+        _say(task, found)
+        if folder is not None:
+            say(f"\nresults in {folder}")
+    lost = sum(found.lost(v) for v in range(len(found.variants)))
+    return SOME_UNSOLVED if lost else SOLVED
+
+
+def _compared(task: CompareTask) -> Comparison:
+    """Compare with a progress bar."""
+    from softnlp.runner_compare import run_compare
+
+    rows, variants = len(task.columns.rows), len(task.variants)
+    with progress(rows * variants, task.scenario.title) as (advance, stop_asked):
+
+        def told(done: int, total: int) -> None:
+            advance(round(done / total * rows * variants))
+            if stop_asked():
+                raise KeyboardInterrupt
+
+        return run_compare(task, told)
+
+
+def _say(task: CompareTask, found: Comparison) -> None:
+    """Print the statistics of each variant, and the mean error by robot where there are several."""
+    from softnlp.evaluation.observed import OBSERVABLES
+
+    robots = ", ".join(o.label for o in found.observed)
+    say(f"{task.scenario.title}: {robots}; {task.scenario.material.name}; {len(task.columns.rows)} rows measured")
+    for name in found.observables:
+        what = OBSERVABLES[name]
+        say(f"\n{what.words} [{what.unit}]: {found.measured(name)} measured")
+        header = ["variant", "count", "rmse", "mape_%", "mean", "median", "max", "bias"]
+        say_rows(header, [_cells(found, v, name) for v in range(len(found.variants))])
+        if len(found.observed) > 1:
+            say(f"mean error by robot [{what.unit}]")
+            told = [k for k in range(len(found.observed)) if found.measured(name, k)]
+            rows = [
+                [label, *(_text(found.statistics(v, name, k).mean / what.scale) for k in told)]
+                for v, label in enumerate(found.labels)
+            ]
+            say_rows(["variant", *(found.observed[k].label for k in told)], rows)
+    if found.best is not None and len(found.variants) > 1:
+        say(f"\nleast error: {found.labels[found.best]}")
+    for note in task.notes:
+        say(f"note: {note}")
+    _complain_of_lost(found)
+
+
+def _cells(found: Comparison, v: int, name: str) -> list[str]:
+    from softnlp.evaluation.observed import OBSERVABLES
+
+    s, scale = found.statistics(v, name), OBSERVABLES[name].scale
+    numbers = [_text(x / scale) for x in (s.mean, s.median, s.largest, s.bias)]
+    return [found.labels[v], str(s.count), _text(s.rmse / scale), _text(s.mape, 3), *numbers]
+
+
+def _text(value: float, digits: int = 4) -> str:
+    return "-" if value != value else f"{value:.{digits}g}"
+
+
+def _complain_of_lost(found: Comparison) -> None:
+    """Say for each variant how many rows have no solution, by status."""
+    for v, label in enumerate(found.labels):
+        lost = [s.value for solved in found.simulated[v] for s in solved.status if s is not None and not s.has_solution]
+        if lost:
+            counts = ", ".join(f"{lost.count(status)} {status}" for status in dict.fromkeys(lost))
+            complain(f"{label}: {len(lost)} of {found.rows} rows have no solution and no errors ({counts})")
+
+
+def _write(folder: Path, task: CompareTask, found: Comparison, document: str) -> None:
+    """Write everything, each file whole, after all of it is made."""
+    from softnlp.plots.compare import compare_figures
+    from softnlp.results.comparison import rows_text, summary_text
+    from softnlp.results.files import make_folder, write_whole
+    from softnlp.results.inputs import versions
+
+    contents: dict[str, Any] = {
+        "comparison.json": document.encode(),
+        "rows.csv": rows_text(task, found).encode(),
+        "summary.csv": summary_text(found).encode(),
+        "versions.json": (json_module.dumps(versions(), indent=2) + "\n").encode(),
+        "scenario.toml": task.scenario.text.encode(),
+        "measured.csv": task.text.encode(),
+    }
+    for name, figure in compare_figures(task, found).items():
+        png = io.BytesIO()
+        figure.savefig(png, format="png")
+        contents[f"{name}.png"] = png.getvalue()
+    make_folder(folder)
+    for name, content in contents.items():
+        write_whole(folder / name, content)

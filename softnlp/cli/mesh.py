@@ -1,0 +1,174 @@
+"""`softnlp mesh`: the body of a step, or the one to cast, as a watertight solid."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say
+from softnlp.cli.folder import require_writable
+from softnlp.errors import InputError
+
+if TYPE_CHECKING:
+    from softnlp.mesh import Solid
+    from softnlp.results import RunView
+    from softnlp.robot import Robot
+    from softnlp.scenario import Scenario
+    from softnlp.studies.step import Step
+
+_WITH_STEPS = ("forward", "blocked-force", "inverse")
+
+
+class _Enough(Exception):
+    """Ends a run once the step asked for is there."""
+
+
+def mesh(
+    scenario: Path,
+    /,
+    *,
+    step: int | None = None,
+    undeformed: bool = False,
+    cores: bool = False,
+    holes: str | None = None,
+    facets: int | None = None,
+    out: Path | None = None,
+) -> int:
+    """Write the body of one step as a watertight solid in mm; --undeformed writes the body to cast, without a solve.
+
+    Lumen and chambers are holes, open at both ends. The exit status is 3 when the step did not solve.
+
+    Parameters
+    ----------
+    scenario
+        TOML file, or the folder of a run (or its results.nc).
+    step
+        Which step, from 1; the last by default.
+    undeformed
+        The body as it is cast: straight, of its natural length, without pressure.
+    cores
+        Also what fills the lumen and each chamber: in a GLB beside the body, with an STL as a second file, NAME-cores.
+    holes
+        Of --undeformed: "bore" (default) makes the finished body; "reinforced" leaves room for chambers wound before.
+    facets
+        Sides of every circle; 96 by default.
+    out
+        STL or GLB file; NAME.stl by default.
+    """
+    from softnlp.mesh import FACETS, HOLES, body_solid, format_of, mould_body, require
+    from softnlp.mesh import cores as core_solids
+
+    target = out or Path(f"{_stem(scenario)}.stl")
+    format_of(target)
+    require_writable(target.parent)
+    sides = FACETS if facets is None else facets
+    require(sides)
+    if undeformed:
+        if step is not None:
+            raise InputError("expected no step together with --undeformed", key="--step")
+        robot = _robot(scenario)
+        chosen = holes or HOLES[0]
+        solid = mould_body(robot, sides, chosen)
+        inside = core_solids(robot, None, sides, chosen) if cores else ()
+    else:
+        if holes is not None:
+            raise InputError("expected only together with --undeformed", key="--holes")
+        view, number = _view_of(scenario, step)
+        if view is None:
+            complain(f"stopped before step {number}; nothing was written")
+            return STOPPED
+        body = view.bodies[number - 1]
+        if body is None:
+            complain(f"step {number} has no body to write, its status is {view.status[number - 1].value!r}")
+            return SOME_UNSOLVED
+        robot = view.robot
+        solid = body_solid(robot, body, sides)
+        inside = core_solids(robot, body, sides) if cores else ()
+    _write(solid, inside, robot, target)
+    return SOLVED
+
+
+def _write(solid: Solid, inside: tuple[Solid, ...], robot: Robot, target: Path) -> None:
+    """Write the files and say what is in them."""
+    from softnlp.mesh import format_of, write_solids
+    from softnlp.results.files import make_folder
+
+    make_folder(target.parent)
+    for warning in solid.warnings:
+        complain(f"warning: {warning}")
+    apart = bool(inside) and format_of(target) == ".stl"
+    say(
+        f"{robot.name}: {solid.volume:.6g} mm^3 of silicone, {len(solid.faces)} triangles in "
+        f"{write_solids([solid] if apart else [solid, *inside], robot, target)}"
+    )
+    if apart:
+        second = write_solids(inside, robot, target.with_name(f"{target.stem}-cores{target.suffix}"))
+        say(f"its {len(inside)} cores in {second}")
+
+
+def _stem(path: Path) -> str:
+    """Return the name of a scenario, or of the folder that results.nc is in."""
+    place = path.resolve()
+    if place.is_dir():
+        return place.name
+    return place.parent.name if path.suffix == ".nc" else path.stem
+
+
+def _is_run(path: Path) -> bool:
+    return path.is_dir() or path.suffix == ".nc"
+
+
+def _robot(path: Path) -> Robot:
+    from softnlp.results import load_run
+    from softnlp.scenario import load_scenario
+
+    return load_run(path).robot if _is_run(path) else load_scenario(path).robot
+
+
+def _view_of(path: Path, step: int | None) -> tuple[RunView | None, int]:
+    """Return the view up to a step, and its number; None where Ctrl-C came before it."""
+    from softnlp.results import load_run, view_of_run
+    from softnlp.runner import partial_run
+
+    if _is_run(path):
+        view = load_run(path)
+        return view, _number(step, len(view.bodies))
+    from softnlp.scenario import load_scenario
+
+    asked = load_scenario(path)
+    if asked.study not in _WITH_STEPS:
+        raise InputError(
+            f"expected {', '.join(map(repr, _WITH_STEPS))} for the body of a step, got {asked.study!r}; --undeformed "
+            "needs none",
+            source=str(path),
+            key="study",
+        )
+    number = _number(step, asked.step_count)
+    steps = _solved(asked, number)
+    return (view_of_run(partial_run(asked, steps)) if len(steps) == number else None), number
+
+
+def _number(step: int | None, count: int) -> int:
+    number = count if step is None else step
+    if not 1 <= number <= count:
+        raise InputError(f"expected a step from 1 to {count}, got {number}", key="--step")
+    return number
+
+
+def _solved(asked: Scenario, number: int) -> list[Step]:
+    """Solve the steps up to a number, each from the last, with a progress bar."""
+    from softnlp.runner import run_scenario
+
+    steps: list[Step] = []
+    with progress(number, asked.title) as (advance, stop_asked):
+
+        def keep(index: int, step: Step) -> None:
+            steps.append(step)
+            advance(len(steps))
+            if len(steps) == number or stop_asked():
+                raise _Enough
+
+        with suppress(_Enough):
+            run_scenario(asked, keep)
+    return steps

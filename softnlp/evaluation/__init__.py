@@ -1,0 +1,1 @@
+"""How far simulations are from measurements: statistics of errors, and whole comparisons."""

@@ -1,0 +1,203 @@
+"""What a comparison leaves behind: a JSON document, a table of its rows, and one of its statistics."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from softnlp.errors import InputError
+from softnlp.evaluation.comparison import Comparison
+from softnlp.evaluation.observed import NUMBERS, OBSERVABLES, differences
+from softnlp.evaluation.statistics import Statistics
+from softnlp.reading import shown
+from softnlp.results.identify_document import number
+from softnlp.results.inputs import coefficients_table, contact_table, loads_table, package_version, pressure_bar, tidy
+from softnlp.runner_compare import CompareTask
+
+STATISTICS = ("count", "rmse", "mape_percent", "mean", "median", "max", "bias", "left_out_of_mape", "unit")
+_VARIANT = ("law", "coefficients", "conventions", "closure")
+
+
+def comparison_document(task: CompareTask, found: Comparison) -> dict[str, Any]:
+    """Return the JSON document of a comparison."""
+    scenario = task.scenario
+    measured = {OBSERVABLES[name].key: found.measured(name) for name in found.observables}
+    return {
+        "softnlp": package_version(),
+        "title": scenario.title,
+        "study": scenario.study,
+        "measured": str(task.path),
+        "conventions": scenario.conventions.name,
+        "robots": [o.label for o in found.observed],
+        "material": scenario.material.name,
+        "loads": loads_table(scenario.loads),
+        "contact": None if scenario.contact is None else contact_table(scenario.contact),
+        "shape": found.shape,
+        "count": len(task.columns.rows),
+        "measured_count": measured,
+        "blank_count": {key: len(task.columns.rows) - count for key, count in measured.items()},
+        "best": _best(found),
+        "variants": [_variant(task, found, v) for v in range(len(found.variants))],
+        "notes": list(task.notes),
+    }
+
+
+def _named(found: Comparison, v: int) -> dict[str, Any]:
+    variant = found.variants[v]
+    names = (variant.law, variant.named, variant.conventions.name, variant.closure)
+    return dict(zip(_VARIANT, names, strict=True))
+
+
+def _best(found: Comparison) -> dict[str, Any] | None:
+    """Return the variant with the least error over all, and of each observable."""
+    if found.best is None:
+        return None
+    each = {}
+    for name in found.main_observables:
+        if (v := found.best_of(name)) is not None:
+            each[OBSERVABLES[name].key] = {"variant": v + 1, **_named(found, v)}
+    return {"variant": found.best + 1, **_named(found, found.best), "by_observable": each}
+
+
+def _variant(task: CompareTask, found: Comparison, v: int) -> dict[str, Any]:
+    return {
+        **_named(found, v),
+        "coefficient_values": coefficients_table(found.variants[v].coefficients),
+        "unsolved": found.lost(v),
+        "statistics": _statistics(found, v, None),
+        "by_robot": {o.label: _statistics(found, v, k) for k, o in enumerate(found.observed)},
+        "rows": [_row(task, found, v, *place) for place in _places(task)],
+    }
+
+
+def _statistics(found: Comparison, v: int, robot: int | None) -> dict[str, Any]:
+    """Return the statistics of every observable that was measured, of one robot or of all."""
+    told = {}
+    for name in found.observables:
+        if found.measured(name, robot):
+            values = statistics_cells(found.statistics(v, name, robot), name)
+            told[OBSERVABLES[name].key] = dict(zip(STATISTICS, values, strict=True))
+    return told
+
+
+def statistics_cells(s: Statistics, name: str) -> list[Any]:
+    """Return statistics in the unit of files, in the order of `STATISTICS`; None where there is no number."""
+    scale = OBSERVABLES[name].scale
+    rmse, mean, median, largest, bias = (number(x / scale) for x in (s.rmse, s.mean, s.median, s.largest, s.bias))
+    return [s.count, rmse, number(s.mape), mean, median, largest, bias, s.left_out, OBSERVABLES[name].unit]
+
+
+def _places(task: CompareTask) -> Iterator[tuple[int, int | None, int]]:
+    """Yield (row of the file, which robot, row of that robot) in the file's order; robot None: it has no numbers."""
+    where = {place: (j, k) for j, rows in enumerate(task.rows) for k, (_, place) in enumerate(rows.places)}
+    for row in range(len(task.columns.rows)):
+        robot, k = where.get(row, (None, 0))
+        yield row, robot, k
+
+
+def _row(task: CompareTask, found: Comparison, v: int, row: int, robot: int | None, k: int) -> dict[str, Any]:
+    """Return one measured row with what a variant says of it."""
+    line = task.columns.lines[row]
+    if robot is None:
+        return {"row": row + 1, "line": line, "status": None}
+    o, solved = found.observed[robot], found.simulated[v][robot]
+    status = solved.status[k]
+    told: dict[str, Any] = {"row": row + 1, "line": line, "robot": o.label, "pressure_bar": pressure_bar(o.pressure[k])}
+    if np.isfinite(task.time[row]):
+        told["t_s"] = tidy(task.time[row])
+    told |= {"status": None if status is None else status.value, "message": solved.message[k]}
+    parts: dict[str, dict[str, Any]] = {"measured": {}, "simulated": {}, "error": {}}
+    for name, measured, simulated, error in _numbers(found, v, robot, k):
+        key = OBSERVABLES[name].key
+        if measured is not None:
+            parts["measured"][key], parts["simulated"][key] = measured, simulated
+        parts["error"][key] = error
+    return told | parts
+
+
+def _numbers(
+    found: Comparison, v: int, robot: int, k: int
+) -> Iterator[tuple[str, float | None, float | None, float | None]]:
+    """Yield (name, measured, simulated, error) of what was measured in a row, in the unit of files.
+
+    The distance of the tips has no measured and no simulated number.
+    """
+    o, solved = found.observed[robot], found.simulated[v][robot]
+    measured, simulated = o.values[k], solved.values[k]
+    for name in found.observables:
+        scale = OBSERVABLES[name].scale
+        error, _ = differences(name, simulated[None, :], measured[None, :], float(o.robot.length))
+        if name in NUMBERS:
+            at = NUMBERS.index(name)
+            if np.isfinite(measured[at]):
+                yield name, number(measured[at] / scale), number(simulated[at] / scale), number(error[0] / scale)
+        elif np.isfinite(measured[:3]).all():
+            yield name, None, None, number(error[0] / scale)
+
+
+def summary_text(found: Comparison) -> str:
+    """Return the statistics as CSV: a row for each variant, robot ("all" first) and observable."""
+    rows: list[list[Any]] = []
+    for v in range(len(found.variants)):
+        for robot, label in ((None, "all"), *((k, o.label) for k, o in enumerate(found.observed))):
+            for name in found.observables:
+                if found.measured(name, robot):
+                    cells = statistics_cells(found.statistics(v, name, robot), name)
+                    rows.append([*_named(found, v).values(), label, OBSERVABLES[name].key, *cells])
+    return _csv([*_VARIANT, "robot", "observable", *STATISTICS], rows)
+
+
+def require_free_names(task: CompareTask) -> None:
+    """Refuse a file that has columns which the table of rows adds."""
+    for name in _added([*OBSERVABLES]):
+        if name in task.header:
+            raise InputError(
+                f"column {shown(name)} is one that a comparison writes; rename it or leave it out",
+                source=task.columns.file,
+            )
+
+
+def _added(observables: Sequence[str]) -> list[str]:
+    """Return the columns that the table of rows has beside those of the file."""
+    numbers = [OBSERVABLES[name].key for name in observables if name in NUMBERS]
+    keys = [OBSERVABLES[name].key for name in observables]
+    return [
+        *(f"variant_{name}" for name in _VARIANT),
+        *("simulated_status", "simulated_message"),
+        *(f"simulated_{key}" for key in numbers),
+        *(f"error_{key}" for key in keys),
+    ]
+
+
+def rows_text(task: CompareTask, found: Comparison) -> str:
+    """Return every row of the file as CSV for each variant: its cells, what is simulated, and the errors."""
+    observables = found.observables
+    rows: list[list[Any]] = []
+    for v in range(len(found.variants)):
+        for row, robot, k in _places(task):
+            cells: list[Any] = [*task.columns.rows[row], *_named(found, v).values()]
+            told: dict[str, tuple[Any, Any]] = {}
+            if robot is not None:
+                solved = found.simulated[v][robot]
+                status = solved.status[k]
+                cells += [None if status is None else status.value, solved.message[k]]
+                told = {name: (simulated, error) for name, _, simulated, error in _numbers(found, v, robot, k)}
+            else:
+                cells += [None, None]
+            cells += [told.get(name, (None, None))[0] for name in observables if name in NUMBERS]
+            cells += [told.get(name, (None, None))[1] for name in observables]
+            rows.append(cells)
+    return _csv([*task.header, *_added(observables)], rows)
+
+
+def _csv(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    for row in rows:
+        writer.writerow([f"{v:.10g}" if isinstance(v, float) else "" if v is None else v for v in row])
+    return text.getvalue()

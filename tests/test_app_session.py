@@ -1,0 +1,181 @@
+"""One browser tab: what controls change is what is read, solved and saved."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("tomlkit", reason="the extra gui is not installed")
+
+from softnlp.app.numbers import certificate_words, chamber_lines, step_lines
+from softnlp.app.session import LARGEST_FILE, Session
+from softnlp.errors import InputError
+from softnlp.results import to_json
+from softnlp.runner import run_scenario
+from softnlp.units import BAR
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+
+
+@pytest.fixture
+def session() -> Iterator[Session]:
+    made = Session()
+    yield made
+    made.close()
+
+
+def live_step(session: Session) -> dict[str, object]:
+    assert session.scenario is not None
+    solve = session.live.blocked if session.document.study == "blocked-force" else session.live.pose
+    step: dict[str, object] = to_json(solve(session.scenario, session.pressure)[0])["steps"][0]
+    return step
+
+
+@pytest.mark.parametrize("study", ["forward", "blocked-force"])
+def test_a_live_pose_is_the_step_of_the_saved_scenario(session: Session, study: str) -> None:
+    session.choose(study)
+    if study == "forward":
+        session.change("tip_load", "force_N", [0.0, 0.05, -0.02])
+        session.change("gravity", "direction", "-z")
+    for bar in (0.2, 0.5, 0.9):  # a slider on its way: each pose starts from the last
+        session.set_pressure(np.array([bar * BAR, 0.0, 0.0]))
+        shown = live_step(session)
+    saved = to_json(run_scenario(session.asked()))["steps"][-1]
+    assert saved["pressure_bar"] == shown["pressure_bar"] == [0.9, 0.0, 0.0]
+    for key in ("tip_position_mm", "bending_angle_deg", "backbone_length_mm", "chamber_length_mm", "stretch"):
+        np.testing.assert_allclose(shown[key], saved[key], rtol=2e-6, atol=1e-4)
+    if study == "blocked-force":
+        assert shown["blocked_force_N"] == pytest.approx(saved["blocked_force_N"], rel=1e-6)
+
+
+def test_live_poses_follow_the_robot_its_silicone_and_the_coefficients(session: Session) -> None:
+    for table, key, value in (
+        ("robot", "length_mm", 52.0),
+        ("material", "name", "Dragon Skin 10"),
+        ("material", "model", "yeoh"),
+        ("stiffening", "bending", 0.3),
+        ("corrections", "conventions", "as_printed"),
+        ("solver", "transcription", "collocation"),
+        ("robot", "chambers_per_set", 1),
+        ("robot", "chamber_sets", 4),
+    ):
+        session.change(table, key, value)
+        assert session.problem is None, session.problem
+        shown = live_step(session)
+        saved = to_json(run_scenario(session.asked()))["steps"][-1]
+        np.testing.assert_allclose(shown["tip_position_mm"], saved["tip_position_mm"], atol=1e-4)
+    assert len(session.pressure) == 4
+
+
+def test_what_does_not_fit_is_said_and_the_last_good_scenario_stays(session: Session) -> None:
+    told = []
+    session.on_scenario(lambda: told.append(session.problem))
+    before = session.scenario
+    session.change("robot", "outer_diameter_mm", 10.0)
+    assert session.problem is not None
+    assert session.problem.table == "robot"
+    assert session.scenario is before
+    session.change("robot", "outer_diameter_mm", None)
+    assert session.problem is None
+    assert len(told) == 2
+
+
+@pytest.mark.parametrize("value", ["a lot", [], {}, True, float("nan"), float("inf"), -3.0, 1e300, 10**400, ""])
+@pytest.mark.parametrize(("table", "key"), [("robot", "length_mm"), ("solver", "accuracy"), ("tip_load", "force_N")])
+def test_wild_values_are_a_problem_not_an_exception(session: Session, table: str, key: str, value: object) -> None:
+    before = session.scenario
+    session.change(table, key, value)
+    assert session.problem is not None
+    assert session.scenario is before
+    session.change(table, key, None)
+    assert session.problem is None
+
+
+def test_a_formula_with_code_in_it_is_refused(session: Session) -> None:
+    formula = "__import__('os').system('true')"
+    session.change_all("material", {"name": "mine", "model": "own", "formula": formula, "constants": {"c": 1.0}})
+
+    assert session.problem is not None
+    assert session.problem.table == "material"
+
+
+@pytest.mark.parametrize("file", sorted(SCENARIOS.rglob("*.toml")), ids=lambda f: f.name)
+def test_a_shipped_scenario_opens_with_its_files(session: Session, file: Path) -> None:
+    if "study" not in file.read_text():
+        pytest.skip("a material file")
+    session.open_path(file)
+    assert session.problem is None
+    asked = session.asked()
+    assert asked.study == session.document.study
+    again = Session()
+    again.folder = session.folder
+    again.recall(session.kept())
+    assert again.text() == session.text()
+    again.close()
+
+
+def test_an_opened_scenario_keeps_its_pressures_until_a_slider_moves(session: Session) -> None:
+    session.open_path(SCENARIOS / "D25L60_one_set.toml")
+    assert session.text() == (SCENARIOS / "D25L60_one_set.toml").read_text()
+    session.set_pressure(np.array([0.7, 0.0, 0.1]) * BAR)
+    assert session.asked().pressures.tolist() == [pytest.approx([0.7 * BAR, 0.0, 0.1 * BAR])]
+    session.show_step(3)
+    assert len(session.asked().pressures) == 11
+
+
+def test_what_cannot_be_opened_leaves_the_screen_as_it_was(session: Session) -> None:
+    before = session.text()
+    for text in ("", "study = 3", "nonsense", 'study = "forward"\n[robot]\nname = "D25L61"'):
+        with pytest.raises(InputError):
+            session.open(text, "x.toml")
+    with pytest.raises(InputError, match="open both together"):
+        session.open(before.replace("sequence_bar = [[0.8, 0.0, 0.0]]", 'file = "p.csv"'), "x.toml")
+    with pytest.raises(InputError, match="beside the scenario"):
+        session.open(before.replace("sequence_bar = [[0.8, 0.0, 0.0]]", 'file = "/etc/passwd"'), "x.toml")
+    with pytest.raises(InputError, match="at most"):
+        session.keep("big.csv", b"0" * (LARGEST_FILE + 1))
+    with pytest.raises(InputError, match="with a name"):
+        session.keep("..", b"")
+    for kept in ("{", "{}", json.dumps({"name": "a", "source": "=", "study": "forward", "pressure": None})):
+        with pytest.raises(InputError):
+            session.recall(kept)
+    assert session.text() == before
+
+
+def test_two_sessions_do_not_mix(session: Session) -> None:
+    other = Session()
+    other.change("robot", "name", "D10L40")
+    assert session.document.get("robot", "name") == "D25L60"
+    assert other.folder != session.folder
+    folder = other.folder
+    other.close()
+    assert not folder.exists()
+
+
+def test_the_page_says_in_words_how_a_step_ended(session: Session) -> None:
+    assert session.scenario is not None
+    run, ghost = session.live.pose(session.scenario, session.pressure)
+    assert ghost is None  # nothing loads it
+    assert certificate_words(run).startswith("Solved, residual")
+    lines = {line.key: line for line in (*step_lines(run), *chamber_lines(run))}
+    assert lines["bending_angle_deg"].text == f"{np.degrees(run.steps[0].pose.bending_angle):.3f}"  # type: ignore[union-attr]
+    assert lines["chamber_length_mm.5"].unit == "mm"
+    session.change_all("stiffening", {"elongation": 0.0, "bending": 0.0})
+    run, _ = session.live.pose(session.scenario, np.full(3, 9 * BAR))
+    assert not run.steps[0].status.has_solution
+    assert "lower the pressure" in certificate_words(run)
+    assert {line.text for line in step_lines(run)} == {"–"}
+
+
+def test_a_load_leaves_the_free_shape_as_a_ghost(session: Session) -> None:
+    session.change("tip_load", "force_N", [0.1, 0.0, 0.0])
+    assert session.scenario is not None
+    run, ghost = session.live.pose(session.scenario, session.pressure)
+    assert ghost is not None
+    pose = run.steps[0].pose
+    assert pose is not None
+    np.testing.assert_allclose(pose.tip_position - ghost.tip_position, pose.tip_displacement, atol=1e-9)
