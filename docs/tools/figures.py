@@ -26,8 +26,8 @@ def _folder(script: Path) -> Path:
     return cache.kept(f"figures/{script.stem}", [script])
 
 
-def make_one(script: Path) -> None:
-    """Run a script and keep what it makes: figure.png and text.md."""
+def make_one(script: Path, kept: Path) -> None:
+    """Run a script and keep what it makes in a folder: figure.png and text.md."""
 
     def build(folder: Path) -> None:
         names = runpy.run_path(str(script))
@@ -40,7 +40,7 @@ def make_one(script: Path) -> None:
             else:
                 drawn.savefig(folder / "figure.png", dpi=DPI)
 
-    cache.make(_folder(script), build)
+    cache.make(kept, build)
 
 
 def make(scripts: Sequence[Path]) -> None:
@@ -50,7 +50,7 @@ def make(scripts: Sequence[Path]) -> None:
         return
     workers = min(len(todo), os.cpu_count() or 1)
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        list(pool.map(make_one, todo))
+        list(pool.map(make_one, todo, map(_folder, todo)))
 
 
 def _scripts() -> list[Path]:
