@@ -64,9 +64,9 @@ def free_port() -> int:
 
 
 @contextmanager
-def served(*arguments: str) -> Iterator[tuple[str, float]]:
+def served(*arguments: str, port: int | None = None) -> Iterator[tuple[str, float]]:
     """Start the app; yield its address and how long it took until the page answered [s]."""
-    port = free_port()
+    port = port or free_port()
     began = time.perf_counter()
     command = [sys.executable, "-m", "softnlp", "gui", *arguments, "--no-browser", "--port", str(port)]
     # NiceGUI behaves otherwise where it believes itself under test

@@ -36,13 +36,11 @@ import numpy as np
 from benchmarks import paper_method
 from benchmarks.numpy_field import numpy_field
 from benchmarks.paper_blocked import Weights, solve_blocked
-from benchmarks.paper_method import Rod
+from benchmarks.rods import Rods
 from softnlp import BAR, Loads, Numerics, material, robot
-from softnlp.branch import branch_function, stretch_on_branch
 from softnlp.contact_settings import ContactSettings
-from softnlp.quantities import Model, quantities
+from softnlp.quantities import Model
 from softnlp.robot import ROBOTS
-from softnlp.section import deform
 from softnlp.studies.blocked import BlockedSolver
 from softnlp.studies.wall import standing_wall
 
@@ -121,7 +119,8 @@ def our_seconds(solver: BlockedSolver) -> float:
 
 def paper_seconds(model: Model, *, planar: bool) -> float | None:
     """Return the time of one step of the paper's method [s], a mean over the sequence; None where one did not end."""
-    rods = [rod_at(model, P) for P in PRESSURES[1:]]
+    made = Rods(model)
+    rods = [made.at(P) for P in PRESSURES[1:]]
     began = time.process_time()
     start = None
     for rod in rods:
@@ -130,24 +129,6 @@ def paper_seconds(model: Model, *, planar: bool) -> float | None:
             return None
         start = np.append(answer.base, answer.force)
     return (time.process_time() - began) / len(rods)
-
-
-def rod_at(model: Model, pressure: np.ndarray) -> Rod:
-    """Return the rod at a pressure [Pa], as plain numbers for the paper's method."""
-    nominal = [q.nominal for name, q in quantities(model).items() if name != "pressure"]
-    stretch = stretch_on_branch(branch_function(model), np.concatenate([pressure, *nominal]), pressure).stretch
-    section = deform(model.robot, model.material, pressure, stretch, model.coefficients, model.conventions)
-    EI_x, EI_y = section.bending_stiffness
-    return Rod(
-        length=float(stretch * model.robot.length),
-        EA=float(section.axial_stiffness),
-        GA=float(section.shear_stiffness),
-        EI=(float(EI_x), float(EI_y)),
-        GJ=float(section.torsional_stiffness),
-        PA=float(section.pressure_area) * pressure[list(model.robot.set_of_chamber)],
-        d=np.array(section.centres, dtype=float),
-        weight=(0.0, 0.0, 0.0),
-    )
 
 
 if __name__ == "__main__":

@@ -15,6 +15,9 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from statistics import mean, median
 from typing import Any
@@ -30,6 +33,7 @@ from softnlp.studies.inverse_task import InverseTask, Target
 from softnlp.studies.statics import PoseSolver, Solved
 
 Array = NDArray[np.float64]
+TipOf = Callable[[Array, Any], tuple[Array, Any]]
 
 SILICONE = material("Ecoflex 00-50")
 HIGHEST = 1.5 * BAR
@@ -40,6 +44,7 @@ CASES = {
     "D15L60, gravity": ("D15L60", Loads(gravity=(0.0, 0.0, 9.80665))),
 }
 TIMED = 12
+REACHED = 1e-6  # of the length
 FAR = ((0.05, 0.02, 0.06), (0.0, 0.0, 0.16), (0.0, 0.0, 0.03), (0.03, 0.0, -0.03), (-0.08, -0.05, 0.05))
 
 
@@ -102,7 +107,7 @@ def out_of_reach(solver: InverseSolver, forward: PoseSolver, loads: Loads, lengt
     tips = []
     near: Solved | None = None
     for P in pressures:
-        tips.append(tip_at(forward, P, loads, near)[0])
+        tips.append(tip_at(forward, loads, P, near)[0])
     dense = np.array(tips)
     for target in np.array(FAR) * length / 0.06:
         step = solver.solve(Target(target, None), None)[0]
@@ -111,7 +116,7 @@ def out_of_reach(solver: InverseSolver, forward: PoseSolver, loads: Loads, lengt
         width = (levels[1] - levels[0]) / 2
         while width > 2e-5 * HIGHEST:
             around = [np.clip(best + width * np.array(move), 0, HIGHEST) for move in product((-1, 0, 1), repeat=3)]
-            found = [float(np.linalg.norm(tip_at(forward, P, loads, None)[0] - target)) for P in around]
+            found = [float(np.linalg.norm(tip_at(forward, loads, P, None)[0] - target)) for P in around]
             k = int(np.nanargmin(found))
             if found[k] < left * (1 - 1e-6):
                 best, left = around[k], found[k]
@@ -122,7 +127,7 @@ def out_of_reach(solver: InverseSolver, forward: PoseSolver, loads: Loads, lengt
         print(f"  {step.status.value}: {1e3 * ours:.4f} mm left, dense search {1e3 * left:.4f} mm ({ours / left:.4f})")
 
 
-def tip_at(forward: PoseSolver, P: Array, loads: Loads, near: Solved | None) -> tuple[Array, Solved | None]:
+def tip_at(forward: PoseSolver, loads: Loads, P: Array, near: Solved | None) -> tuple[Array, Solved | None]:
     """Return the tip of a stable pose, NaN where there is none."""
     step, solved = forward.solve(P, loads, near)
     if step.pose is None or not step.pose.stable:
@@ -141,12 +146,12 @@ def against_nelder_mead(model: Model, forward: PoseSolver, loads: Loads, targets
         began = time.perf_counter()
         solver.solve(Target(target, None), None)
         middle = time.perf_counter()
-        evaluations, reached = nelder_mead(forward, loads, target, length)
+        searched = nelder_mead(partial(tip_at, forward, loads), target, length)
         ended = time.perf_counter()
         ours.append(middle - began)
         theirs.append(ended - middle)
-        solves.append(evaluations)
-        if reached <= 1e-6:
+        solves.append(searched.solves)
+        if searched.distance <= REACHED:
             ratios.append(theirs[-1] / ours[-1])
     print(f"  Nelder-Mead met {len(ratios)} of {len(targets)} targets, {median(solves):.0f} forward solves each")
     print(f"  s for {len(targets)} targets: {sum(ours):.2f} and Nelder-Mead {sum(theirs):.2f}")
@@ -155,21 +160,35 @@ def against_nelder_mead(model: Model, forward: PoseSolver, loads: Loads, targets
     print(f"  ratio of the means, ours over all targets: {mean(theirs) / usual:.1f}")
 
 
-def nelder_mead(forward: PoseSolver, loads: Loads, target: Array, length: float) -> tuple[int, float]:
-    """Return the forward solves spent and the distance reached, over the length."""
-    near: Solved | None = None
-    spent, best = 0, np.inf
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """How a search ended: forward solves spent, distance left over the length, at this pressure (sets,) [Pa]."""
+
+    solves: int
+    distance: float
+    pressure: Array
+
+
+def nelder_mead(tip_of: TipOf, target: Array, length: float) -> Searched:
+    """Search the pressures from the middle of the bounds until the tip is within `REACHED` of the length.
+
+    tip_of : (pressure, what it returned of the last pose or None) -> tip (3,), NaN where there is none, and what to
+    start the next pose from.
+    """
+    near: Any = None
+    spent, best, pressure = 0, np.inf, np.full(3, HIGHEST / 2)
 
     def distance(z: Array) -> float:
-        nonlocal near, spent, best
-        tip, near = tip_at(forward, z * BAR, loads, near)
+        nonlocal near, spent, best, pressure
+        tip, near = tip_of(z * BAR, near)
         spent += 1
         found = float(np.linalg.norm(tip - target)) / length
-        best = min(best, found)
+        if found < best:
+            best, pressure = found, z * BAR
         return found if np.isfinite(found) else 1e3
 
     def stop(*_: Any) -> None:
-        if best <= 1e-6:
+        if best <= REACHED:
             raise StopIteration
 
     minimize(
@@ -180,7 +199,7 @@ def nelder_mead(forward: PoseSolver, loads: Loads, target: Array, length: float)
         callback=stop,
         options={"xatol": 1e-9, "fatol": 1e-9, "maxiter": 1000},
     )
-    return spent, best
+    return Searched(spent, best, pressure)
 
 
 if __name__ == "__main__":

@@ -33,10 +33,9 @@ import numpy as np
 from benchmarks import paper_method
 from benchmarks.numpy_field import numpy_field
 from benchmarks.paper_method import Array, Rod, solve_pose
+from benchmarks.rods import Rods
 from softnlp import BAR, Loads, Numerics, material, robot
-from softnlp.branch import branch_function, stretch_on_branch
-from softnlp.quantities import Model, quantities
-from softnlp.section import deform
+from softnlp.quantities import Model
 from softnlp.studies.statics import PoseSolver
 from softnlp.units import STANDARD_GRAVITY
 
@@ -136,21 +135,7 @@ def our_new_sequence(numerics: Numerics, loads: Loads, pressures: Array) -> Arra
 
 def rod_at(pressure: Array, loads: Loads) -> Rod:
     """Return the rod at a pressure [Pa], as plain numbers for the paper's method."""
-    nominal = [q.nominal for name, q in quantities(MODEL).items() if name != "pressure"]
-    stretch = stretch_on_branch(branch_function(MODEL), np.concatenate([pressure, *nominal]), pressure).stretch
-    section = deform(MODEL.robot, MODEL.material, pressure, stretch, MODEL.coefficients, MODEL.conventions)
-    EI_x, EI_y = section.bending_stiffness
-    w_x, w_y, w_z = (MODEL.material.density * section.area * g for g in loads.gravity)
-    return Rod(
-        length=float(stretch * MODEL.robot.length),
-        EA=float(section.axial_stiffness),
-        GA=float(section.shear_stiffness),
-        EI=(float(EI_x), float(EI_y)),
-        GJ=float(section.torsional_stiffness),
-        PA=float(section.pressure_area) * pressure[list(MODEL.robot.set_of_chamber)],
-        d=np.array(section.centres, dtype=float),
-        weight=(float(w_x), float(w_y), float(w_z)),
-    )
+    return Rods(MODEL).at(pressure, loads)
 
 
 def processes() -> dict[str, float]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from benchmarks.app import FLAGS, chromium, served
+from benchmarks.app import FLAGS, chromium
 
 WAIT_MS = 30_000  # for anything to appear
 
@@ -46,7 +46,7 @@ class Watched:
 
     def value_becomes(self, testid: str, text: str) -> None:
         """Wait until a field shows a text."""
-        found = f"document.querySelector(\"input[data-testid='{testid}']\").value === {json.dumps(text)}"
+        found = f"document.querySelector(\"input[data-testid='{testid}']\")?.value === {json.dumps(text)}"
         self.page.wait_for_function(found)
 
     def type(self, testid: str, value: str) -> None:
@@ -126,17 +126,17 @@ class Watched:
 
 
 @contextmanager
-def browser(*arguments: str) -> Iterator[Any]:
-    """Yield a function that opens a tab of a server of its own."""
+def browser() -> Iterator[Any]:
+    """Yield a function that opens an address in a tab."""
     from playwright.sync_api import sync_playwright
 
-    with tempfile.TemporaryDirectory() as profile, served(*arguments) as (address, _), sync_playwright() as play:
+    with tempfile.TemporaryDirectory() as profile, sync_playwright() as play:
         context = play.chromium.launch_persistent_context(
             profile, executable_path=chromium(), args=list(FLAGS), viewport={"width": 1280, "height": 800}
         )
         context.set_default_timeout(WAIT_MS)
 
-        def tab() -> Watched:
+        def tab(address: str) -> Watched:
             watched = Watched(context.new_page())
             watched.page.on("request", lambda r: _note_request(watched, address, r.url))
             watched.page.on("console", lambda m: watched.complaints.append(m.text) if m.type == "error" else None)

@@ -19,7 +19,7 @@ from designs import (
     rubber_of,
     silicone,
 )
-from elastica import cantilever
+from euler_elastica import cantilever
 from witness import Witnessed, arc, shoot
 from witness_section import section
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from elastica import cantilever
+from euler_elastica import cantilever
 from witness import arc, shoot, solve
 from witness_section import (
     AS_PRINTED,

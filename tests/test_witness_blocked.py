@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from elastica import cantilever
+from euler_elastica import cantilever
 from witness_blocked import Blocked, Fold, Loads, Wall, Weights, follow
 from witness_section import BODIES, CALIBRATED, REPRODUCTION, Choices, published
 
