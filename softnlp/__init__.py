@@ -12,6 +12,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from softnlp.contact_settings import Closure as Closure
     from softnlp.contact_settings import ClosureWeights as ClosureWeights
     from softnlp.contact_settings import ContactSettings as ContactSettings
     from softnlp.conventions import AS_PRINTED as AS_PRINTED
@@ -76,7 +77,7 @@ if TYPE_CHECKING:
     from softnlp.units import NEWTON_MILLIMETRE as NEWTON_MILLIMETRE
 
 _HOMES = {
-    "contact_settings": ("ClosureWeights", "ContactSettings"),
+    "contact_settings": ("Closure", "ClosureWeights", "ContactSettings"),
     "conventions": ("AS_PRINTED", "COEFFICIENT_SETS", "REPRODUCTION", "Coefficients", "Conventions"),
     "errors": ("IllPosedError", "InputError", "MaterialError", "RobotError", "SoftnlpError"),
     "evaluation.compare": ("compare",),

@@ -2,12 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 CLOSURES = ("free", "compliant", "weighted", "rigid")
 
 Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Closure:
+    """How pressurised chambers react at a blocked tip: what a closure of your own says.
+
+    Both functions take a `softnlp.tip.AtTip` and return expressions of it, made of operators and casadi functions.
+    Forces are in units of EI/L_0^2 and lengths in L_0, as everything in `AtTip` is.
+
+    Attributes
+    ----------
+    name
+        How results call it.
+    reaction
+        Takes an `AtTip`, returns T_i, the reactions (N,) of the chambers, which act at the tip with P_i A_c.
+    equation
+        Takes an `AtTip`, returns one residual that determines one more unknown force, `at.unknowns[-1]`, such as a
+        common reaction; None where there is no such unknown.
+    """
+
+    name: str
+    reaction: Callable[[Any], Any]
+    equation: Callable[[Any], Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -28,17 +52,23 @@ class ContactSettings:
     """Where the wall stands and how the pressurised chambers react to it.
 
     offset : h, horizontal position at which the tip is held, along x [m]; unused when a wall is given.
-    tip_cap : L_t, length of the rigid cap on the tip [m]. closure : which equations close the problem.
+    tip_cap : L_t, length of the rigid cap on the tip [m]. closure : which equations close the problem, by name or as a
+    `Closure` of your own.
     wall_point, wall_normal : a wall anywhere, world frame, a point [m] and a unit vector; both or neither.
     weights : of the `weighted` closure.
     """
 
     offset: float = 0.0
     tip_cap: float = 0.0
-    closure: Literal["free", "compliant", "weighted", "rigid"] = "compliant"
+    closure: Literal["free", "compliant", "weighted", "rigid"] | Closure = "compliant"
     wall_point: Vector | None = None
     wall_normal: Vector | None = None
     weights: ClosureWeights = field(default_factory=ClosureWeights)
+
+    @property
+    def closure_name(self) -> str:
+        """The name of the closure, one of the package's or your own."""
+        return self.closure.name if isinstance(self.closure, Closure) else self.closure
 
 
 @dataclass(frozen=True)

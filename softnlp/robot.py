@@ -120,7 +120,13 @@ class Robot:
         return [theta_1 + alpha_1 * n + beta * (n // n2) for n in range(self.chambers)]
 
     def chamber_centres(self) -> list[tuple[Any, Any]]:
-        """Undeformed centre (x, y) of each chamber in the body frame, d_i = r_cp [cos, sin] [m]; N entries."""
+        """Return the undeformed centre of each chamber in the body frame, d_i = r_cp [cos, sin].
+
+        Returns
+        -------
+        list
+            (N, 2) pairs x, y [m].
+        """
         r_cp = self.chamber_circle_radius
         return [(r_cp * ca.cos(theta), r_cp * ca.sin(theta)) for theta in self.chamber_angles()]
 

@@ -244,7 +244,7 @@ def _variants(scenario: Scenario, asked: Asked, against_wall: bool) -> tuple[Var
         _materials(scenario, asked.laws),
         _coefficients(scenario.coefficients, asked.coefficients),
         conventions,
-        (closures or [contact.closure]) if against_wall else [None],
+        (closures or [contact.closure_name]) if against_wall else [None],
     )
 
 

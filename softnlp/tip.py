@@ -6,13 +6,15 @@ equations as it has unknown forces of its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
 
 from softnlp import rod
+from softnlp.contact_settings import Closure
+from softnlp.errors import InputError
 from softnlp.rod import RodSection
 
 
@@ -105,6 +107,21 @@ def _rigid(at: AtTip) -> Any:
     return at.given.pressed * at.unknowns[-1]
 
 
+def _held(at: AtTip) -> Any:
+    """Return e_L, which determines T; T itself where no chamber is pressurised."""
+    idle = ca.if_else(ca.sum1(at.given.pressed) > 0, 0.0, 1.0)
+    return length_error(at) + idle * at.unknowns[-1]
+
+
+BUILT_IN: Mapping[str, Closure] = {
+    "free": Closure("free", _no_reaction),
+    "weighted": Closure("weighted", _no_reaction),  # with errors that are chosen elsewhere
+    "compliant": Closure("compliant", _compliant),
+    "rigid": Closure("rigid", _rigid, _held),
+}
+"""The closures that a scenario may name."""
+
+
 def _balance(at: AtTip, T: Any, F_b: Any) -> Any:
     """Return the 6 tip balances with reactions T (N,) of the chambers and the wall's force F_b."""
     R = rod.unpack(at.state)[1]
@@ -118,29 +135,44 @@ def _balance(at: AtTip, T: Any, F_b: Any) -> Any:
     return rod.tip_balance(at.state, at.section, force, moment)
 
 
-def tip_conditions(closure: str, *, wall: bool = True) -> TipConditions:
-    """Return the conditions of a closure (free, weighted, compliant, rigid) with a wall, or for a given load without.
+def tip_conditions(closure: str | Closure, *, wall: bool = True) -> TipConditions:
+    """Return the conditions of a closure, one of `BUILT_IN` or your own, with a wall, or for a given load without.
 
-    `weighted` is `free` with errors that are chosen elsewhere. `rigid` has e_L = 0 for T, or T = 0 where no chamber is
-    pressurised.
+    Raises
+    ------
+    InputError
+        When the conditions are used, where the closure's functions return another number of entries than they should.
     """
-    reaction = {"compliant": _compliant, "rigid": _rigid}.get(closure, _no_reaction)
-    rigid = closure == "rigid"
+    chosen = BUILT_IN[closure] if isinstance(closure, str) else closure
+    equation = chosen.equation
+    own = equation is not None
+
+    def reaction(at: AtTip) -> Any:
+        return _sized(chosen, "reaction", chosen.reaction(at), len(at.centres))
 
     def residual(at: AtTip) -> Any:
         F_b = at.unknowns[0] if wall else 0.0
         rows = [_balance(at, reaction(at), F_b)]
         if wall:
             rows.append(gap(at) - at.given.gap_error)
-        if rigid:
-            idle = ca.if_else(ca.sum1(at.given.pressed) > 0, 0.0, 1.0)
-            rows.append(length_error(at) + idle * at.unknowns[-1])
+        if equation is not None:
+            rows.append(_sized(chosen, "equation", equation(at), 1))
         return ca.vertcat(*rows)
 
     return TipConditions(
-        unknowns=("wall force",) * wall + ("chamber reaction",) * rigid,
-        equations=("contact gap",) * wall + ("chamber length",) * rigid,
+        unknowns=("wall force",) * wall + ("chamber reaction",) * own,
+        equations=("contact gap",) * wall + ("chamber length",) * own,
         residual=residual,
         reaction=reaction,
         has_contact=True,
     )
+
+
+def _sized(closure: Closure, part: str, value: Any, size: int) -> Any:
+    """Return what a function of a closure gave as a column, or raise `InputError` where it has another size."""
+    column = ca.vec(ca.vertcat(*value) if isinstance(value, list | tuple) else value)
+    if column.numel() != size:
+        raise InputError(
+            f"{part} of closure {closure.name!r}: expected {size} entries, got {column.numel()}", key="closure"
+        )
+    return column

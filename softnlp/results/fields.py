@@ -249,7 +249,7 @@ def closure_of(run: Run, step: Step) -> str | None:
     """Return the closure of a step, known of a failed one by what was asked."""
     if step.contact is not None:
         return step.contact.closure
-    return None if run.contact is None else run.contact.closure
+    return None if run.contact is None else run.contact.closure_name
 
 
 def left_by_weights(step: Step) -> tuple[EquationResidual, ...]:

@@ -62,7 +62,7 @@ def coefficients_table(coefficients: Coefficients) -> dict[str, float]:
 
 def contact_table(contact: ContactSettings) -> dict[str, Any]:
     """Return the wall and the closure as the `[contact]` table of a scenario; what is left to the study is absent."""
-    table: dict[str, Any] = {"closure": contact.closure, "tip_cap_mm": tidy(contact.tip_cap, MILLIMETRE)}
+    table: dict[str, Any] = {"closure": contact.closure_name, "tip_cap_mm": tidy(contact.tip_cap, MILLIMETRE)}
     if contact.wall_point is None or contact.wall_normal is None:
         table["offset_mm"] = tidy(contact.offset, MILLIMETRE)
     else:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.contact_settings import ClosureWeights, ContactSettings
+from softnlp.contact_settings import Closure, ClosureWeights, ContactSettings
 from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.errors import InputError
 from softnlp.materials import Material
@@ -149,7 +149,7 @@ def constrained_pose(
     material: Material,
     pressure: Any,
     loads: Loads,
-    closure: str = "compliant",
+    closure: str | Closure = "compliant",
     *,
     weights: ClosureWeights = ClosureWeights(),
     coefficients: Coefficients = Coefficients(),

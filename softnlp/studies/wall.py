@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.contact_settings import CLOSURES, ContactSettings
+from softnlp.contact_settings import CLOSURES, Closure, ContactSettings
 from softnlp.errors import InputError
 from softnlp.rod import Loads
 from softnlp.status import Status
@@ -62,7 +62,7 @@ def wall_of(contact: ContactSettings, rest: Array, furthest: Array) -> Wall:
 
 def checked_contact(contact: ContactSettings) -> ContactSettings:
     """Return the settings with a unit normal, or raise `InputError` naming what is not right."""
-    if contact.closure not in CLOSURES:
+    if contact.closure not in CLOSURES and not isinstance(contact.closure, Closure):
         raise InputError(f"expected one of {', '.join(CLOSURES)}, got {contact.closure!r}", key="closure")
     numbers = {"offset": contact.offset, "tip_cap": contact.tip_cap}
     for key, value in numbers.items():

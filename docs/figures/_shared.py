@@ -1,0 +1,103 @@
+"""What the scripts of this folder share: published numbers with their source, and tables as Markdown."""
+
+from __future__ import annotations
+
+import atexit
+import csv
+import io
+import shlex
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import chdir, redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from softnlp import BAR, load_scenario, run_scenario
+from softnlp.cli import main
+from softnlp.plots import run_figure
+from softnlp.results import view_of_run
+
+ROOT = Path(__file__).parents[2]
+SCENARIOS = ROOT / "scenarios"
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A published simulation of the six-chamber laparoscope robot: one set, Mooney-Rivlin; bar and degrees."""
+
+    silicone: str
+    pressure: float
+    angle: float
+
+
+# Shi et al., IEEE Transactions on Robotics 2025, doi 10.1109/TRO.2025.3626601
+PUBLISHED = (
+    Simulated("Ecoflex 00-10", 0.6, 111.6),
+    Simulated("Ecoflex 00-20", 0.8, 111.7),
+    Simulated("Ecoflex 00-30", 1.2, 113.4),
+    Simulated("Ecoflex 00-50", 1.8, 108.5),
+    Simulated("Dragon Skin 10", 3.0, 62.5),
+)
+# The same: least and largest elongation of the robots of one length, three sets at 1.5 bar, Ecoflex 00-50 [mm]
+MEASURED_ELONGATION = {"L60": (35.03, 42.31), "L40": (22.70, 25.11)}
+
+
+def measured(file: str, column: str) -> list[tuple[str, list[float], float]]:
+    """Return (robot, pressures [Pa], value) for each row of a shipped file that has a value."""
+    with open(SCENARIOS / "files" / file, newline="") as opened:
+        rows = list(csv.DictReader(opened))
+    return [
+        (row["robot"], [float(row[f"p{k}_bar"]) * BAR for k in (1, 2, 3)], float(row[column]))
+        for row in rows
+        if row[column]
+    ]
+
+
+def markdown(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """Return a table; columns of numbers are set to the right."""
+    cells = [[str(cell).replace("|", "\\|") for cell in row] for row in rows]
+    numeric = [all(cell[:1] in "+-0123456789*" for cell in column if cell) for column in zip(*cells, strict=True)]
+    align = ["--:" if is_number and k else "---" for k, is_number in enumerate(numeric)]
+    return "\n".join("| " + " | ".join(line) + " |" for line in [header, align, *cells])
+
+
+def figure_of(scenario: str, change: Callable[[Any], Any] = lambda asked: asked) -> Any:
+    """Return the figure of a scenario's run."""
+    return run_figure(view_of_run(run_scenario(change(load_scenario(SCENARIOS / scenario)))))
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a command printed, and the folder in which it ran."""
+
+    line: str
+    printed: str
+    folder: Path
+
+    @property
+    def block(self) -> str:
+        """The command and what it printed, as a reader sees it."""
+        return f"```text\n$ {self.line}\n{self.printed.rstrip()}\n```"
+
+
+def command(*lines: str) -> Done:
+    """Run commands as a person would at the top of the repository; what is kept is of the last one.
+
+    Raises
+    ------
+    RuntimeError
+        When a command does not end with status 0.
+    """
+    holder = tempfile.TemporaryDirectory()
+    atexit.register(holder.cleanup)
+    folder = Path(holder.name)
+    (folder / "scenarios").symlink_to(SCENARIOS)
+    said = io.StringIO()
+    for line in lines:
+        said = io.StringIO()
+        with chdir(folder), redirect_stdout(said):
+            status = main(shlex.split(line)[1:])
+        if status:
+            raise RuntimeError(f"{line}: status {status}")
+    return Done(lines[-1], said.getvalue(), folder)

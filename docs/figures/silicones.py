@@ -1,0 +1,9 @@
+"""The five laws of Ecoflex 00-50."""
+
+from softnlp import load_materials
+from softnlp.plots import material_figure
+
+
+def figure():
+    """Draw stress and modulus against stretch."""
+    return material_figure(list(load_materials()["Ecoflex 00-50"].models.values()))

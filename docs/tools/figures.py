@@ -1,0 +1,78 @@
+"""Figures and tables that scripts of docs/figures make.
+
+A script has `figure()`, which returns a matplotlib figure or the path of a PNG file, or `text()`, which returns
+Markdown, or both. A page shows them by a link to the script that stands alone in a paragraph, `[What it
+shows](figures/name.py)`: readers of the repository reach the script, readers of the site see what it makes.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import runpy
+import shutil
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+from docs.tools import cache
+
+DPI = 160
+_LINK = re.compile(r"^\[(?P<text>[^\]]+)\]\((?P<up>(?:\.\./)*)figures/(?P<name>\w+)\.py\)$", re.MULTILINE)
+
+
+def _folder(script: Path) -> Path:
+    return cache.kept(f"figures/{script.stem}", [script])
+
+
+def make_one(script: Path, kept: Path) -> None:
+    """Run a script and keep what it makes in a folder: figure.png and text.md."""
+
+    def build(folder: Path) -> None:
+        names = runpy.run_path(str(script))
+        if "text" in names:
+            (folder / "text.md").write_text(names["text"]().strip() + "\n")
+        if "figure" in names:
+            drawn = names["figure"]()
+            if isinstance(drawn, Path):
+                shutil.copyfile(drawn, folder / "figure.png")
+            else:
+                drawn.savefig(folder / "figure.png", dpi=DPI)
+
+    cache.make(kept, build)
+
+
+def make(scripts: Sequence[Path]) -> None:
+    """Run every script whose result is not kept, on all processors."""
+    todo = [script for script in scripts if not _folder(script).is_dir()]
+    if not todo:
+        return
+    workers = min(len(todo), os.cpu_count() or 1)
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        list(pool.map(make_one, todo, map(_folder, todo)))
+
+
+def _scripts() -> list[Path]:
+    return sorted((cache.ROOT / "docs" / "figures").glob("[!_]*.py"))
+
+
+def made() -> dict[str, bytes]:
+    """Return the images by their place in the site."""
+    files = {f"figures/{script.stem}.png": _folder(script) / "figure.png" for script in _scripts()}
+    return {uri: path.read_bytes() for uri, path in files.items() if path.is_file()}
+
+
+def shown(markdown: str, uri: str) -> str:
+    """Return a page with figures and tables in place of the links to their scripts."""
+
+    def replace(match: re.Match[str]) -> str:
+        folder = _folder(cache.ROOT / "docs" / "figures" / f"{match['name']}.py")
+        text, image = folder / "text.md", folder / "figure.png"
+        parts = [text.read_text()] if text.is_file() else []
+        if image.is_file():
+            link = f"{match['up']}figures/{match['name']}.png"
+            parts.append(f"[![{match['text']}]({link})]({link})")
+        return "\n".join(parts)
+
+    return _LINK.sub(replace, markdown)

@@ -1,0 +1,71 @@
+"""Notebooks, stored without outputs, run and turned into pages with them."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from docs.tools import cache
+
+
+def _folder(notebook: Path) -> Path:
+    return cache.kept(f"notebooks/{notebook.stem}", [notebook])
+
+
+def make(notebooks: Sequence[Path]) -> None:
+    """Run every notebook whose result is not kept, and keep it as a page with its images."""
+    for path in notebooks:
+        cache.make(_folder(path), lambda folder, path=path: _build(path, folder))  # type: ignore[misc]
+
+
+def run(path: Path) -> Any:
+    """Return a notebook after running it top to bottom in the top folder of the repository.
+
+    Raises
+    ------
+    nbclient.exceptions.CellExecutionError
+        Where a cell raises.
+    """
+    import nbformat
+    from jupyter_client import AsyncKernelManager
+    from nbclient import NotebookClient
+
+    notebook = nbformat.read(path, as_version=4)
+    kernel = AsyncKernelManager(kernel_name="python3", transport="ipc")
+    where = {"metadata": {"path": str(cache.ROOT)}}
+    NotebookClient(notebook, km=kernel, timeout=120, resources=where).execute()
+    return notebook
+
+
+def _build(path: Path, folder: Path) -> None:
+    parts = []
+    for number, cell in enumerate(run(path).cells):
+        if cell.cell_type == "markdown":
+            parts.append(re.sub(r"(\]\(\w+)\.ipynb\)", r"\1.md)", cell.source))
+            continue
+        parts.append(f"```python\n{cell.source}\n```")
+        for k, output in enumerate(cell.outputs):
+            parts.append(_shown(output, folder, f"{path.stem}_{number}_{k}"))
+    (folder / f"{path.stem}.md").write_text("\n\n".join(parts) + "\n")
+
+
+def _shown(output: Any, folder: Path, name: str) -> str:
+    """Return the Markdown of an output of a cell; an image is written into the folder."""
+    data = output.get("data", {})
+    if "image/png" in data:
+        (folder / f"{name}.png").write_bytes(base64.b64decode(data["image/png"]))
+        return f"![Output of the cell above]({name}.png)"
+    text = output.get("text") or data.get("text/markdown") or data.get("text/plain", "")
+    return text if "text/markdown" in data else f"```text\n{text.rstrip()}\n```"
+
+
+def made() -> dict[str, bytes]:
+    """Return pages and images by their place in the site."""
+    found = {}
+    for notebook in sorted((cache.ROOT / "docs" / "notebooks").glob("*.ipynb")):
+        for path in sorted(_folder(notebook).glob("*")):
+            found[f"notebooks/{path.name}"] = path.read_bytes()
+    return found
