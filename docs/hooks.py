@@ -10,17 +10,15 @@ ROOT = Path(__file__).parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-from docs.tools import figures, links, mathml, navigation, notebooks, paper  # noqa: E402
+from docs.tools import figures, links, mathml, notebooks, paper, work  # noqa: E402
 
 DOCS = ROOT / "docs"
 
 
 def on_config(config: Any) -> Any:
-    """Make what is computed, and leave pages out of the navigation that are not written yet."""
-    figures.make(sorted((DOCS / "figures").glob("[!_]*.py")))
-    notebooks.make(sorted((DOCS / "notebooks").glob("*.ipynb")))
-    paper.make()
-    config.nav = navigation.pruned(config.nav, navigation.existing(DOCS)) + paper.navigation()
+    """Make what is computed."""
+    work.do([*paper.jobs(), *notebooks.jobs(), *figures.jobs()])
+    config.nav += paper.navigation()
     return config
 
 

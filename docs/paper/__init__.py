@@ -37,7 +37,7 @@ def build(folder: Path, names: Sequence[str] = PAGES, *, cache: Path | None = No
         raise ValueError(f"unknown page {unknown[0]!r}; expected one of {', '.join(PAGES)}")
     folder.mkdir(parents=True, exist_ok=True)
     for count, name in enumerate(names, start=1):
-        for file in sorted(_built(name, cache or cache_folder()).iterdir()):
+        for file in sorted(built(name, cache or cache_folder()).iterdir()):
             shutil.copyfile(file, folder / file.name)
         if done is not None:
             done(count)
@@ -48,10 +48,15 @@ def pages(cache: Path | None = None) -> Iterator[tuple[str, str]]:
     """Yield the file name and the Markdown of every page, the index first; figures are written by `build`."""
     yield f"{INDEX}.md", _index()
     for name in PAGES:
-        yield f"{name}.md", (_built(name, cache or cache_folder()) / f"{name}.md").read_text(encoding="utf-8")
+        yield f"{name}.md", (built(name, cache or cache_folder()) / f"{name}.md").read_text(encoding="utf-8")
 
 
-def _built(name: str, cache: Path) -> Path:
+def titles() -> dict[str, str]:
+    """Return the title of each page by its name."""
+    return {name: title for name, (title, _) in _CONTENTS.items()}
+
+
+def built(name: str, cache: Path) -> Path:
     """Return the folder of a finished page, building it where it is not kept."""
     kept = cache / f"{name}-{digest()}"
     if not kept.is_dir():

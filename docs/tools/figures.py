@@ -7,16 +7,13 @@ shows](figures/name.py)`: readers of the repository reach the script, readers of
 
 from __future__ import annotations
 
-import os
 import re
 import runpy
 import shutil
-from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 
 from docs.tools import cache
+from docs.tools.work import Job
 
 DPI = 160
 _LINK = re.compile(r"^\[(?P<text>[^\]]+)\]\((?P<up>(?:\.\./)*)figures/(?P<name>\w+)\.py\)$", re.MULTILINE)
@@ -43,14 +40,10 @@ def make_one(script: Path, kept: Path) -> None:
     cache.make(kept, build)
 
 
-def make(scripts: Sequence[Path]) -> None:
-    """Run every script whose result is not kept, on all processors."""
-    todo = [script for script in scripts if not _folder(script).is_dir()]
-    if not todo:
-        return
-    workers = min(len(todo), os.cpu_count() or 1)
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        list(pool.map(make_one, todo, map(_folder, todo)))
+def jobs() -> list[Job]:
+    """Return what is to be done for the scripts whose result is not kept."""
+    folders = ((script, _folder(script)) for script in _scripts())
+    return [(make_one, (script, folder)) for script, folder in folders if not folder.is_dir()]
 
 
 def _scripts() -> list[Path]:

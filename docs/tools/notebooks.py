@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from docs.tools import cache
+from docs.tools.work import Job
 
 
 def _folder(notebook: Path) -> Path:
     return cache.kept(f"notebooks/{notebook.stem}", [notebook])
 
 
-def make(notebooks: Sequence[Path]) -> None:
-    """Run every notebook whose result is not kept, and keep it as a page with its images."""
-    for path in notebooks:
-        cache.make(_folder(path), lambda folder, path=path: _build(path, folder))  # type: ignore[misc]
+def jobs() -> list[Job]:
+    """Return what is to be done for the notebooks whose result is not kept."""
+    return [(make_one, (path,)) for path in _notebooks() if not _folder(path).is_dir()]
+
+
+def make_one(path: Path) -> None:
+    """Run a notebook, if its result is not kept, and keep it as a page with its images; raises as `run`."""
+    cache.make(_folder(path), lambda folder: _build(path, folder))
+
+
+def _notebooks() -> list[Path]:
+    return sorted((cache.ROOT / "docs" / "notebooks").glob("*.ipynb"))
 
 
 def run(path: Path) -> Any:
@@ -65,7 +73,7 @@ def _shown(output: Any, folder: Path, name: str) -> str:
 def made() -> dict[str, bytes]:
     """Return pages and images by their place in the site."""
     found = {}
-    for notebook in sorted((cache.ROOT / "docs" / "notebooks").glob("*.ipynb")):
+    for notebook in _notebooks():
         for path in sorted(_folder(notebook).glob("*")):
             found[f"notebooks/{path.name}"] = path.read_bytes()
     return found

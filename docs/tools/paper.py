@@ -1,48 +1,39 @@
-"""The pages that reproduce the paper, once the package docs.paper is there: `build(folder)` writes Markdown and PNG."""
+"""The pages that reproduce the paper, as docs.paper builds them."""
 
 from __future__ import annotations
 
-import re
-from importlib import import_module
+from functools import cache as once
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
+from docs import paper
 from docs.tools import cache
+from docs.tools.work import Job
 
-PACKAGE = cache.ROOT / "docs" / "paper"
-
-
-def _folder() -> Path:
-    return cache.kept("paper", PACKAGE.rglob("*.py"))
+FOLDER = cache.FOLDER / "paper"
 
 
-def make() -> None:
-    """Build the pages, if they are not kept."""
-    if (PACKAGE / "__init__.py").is_file():
-        cache.make(_folder(), lambda folder: import_module("docs.paper").build(folder))
+def jobs() -> list[Job]:
+    """Return what is to be done for the pages, the longest first; one that is kept takes no time."""
+    return [(make_one, (name,)) for name in paper.PAGES]
 
 
-def _files() -> dict[str, Path]:
-    if not (PACKAGE / "__init__.py").is_file():
-        return {}
-    folder = _folder()
-    found = (path for path in sorted(folder.rglob("*")) if path.suffix in (".md", ".png", ".svg", ".csv"))
-    return {f"paper/{path.relative_to(folder).as_posix()}": path for path in found}
+def make_one(name: str) -> None:
+    """Build a page, if it is not kept."""
+    paper.built(name, FOLDER)
 
 
+@once
 def made() -> dict[str, bytes]:
     """Return pages and images by their place in the site."""
-    return {uri: path.read_bytes() for uri, path in _files().items()}
+    with TemporaryDirectory() as folder:
+        paper.build(Path(folder), cache=FOLDER)
+        return {f"paper/{path.name}": path.read_bytes() for path in sorted(Path(folder).iterdir())}
 
 
 def navigation() -> list[dict[str, Any]]:
-    """Return the entry of the navigation: the index first, if there is one; each page under its heading."""
-    pages = {uri: path for uri, path in _files().items() if uri.endswith(".md")}
-    order = sorted(pages, key=lambda uri: (not uri.endswith(("/index.md", "/README.md")), uri))
-    entries = [{_heading(pages[uri]): uri} for uri in order]
-    return [{"The paper": entries}] if entries else []
-
-
-def _heading(page: Path) -> str:
-    match = re.search(r"^# (.+)$", page.read_text(), re.MULTILINE)
-    return match[1] if match else page.stem
+    """Return the entry of the navigation: the index, then each page under its title."""
+    entries: list[Any] = [f"paper/{paper.INDEX}.md"]
+    entries += [{title: f"paper/{name}.md"} for name, title in paper.titles().items()]
+    return [{"The paper": entries}]
