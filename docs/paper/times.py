@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks import paper_method
-from benchmarks.blocked import rod_at
 from benchmarks.numpy_field import numpy_field
 from benchmarks.paper_blocked import Weights, solve_blocked
 from benchmarks.paper_method import Rod, solve_pose
+from benchmarks.rods import Rods
 from docs.paper.blocked import raised
 from docs.paper.cases import case, law_of, model_of
 from docs.paper.figures import legend, named, panels, saved
@@ -118,7 +118,8 @@ def pose_times() -> dict[str, float]:
     scenario = case(f"bending_{robot_name()}")
     pressures, model = raised(scenario.pressures)[1::2], model_of(scenario)
     kept = PoseSolver(model, scenario.numerics)
-    rods = [rod_at(model, P) for P in pressures]
+    made = Rods(model)
+    rods = [made.at(P) for P in pressures]
     slow: dict[str, Callable[[], bool]] = {
         ARRAYS: lambda: _paper_poses(rods, numpy_field),
         "this package, first": lambda: _poses(PoseSolver(model, scenario.numerics), pressures),
@@ -135,7 +136,8 @@ def push_times() -> dict[str, float]:
     """Return the time of one blocked force by method [s]."""
     scenario = case("constraint_compliant")
     pressures, model = raised(scenario.pressures), model_of(scenario)
-    rods = [rod_at(model, P) for P in pressures]
+    made = Rods(model)
+    rods = [made.at(P) for P in pressures]
     contacts = [ContactSettings(closure=closure) for closure in ("compliant", "free")]
     kept = {c.closure: BlockedSolver(model, scenario.numerics, c) for c in contacts}
     slow: dict[str, Callable[[], bool]] = {
