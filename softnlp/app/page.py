@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 from nicegui import ui
 
@@ -136,8 +137,24 @@ def _panels(session: Session) -> None:
     ):
         panel = ui.expansion(label, value=opened).classes("w-full softnlp-panel")
         panel.props(f"dense header-class=font-semibold data-testid=panel-{name}")
-        with panel, ui.column().classes("w-full gap-2 pb-3"):
-            build(session)
+        with panel:
+            inside = ui.column().classes("w-full gap-2 pb-3")
+        _when_open(panel, inside, partial(build, session))
+
+
+def _when_open(panel: ui.expansion, inside: ui.element, build: Callable[[], None]) -> None:
+    """Build what is inside a panel when it is first open, so that the page is there sooner."""
+    built = False
+
+    def look() -> None:
+        nonlocal built
+        if panel.value and not built:
+            built = True
+            with inside:
+                build()
+
+    panel.on_value_change(look)
+    look()
 
 
 def _view_buttons(view: RobotView) -> None:

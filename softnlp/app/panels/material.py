@@ -68,7 +68,7 @@ class _MaterialPanel:
             self._numbers()
             self._curves()
         self.redraw = Redraw(self.root, self._draw)
-        self.move = Redraw(self.root, self._mark)
+        self.move = Redraw(self.root, self._mark, 0.25, at_rest=True)
         session.on_scenario(self._changed)
         session.on_pressure(self.move)
         on_dark(self._draw)
