@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 
 import pytest
 from hypothesis import Phase, settings
@@ -11,7 +10,7 @@ from hypothesis import Phase, settings
 # Always the same examples, and no time spent on making a failure small.
 settings.register_profile("mutation", derandomize=True, database=None, phases=(Phase.explicit, Phase.generate))
 
-# A mutant has to be found by the tests of its own module, not by a solve somewhere above it that happens to change.
+# A mutant has to be found by the tests of its own module, test_<module>.py, and not by a solve somewhere above it.
 TESTS_OF = {
     "formula": ("test_formula.py", "test_materials.py"),
     "laws": ("test_materials.py", "test_formula.py"),
@@ -19,13 +18,12 @@ TESTS_OF = {
 }
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Keep the tests of the mutated module, in the order of the files; all of them where nothing is mutated."""
+def pytest_configure(config: pytest.Config) -> None:
+    """Run all tests of the mutated module, whichever of them were seen to call the function.
+
+    What a law gives is traced once and kept, so the first test to use it would else be the only one.
+    """
     mutant = os.environ.get("MUTANT_UNDER_TEST", "")
-    if not mutant.startswith("softnlp."):
-        return
-    module = mutant.split(".")[1]
-    files: Sequence[str] = TESTS_OF.get(module, (f"test_{module}.py",))
-    kept = [item for name in files for item in items if item.path.name == name]
-    config.hook.pytest_deselected(items=[item for item in items if item not in kept])
-    items[:] = kept
+    if mutant.startswith("softnlp."):
+        module = mutant.split(".")[1]
+        config.args = [f"tests/{name}" for name in TESTS_OF.get(module, (f"test_{module}.py",))]
