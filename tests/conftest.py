@@ -23,7 +23,22 @@ def pytest_configure(config: pytest.Config) -> None:
 
     What a law gives is traced once and kept, so the first test to use it would else be the only one.
     """
-    mutant = os.environ.get("MUTANT_UNDER_TEST", "")
-    if mutant.startswith("softnlp."):
-        module = mutant.split(".")[1]
+    if _is_mutated():
+        module = os.environ["MUTANT_UNDER_TEST"].split(".")[1]
         config.args = [f"tests/{name}" for name in TESTS_OF.get(module, (f"test_{module}.py",))]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Run what takes one example before what takes many, where the first failure ends the run."""
+    if _is_mutated():
+        items.sort(key=lambda item: hasattr(getattr(item, "function", None), "hypothesis"))
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Call a mutant found that stops the tests from being imported; interrupted is what pytest calls that."""
+    if _is_mutated() and session.testsfailed:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def _is_mutated() -> bool:
+    return os.environ.get("MUTANT_UNDER_TEST", "").startswith("softnlp.")
