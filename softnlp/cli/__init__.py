@@ -55,6 +55,7 @@ def _app() -> App:
 
     from softnlp import __version__
     from softnlp.cli.design import design
+    from softnlp.cli.example import example
     from softnlp.cli.identify import identify
     from softnlp.cli.inverse import inverse
     from softnlp.cli.library import materials, robots
@@ -80,6 +81,7 @@ def _app() -> App:
     app.command(sensitivity)
     app.command(identify)
     app.command(design)
+    app.command(example)
     app.command(robots)
     app.command(materials)
     plot = App(name="plot", help="Draw a cross-section, silicones, or the results of a run.")
