@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from math import inf, pi
 
@@ -17,6 +18,7 @@ from softnlp.laws import function_law
 from softnlp.materials import Material
 from softnlp.quantities import (
     Model,
+    Quantity,
     contact_quantities,
     force_unit,
     quantities,
@@ -69,14 +71,14 @@ WALL = {
 
 
 @pytest.mark.parametrize(
-    ("found", "expected"),
-    [
-        (quantities(MODEL), EXPECTED),
-        (contact_quantities(MODEL), {f"contact.{name}": entry for name, entry in WALL.items()}),
-    ],
+    ("declare", "expected"),
+    [(quantities, EXPECTED), (contact_quantities, {f"contact.{name}": entry for name, entry in WALL.items()})],
     ids=["model", "contact"],
 )
-def test_every_quantity_has_its_unit_scale_bounds_and_value(found: dict, expected: dict) -> None:
+def test_every_quantity_has_its_unit_scale_bounds_and_value(
+    declare: Callable[[Model], Mapping[str, Quantity]], expected: Mapping[str, tuple[str, float, float, list[float]]]
+) -> None:
+    found = declare(MODEL)
     assert list(found) == list(expected)
     for name, (unit, scale, lower, nominal) in expected.items():
         q = found[name]
