@@ -1,4 +1,4 @@
-"""What changes where the tests run against mutants of the code (docs/mutation.md); nothing otherwise."""
+"""How hypothesis searches, and what changes where the tests run against mutants of the code (docs/mutation.md)."""
 
 from __future__ import annotations
 
@@ -7,8 +7,13 @@ import os
 import pytest
 from hypothesis import Phase, settings
 
-# Always the same examples, and no time spent on making a failure small.
-settings.register_profile("mutation", derandomize=True, database=None, phases=(Phase.explicit, Phase.generate))
+# How long an example takes says nothing where several programs share the processors.
+settings.register_profile("project", deadline=None)
+settings.load_profile("project")
+# For mutants: always the same examples, and no time spent on making a failure small.
+settings.register_profile(
+    "mutation", deadline=None, derandomize=True, database=None, phases=(Phase.explicit, Phase.generate)
+)
 
 # A mutant has to be found by the tests of its own module, test_<module>.py, and not by a solve somewhere above it.
 TESTS_OF = {
