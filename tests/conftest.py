@@ -16,11 +16,9 @@ settings.register_profile(
 )
 
 # A mutant has to be found by the tests of its own module, test_<module>.py, and not by a solve somewhere above it.
-TESTS_OF = {
-    "formula": ("test_formula.py", "test_materials.py"),
-    "laws": ("test_materials.py", "test_formula.py"),
-    "material_reading": ("test_materials.py",),
-}
+MATERIALS = ("test_material_lines.py", "test_formula.py", "test_materials.py")
+TESTS_OF = dict.fromkeys(("formula", "laws", "material_reading", "materials"), MATERIALS)
+LONG = "test_units_only_change_the_numbers"  # an integration, which a mutant of the field may make endless
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -36,7 +34,9 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Run what takes one example before what takes many, where the first failure ends the run."""
     if _is_mutated():
-        items.sort(key=lambda item: hasattr(getattr(item, "function", None), "hypothesis"))
+        items.sort(
+            key=lambda item: (item.name.startswith(LONG), hasattr(getattr(item, "function", None), "hypothesis"))
+        )
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
