@@ -12,13 +12,18 @@ settings.register_profile("project", deadline=None)
 settings.load_profile("project")
 # For mutants: always the same examples, and no time spent on making a failure small.
 settings.register_profile(
-    "mutation", deadline=None, derandomize=True, database=None, phases=(Phase.explicit, Phase.generate)
+    "mutation",
+    deadline=None,
+    derandomize=True,
+    database=None,
+    phases=(Phase.explicit, Phase.generate),
+    report_multiple_bugs=False,
 )
 
 # A mutant has to be found by the tests of its own module, test_<module>.py, and not by a solve somewhere above it.
 MATERIALS = ("test_material_lines.py", "test_formula.py", "test_materials.py")
 TESTS_OF = dict.fromkeys(("formula", "laws", "material_reading", "materials"), MATERIALS)
-LONG = "test_units_only_change_the_numbers"  # an integration, which a mutant of the field may make endless
+LONG = "test_units_only_change_the_numbers"
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -32,7 +37,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Run what takes one example before what takes many, where the first failure ends the run."""
+    """Run last what takes many examples, or long, where the first failure ends the run."""
     if _is_mutated():
         items.sort(
             key=lambda item: (item.name.startswith(LONG), hasattr(getattr(item, "function", None), "hypothesis"))

@@ -163,6 +163,22 @@ def test_hat_is_the_cross_product() -> None:
     np.testing.assert_allclose(np.asarray(rod.hat(ca.DM(a)) @ b).ravel(), np.cross(a, b), atol=1e-15)
 
 
+def test_every_entry_of_the_section_has_the_units_of_what_it_is() -> None:
+    design = random_design(np.random.default_rng(8))
+    w, L, F, g = design.section, 0.037, 0.21, np.array([1.0, -2.0, 9.0])
+    made = deform(design.robot, design.material, design.pressure, w.stretch, Coefficients())
+    own = rod.rod_section(made, 1070.0, g, L, F)
+    expected = {
+        "shear": w.GA / F, "axial": w.EA / F, "bending_x": w.EI[0] / (F * L**2), "bending_y": w.EI[1] / (F * L**2),
+        "torsion": w.GJ / (F * L**2), "pressure_force": w.F_P / F, "pressure_moment_x": w.M_P[0] / (F * L),
+        "pressure_moment_y": w.M_P[1] / (F * L), "load_x": 1070 * w.A * g[0] * L / F,
+        "load_y": 1070 * w.A * g[1] * L / F, "load_z": 1070 * w.A * g[2] * L / F,
+    }  # fmt: skip
+    assert own._fields == tuple(expected)
+    for name, value in expected.items():
+        assert float(getattr(own, name)) == pytest.approx(value, rel=1e-9, abs=1e-9), name
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_units_only_change_the_numbers(seed: int) -> None:
     # the same rod integrated in metres and newtons, and in its own units
