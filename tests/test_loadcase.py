@@ -15,10 +15,11 @@ from scipy.spatial.transform import Rotation
 from witness_section import Section as WitnessSection
 
 from softnlp import rod
-from softnlp.conventions import Coefficients
+from softnlp.conventions import AS_PRINTED, Coefficients
 from softnlp.loadcase import LoadCase, RodFunctions, load_case, rod_functions, unpack_section
 from softnlp.quantities import Model, Quantity, force_unit
 from softnlp.robot import ROBOTS
+from softnlp.section import deform, stretch_balance
 from softnlp.tip import DEAD_LOADS, tip_conditions
 from softnlp.transcription import Collocation, MultipleShooting
 
@@ -85,6 +86,22 @@ def test_the_constants_are_the_witness_s_section_in_the_units_of_the_robot(seed:
     assert further * case.F_0 > 1e-2 * case.design.section.F_P
     assert unpack_section(plain(c))._fields == rod.RodSection._fields
     assert list(unpack_section(plain(c))) == list(plain(c)[:11])
+
+
+def test_the_section_follows_the_model_s_coefficients_and_readings() -> None:
+    robot, coefficients = ROBOTS["D15L60"], Coefficients(0.3, 1.1, 0.97, 1.02, 0.2)
+    model = Model(robot, silicone("Ecoflex 00-30"), coefficients, AS_PRINTED)
+    functions = rod_functions(model)
+    values = {name: q.nominal for name, q in functions.declared().items()}
+    values["pressure"] = np.array([4e4, 2e4, 0.0])
+    c, balance, _ = functions.section(np.concatenate(list(values.values())), 1.2)
+    made = deform(robot, model.material, values["pressure"], 1.2, coefficients, AS_PRINTED)
+    F_0 = float(force_unit(model))
+    assert plain(c)[1] * F_0 == pytest.approx(float(made.axial_stiffness), rel=1e-12)
+    assert plain(c)[3] * F_0 * robot.length**2 == pytest.approx(float(made.bending_stiffness[1]), rel=1e-12)
+    expected = float(stretch_balance(made, coefficients, AS_PRINTED))
+    assert float(balance) * F_0 == pytest.approx(expected, rel=1e-12)
+    assert expected != pytest.approx(float(stretch_balance(made, coefficients)), rel=1e-3)
 
 
 def random_state(seed: int, section: WitnessSection) -> tuple[np.ndarray, np.ndarray]:

@@ -250,6 +250,12 @@ def test_the_line_of_a_value(text: str, line: str) -> None:
     assert line_of(lambda: parse_formula(text, [])(1.0)) == line
 
 
+def test_what_a_material_is_given_is_kept_as_floats() -> None:
+    made = Material("S", LAWS["linear"], {"E_l": 1}, density=1000, fitted_stretch=[1, 3])  # type: ignore[arg-type]
+    assert (made.fitted_stretch, made.density, dict(made.constants)) == ((1.0, 3.0), 1000.0, {"E_l": 1.0})
+    assert [type(x) for x in (made.fitted_stretch, made.density, made.constants["E_l"])] == [tuple, float, float]
+
+
 def test_what_is_shown_is_short() -> None:
     assert shown("a" * 78) == "'" + "a" * 78 + "'"
     assert shown("a" * 79) == "'" + "a" * 76 + "..."
