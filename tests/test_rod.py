@@ -139,6 +139,17 @@ def test_the_arc_stays_smooth_where_the_curvature_vanishes(seed: int, exponent: 
     assert np.all(np.isfinite(np.asarray(gradient(0.0))))
 
 
+def test_the_base_is_clamped_at_the_origin_upright() -> None:
+    case = drawn(11)
+    p, R, n, m = (np.asarray(ca.DM(part)) for part in rod.unpack(ca.DM(case.state)))
+    theirs = case.witness_state
+    np.testing.assert_array_equal(np.concatenate([p.ravel(), R.ravel(), n.ravel(), m.ravel()]), theirs[:18])
+    rows = np.asarray(rod.base_balance(ca.DM(case.state))).ravel()
+    assert rows.size == 12
+    np.testing.assert_array_equal(rows[:3], theirs[:3])
+    np.testing.assert_allclose(rows[3:].reshape(3, 3).T, theirs[3:12].reshape(3, 3) - np.eye(3), atol=1e-16)
+
+
 def test_the_tip_balance_is_the_witness_s() -> None:
     for seed in range(20):
         case = drawn(seed)
