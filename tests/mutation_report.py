@@ -12,6 +12,7 @@ import sys
 import tomllib
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 from mutmut.mutation.diff_apply import get_diff_for_mutant
 
@@ -28,10 +29,12 @@ def changed(mutant: str, module: str) -> tuple[str, str]:
     return " ".join(before), " ".join(after)
 
 
-def reason_of(reasons: list[dict[str, str]], module: str, before: str, after: str) -> dict[str, str] | None:
-    """Return the first reason whose texts stand in the lines."""
+def reason_of(reasons: list[dict[str, Any]], module: str, before: str, after: str) -> dict[str, Any] | None:
+    """Return the first reason that fits; `text = true` is for a change of quoted letters alone."""
+    spelt = after.replace("XX", "").casefold() == before.casefold()
     for reason in reasons:
-        if reason["module"] == module and reason["before"] in before and reason.get("after", "") in after:
+        fits = reason.get("module", module) == module and reason["before"] in before
+        if fits and reason.get("after", "") in after and (spelt or not reason.get("text")):
             return reason
     return None
 

@@ -22,7 +22,7 @@ from softnlp.transcription import (
 )
 
 C = 5.0  # x'' = -C sin x, swinging to 2 arcsin(K)
-CONSTANTS = [2.0, 2.5]  # C in two factors
+CONSTANTS = [2.0, 2.5, 1.0]  # C in three factors
 K = 0.85
 EULER = Tableau(a=((),), b=(1.0,), order=1)
 HEUN = Tableau(a=((), (1.0,)), b=(0.5, 0.5), order=2)
@@ -40,8 +40,8 @@ def named(method: Transcription) -> str:
 
 
 def pendulum() -> ca.Function:
-    x, c = ca.SX.sym("x", 2), ca.SX.sym("c", 2)
-    return ca.Function("pendulum", [x, c], [ca.vertcat(x[1], -c[0] * c[1] * ca.sin(x[0]))])
+    x, c = ca.SX.sym("x", 2), ca.SX.sym("c", 3)
+    return ca.Function("pendulum", [x, c], [ca.vertcat(x[1], -c[0] * c[1] * c[2] * ca.sin(x[0]))])
 
 
 def exact(s: np.ndarray) -> np.ndarray:
@@ -54,7 +54,7 @@ class Solved:
     """The pendulum's initial value problem on a grid, solved by Newton from a straight line."""
 
     def __init__(self, method: Transcription) -> None:
-        c = ca.MX.sym("c", 2)
+        c = ca.MX.sym("c", 3)
         self.posed: Transcribed = method.transcribe(pendulum(), c)
         x = self.posed.unknowns
         start = ca.DM(exact(np.zeros(1)))
@@ -110,9 +110,9 @@ def test_the_fine_equations_estimate_the_error(method: Transcription) -> None:
 
 @pytest.mark.parametrize("method", METHODS[2:], ids=named)
 def test_quadratures_converge_with_the_method(method: Transcription) -> None:
-    x, c = ca.SX.sym("x", 2), ca.SX.sym("c", 2)
+    x, c = ca.SX.sym("x", 2), ca.SX.sym("c", 3)
     # energy is constant; the integral of speed is the angle; of sin(angle), what the speed lost
-    quadrature = ca.Function("q", [x, c], [ca.vertcat(x[1] ** 2 / 2 - c[0] * c[1] * ca.cos(x[0]), x[1], ca.sin(x[0]))])
+    quadrature = ca.Function("q", [x, c], [ca.vertcat(x[1] ** 2 / 2 - c[0] * c[1] * c[2] * ca.cos(x[0]), x[1], ca.sin(x[0]))])
     angle, speed = exact(np.ones(1))[:, 0]
     start_speed = exact(np.zeros(1))[1, 0]
     expected = np.array([start_speed**2 / 2 - C, angle, (start_speed - speed) / C])
@@ -121,7 +121,7 @@ def test_quadratures_converge_with_the_method(method: Transcription) -> None:
         solved = Solved(method.with_intervals(K))
         inputs = ca.symvar(solved.posed.integrate(quadrature))
         f = ca.Function("f", inputs, [solved.posed.integrate(quadrature)])
-        given = [CONSTANTS if v.numel() == 2 else solved.x for v in inputs]
+        given = [CONSTANTS if v.numel() == 3 else solved.x for v in inputs]
         return float(np.abs(np.asarray(f(*given)).ravel() - expected).max())
 
     assert measured_order(error, 20 if method.order <= 4 else 4) > method.order - 0.2
@@ -171,7 +171,7 @@ def test_one_step_of_rk4_is_the_taylor_series_to_fourth_order() -> None:
 
 
 def test_a_quadrature_is_appended_to_the_state() -> None:
-    x, c = ca.SX.sym("x", 2), ca.SX.sym("c", 2)
+    x, c = ca.SX.sym("x", 2), ca.SX.sym("c", 3)
     both = with_quadrature(pendulum(), ca.Function("q", [x, c], [x[0] * x[1]]))
     found = np.asarray(both([0.3, 0.7, 99.0], CONSTANTS)).ravel()
     np.testing.assert_allclose(found, [0.7, -C * np.sin(0.3), 0.21], rtol=1e-15)
