@@ -112,7 +112,9 @@ def test_the_fine_equations_estimate_the_error(method: Transcription) -> None:
 def test_quadratures_converge_with_the_method(method: Transcription) -> None:
     x, c = ca.SX.sym("x", 2), ca.SX.sym("c", 3)
     # energy is constant; the integral of speed is the angle; of sin(angle), what the speed lost
-    quadrature = ca.Function("q", [x, c], [ca.vertcat(x[1] ** 2 / 2 - c[0] * c[1] * c[2] * ca.cos(x[0]), x[1], ca.sin(x[0]))])
+    quadrature = ca.Function(
+        "q", [x, c], [ca.vertcat(x[1] ** 2 / 2 - c[0] * c[1] * c[2] * ca.cos(x[0]), x[1], ca.sin(x[0]))]
+    )
     angle, speed = exact(np.ones(1))[:, 0]
     start_speed = exact(np.zeros(1))[1, 0]
     expected = np.array([start_speed**2 / 2 - C, angle, (start_speed - speed) / C])
