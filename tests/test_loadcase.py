@@ -196,6 +196,7 @@ def test_the_unloaded_arc_solves_every_equation(conditions: str, method: Any) ->
     rows, fine, scales, *rest = (np.asarray(value) for value in function(*at))
     outputs = dict(zip(made.outputs, rest, strict=False))
     assert made.name == "free"
+    assert made.functions is case.functions
     assert len(made.symbols) == 2 + bool(y)
     assert sum(s.numel() for s in made.symbols) == rows.size
     assert np.abs(rows).max() < 1e-5  # the discretisation's error in each interval
