@@ -136,7 +136,8 @@ def test_the_arc_stays_smooth_where_the_curvature_vanishes(seed: int, exponent: 
     found = np.asarray(rod.arc_state(ca.DM(1.0), straight)).ravel()
     k = np.hypot(u_x, u_y)  # u = (u_x, u_y, 0); to fourth order in k
     p = [u_y * (0.5 - k**2 / 24), -u_x * (0.5 - k**2 / 24), 1 - k**2 / 6 + k**4 / 120]
-    np.testing.assert_allclose(found[:3], p, rtol=0, atol=1e-15 + k**5)
+    cancelled = 4e-16 / k if k >= 1e-4 else 0.0  # of 1 - cos k, where no series takes its place
+    np.testing.assert_allclose(found[:3], p, rtol=0, atol=1e-15 + k**5 + cancelled)
     R = Rotation.from_rotvec([u_x, u_y, 0]).as_matrix()
     np.testing.assert_allclose(found[3:12].reshape(3, 3).T, R, rtol=0, atol=1e-15)
     gradient = ca.Function("g", [s := ca.SX.sym("s")], [ca.jacobian(rod.arc_state(s, straight), s)])
