@@ -43,15 +43,15 @@ def main() -> int:
     """Write the report; return 1 where something has no reason or too little was found."""
     reasons = tomllib.loads((ROOT / "tests" / "mutation_reasons.toml").read_text())["survivor"]
     rows, listed, lost, kinds = [], [], [], Counter[str]()
-    made = found = 0
+    made = found = left = 0
     for file in sorted((ROOT / "mutants" / "softnlp").rglob("*.py.meta")):
         module, codes = file.name.partition(".")[0], json.loads(file.read_text())["exit_code_by_key"]
         survivors = [mutant for mutant, code in codes.items() if code in SURVIVED]
-        unknown = [mutant for mutant, code in codes.items() if code not in (*SURVIVED, *FOUND, *SLOW)]
-        lost += [f"{mutant}: not run to its end ({codes[mutant]})" for mutant in unknown]
-        killed = len(codes) - len(survivors) - len(unknown)
-        rows.append(f"| `{module}` | {len(codes)} | {killed} | {len(survivors)} | {100 * killed / len(codes):.1f} % |")
-        made, found = made + len(codes), found + killed
+        killed = sum(code in (*FOUND, *SLOW) for code in codes.values())
+        run = killed + len(survivors)
+        share = f"{100 * killed / run:.1f} %" if run else ""
+        rows.append(f"| `{module}` | {len(codes)} | {killed} | {len(survivors)} | {len(codes) - run} | {share} |")
+        made, found, left = made + run, found + killed, left + len(codes) - run
         lines = []
         for mutant in survivors:
             before, after = changed(mutant, module)
@@ -70,11 +70,13 @@ def main() -> int:
         return 1
     counted = "; ".join(f"{kinds[kind]} {kind} ({text})" for kind, text in KINDS.items() if kinds[kind])
     text = (ROOT / "tests" / "mutation_head.md").read_text()
-    table = "\n".join(["| module | mutants | found | not found | |", "|---|---|---|---|---|", *rows])
-    total = f"| all | {made} | {found} | {made - found} | {100 * found / made:.1f} % |"
+    table = "\n".join(
+        ["| module | mutants | found | not found | not run | found of those run |", "|---|---|---|---|---|---|", *rows]
+    )
+    total = f"| all | {made + left} | {found} | {made - found} | {left} | {100 * found / made:.1f} % |"
     text += f"\n{table}\n{total}\n\n## Not found\n\n{counted}.\n\n" + "\n".join(listed)
     (ROOT / "docs" / "mutation.md").write_text(text.rstrip("\n") + "\n")
-    print(f"{found} of {made} found, {made - found} listed")
+    print(f"{found} of {made} found, {made - found} listed, {left} not run")
     return 0
 
 

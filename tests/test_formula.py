@@ -200,6 +200,8 @@ def test_numbers_that_cannot_be_evaluated_are_an_error_at_once(text: str, reason
 
 
 def test_the_limits_themselves_are_allowed() -> None:
+    check_constant_name("c" * MAX_LENGTH)
+    assert parse_formula("stretch + 0**0.5", [])(1.0) == 1.0  # a root of 0 is real
     deepest = parse_formula("stretch" + "+1" * (MAX_NESTING - 1), [])
     assert deepest(1.0) == MAX_NESTING
     longest = "+".join(["(stretch+1+1)"] * 40) + " " * (MAX_LENGTH - 40 * 14 + 1)

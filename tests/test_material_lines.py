@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from softnlp.errors import MaterialError
-from softnlp.formula import parse_formula, shown
+from softnlp.formula import Formula, parse_formula, shown
 from softnlp.laws import LAWS, formula_law, function_law
 from softnlp.materials import Material, load_materials, material, material_from_table
 
@@ -213,7 +213,7 @@ FORMULAS: list[tuple[Any, str]] = [
     ("stretch^2", "'^' is not allowed in a formula; a power is written **"),
     ("stretch;", f"';' is not allowed in a formula; {ALLOWED}"),
     ("é*stretch", f"'\\xe9' is not allowed in a formula; {ALLOWED}"),
-    ("stretch//2 + 1", f"'stretch//2' is not allowed in a formula; {ALLOWED}"),
+    ("1 + stretch//2 + 1", f"'stretch//2' is not allowed in a formula; {ALLOWED}"),
     ("stretch*c", "unknown name 'c' in the formula; known: stretch, a"),
     ("2*a", "the formula '2*a' does not use 'stretch'"),
     ("exp*stretch", "the function 'exp' needs an argument in parentheses"),
@@ -222,6 +222,7 @@ FORMULAS: list[tuple[Any, str]] = [
     ("exp()*stretch", "the function 'exp' takes one argument"),
     ("stretch*1e999", "a number in the formula is too large"),
     ("(", "'(' is not a formula: '(' was never closed"),
+    ("-" * 900 + "stretch", "'" + "-" * 76 + "... is not a formula: nested too deeply"),
     (
         "-" * 70 + "stretch",
         "the formula is nested too deeply: at most 64 levels, where each term of a long sum or product is one",
@@ -254,6 +255,10 @@ def test_what_a_material_is_given_is_kept_as_floats() -> None:
     made = Material("S", LAWS["linear"], {"E_l": 1}, density=1000, fitted_stretch=[1, 3])  # type: ignore[arg-type]
     assert (made.fitted_stretch, made.density, dict(made.constants)) == ((1.0, 3.0), 1000.0, {"E_l": 1.0})
     assert [type(x) for x in (made.fitted_stretch, made.density, made.constants["E_l"])] == [tuple, float, float]
+
+
+def test_a_formula_keeps_the_names_of_its_constants() -> None:
+    assert parse_formula(" b *  stretch + a", ["a", "b"]) == Formula("b * stretch + a", ("a", "b"))
 
 
 def test_what_is_shown_is_short() -> None:
