@@ -302,6 +302,8 @@ def test_loads_and_forces_of_the_tip_come_in_si() -> None:
     before = plain(function(*still)[0])
     case.values["tip_force"] = np.array([0.3, -0.2, 0.1])
     case.values["tip_moment"] = np.array([4e-3, 5e-3, -6e-3])
+    left_n, left_m = np.array([0.02, 0.01, -0.03]), np.array([1e-3, 2e-3, -1e-3])
+    case.values["contact.force_error"], case.values["contact.moment_error"] = left_n, left_m
     y = np.array([0.7, -0.4])
     results = function(*still[:2], y, *case.values.values())
     moved = plain(results[0]) - before
@@ -309,9 +311,9 @@ def test_loads_and_forces_of_the_tip_come_in_si() -> None:
     pressed = case.values["contact.pressed"]
     push, pull = y[0] * case.F_0 * np.array([1.0, 0.0, 0.0]), y[1] * case.F_0 * pressed
     arms = sum(np.cross([*d, 0.0], [0, 0, a]) for d, a in zip(case.design.section.d, pull, strict=True))
-    force = case.values["tip_force"] + push + pull.sum() * R[:, 2]
+    force = case.values["tip_force"] + push + pull.sum() * R[:, 2] + left_n
     np.testing.assert_allclose(moved[rows["tip force"]] * case.F_0, -force, rtol=1e-6)
-    moment = case.values["tip_moment"] + R @ arms
+    moment = case.values["tip_moment"] + R @ arms + left_m
     np.testing.assert_allclose(moved[rows["tip moment"]] * case.F_0 * case.L_0, -moment, rtol=1e-5, atol=1e-9)
     forces = dict(zip(made.outputs, results[3:], strict=False))["tip_forces"]
     np.testing.assert_allclose(plain(forces), y * case.F_0, rtol=1e-12)

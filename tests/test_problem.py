@@ -342,6 +342,8 @@ def test_a_value_for_what_is_not_fixed_is_refused() -> None:
         posed.problem.pack({"presure": PRESSURE})
     with pytest.raises(IllPosedError, match=r"'pressure' takes 3 numbers, got 2"):
         posed.problem.pack({"pressure": PRESSURE[:2]})
+    with pytest.raises(IllPosedError, match=r"'gravity' takes 3 numbers, got 2"):
+        posed.problem.pack({"gravity": [0.0, 1.0]})
     with pytest.raises(IllPosedError, match="not a free quantity"):
         posed.problem.pack_free({"pressure": PRESSURE})
     np.testing.assert_array_equal(posed.problem.pack({"pressure": 2.0})[:3], 2.0)
