@@ -10,19 +10,24 @@ import pytest
 from designs import silicone
 
 from softnlp import (
+    Coefficients,
     ContactSettings,
     InputError,
     Loads,
     Measurements,
     Numerics,
     blocked_force,
+    compliance_ellipsoid,
     constrained_pose,
     force_against_offset,
     forward,
     identify,
     inverse,
+    manipulability,
+    monte_carlo,
     pressure_for_force,
     sensitivities,
+    stiffness_ellipsoid,
     weight_sensitivity,
 )
 from softnlp.robot import ROBOTS
@@ -80,6 +85,48 @@ def test_an_argument_is_refused_by_name(key: str, reason: str, call: Callable[[]
         call()
     assert caught.value.key == key
     assert reason in caught.value.message
+
+
+def test_what_is_not_solved_has_no_ellipsoids_and_nothing_to_draw() -> None:
+    # beyond the limit pressure there is no equilibrium: names and units are there, numbers are not
+    lost = sensitivities(
+        ROBOT,
+        silicone("Ecoflex 00-30", "yeoh"),
+        [5e6, 0, 0],
+        outputs=("tip_position", "tip_rotation"),
+        by=("pressure", "tip_force", "tip_moment"),
+        coefficients=Coefficients(elongation=0.0),
+    )
+    assert not lost.step.status.has_solution
+    assert not lost.solved
+    assert lost.matrix.shape == (6, 9)
+    found = manipulability(lost)
+    assert np.isnan([found.measure, found.isotropy, *found.translation.semi_axes]).all()
+    for ellipsoid in (
+        compliance_ellipsoid(lost),
+        stiffness_ellipsoid(lost),
+        stiffness_ellipsoid(lost, rotation_held=True),
+    ):
+        assert np.isnan(ellipsoid.semi_axes).all()
+        assert np.isnan(ellipsoid.axes).all()
+    for tolerances, key, reason in (
+        ({}, "tolerances", "at least one tolerance"),
+        ({"pressure": 1e3}, "sensitivities", "a step with a solution"),
+        ({"presure": 1e3}, None, "did you mean 'pressure"),
+    ):
+        with pytest.raises(InputError, match=reason) as caught:
+            monte_carlo(lost, tolerances)
+        assert key is None or caught.value.key == key
+
+
+def test_a_draw_needs_two_samples() -> None:
+    found = sensitivities(ROBOT, SOFT, [1e4, 0, 0], numerics=Numerics(intervals=8))
+    with pytest.raises(InputError, match="at least 2 samples, got 1"):
+        monte_carlo(found, {"pressure": 1e2}, 1)
+    seen: list[int] = []
+    drawn = monte_carlo(found, {"pressure": 1e2}, 2, progress=seen.append)
+    assert (drawn.asked, drawn.solved, seen) == (2, 2, [1, 2])
+    assert np.isfinite(drawn.deviation).all()
 
 
 def test_times_and_progress_go_with_each_blocked_step() -> None:
