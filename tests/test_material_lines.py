@@ -260,6 +260,20 @@ def test_a_formula_keeps_the_names_of_its_constants() -> None:
     assert parse_formula(" b *  stretch + a", ["a", "b"]) == Formula("b * stretch + a", ("a", "b"))
 
 
+def test_a_law_of_ones_own_takes_its_constants_as_they_are_written() -> None:
+    law = formula_law("m", "c * (stretch - 1)", ["c"])
+    assert [(c.name, c.unit, c.file_key, c.scale) for c in law.constants] == [("c", "1", "c", 1.0)]
+    entry = load_materials("s.toml")["S"]
+    assert (entry.source, dict(entry.derived)) == ("", {})
+
+
+def test_a_long_reason_is_cut() -> None:
+    def long(stretch: Any) -> Any:
+        raise ValueError("b" * 300)
+
+    assert f"(ValueError: {'b' * 200}); use" in line_of(lambda: function_law("m", long, []))
+
+
 def test_what_is_shown_is_short() -> None:
     assert shown("a" * 78) == "'" + "a" * 78 + "'"
     assert shown("a" * 79) == "'" + "a" * 76 + "..."
