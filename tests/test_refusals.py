@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -76,6 +77,21 @@ REFUSED: list[tuple[str, str, Callable[[], Any]]] = [
     ("measurements", "at least one robot", lambda: identify([], SOFT, ["k_b"])),
     ("free", "cannot determine 2 constants", lambda: identify(MEASURED, SOFT, ["k_b", "C10"])),
     ("measurements", "at least one number", lambda: identify(Measurements(ROBOT, [ONE]), SOFT, ["k_b"])),
+    ("tip_force", "expected three numbers", lambda: forward(ROBOT, SOFT, ONE, loads=Loads(tip_force="much"))),
+    ("gravity", "three finite numbers", lambda: forward(ROBOT, SOFT, ONE, loads=Loads(gravity=(0.0, 0.0)))),
+    ("positions", "", lambda: inverse(ROBOT, SOFT, positions="there")),
+    ("directions", "", lambda: inverse(ROBOT, SOFT, directions=[0.0, 1.0])),
+    ("offset", "a finite length", lambda: blocked_force(ROBOT, SOFT, ONE, ContactSettings(offset=np.nan))),
+    ("tip_cap", "not negative", lambda: blocked_force(ROBOT, SOFT, ONE, ContactSettings(tip_cap=-1e-3))),
+    ("wall_normal", "or neither", lambda: blocked_force(ROBOT, SOFT, ONE, ContactSettings(wall_point=(0, 0, 0)))),
+    ("weights.force", "a weight above 0", lambda: blocked_force(ROBOT, SOFT, ONE, weighted(force=0.0))),
+    (
+        "wall_point",
+        "",
+        lambda: blocked_force(ROBOT, SOFT, ONE, ContactSettings(wall_point=(0, 0), wall_normal=(1, 0, 0))),  # type: ignore[arg-type]
+    ),
+    ("weight", "not negative", lambda: identify(replace(MEASURED, weight=[-1.0]), SOFT, ["k_b"])),
+    ("bending_angle", "", lambda: identify(replace(MEASURED, bending_angle="wide"), SOFT, ["k_b"])),
 ]
 
 
@@ -117,6 +133,17 @@ def test_what_is_not_solved_has_no_ellipsoids_and_nothing_to_draw() -> None:
         with pytest.raises(InputError, match=reason) as caught:
             monte_carlo(lost, tolerances)
         assert key is None or caught.value.key == key
+
+
+def test_a_blocked_force_without_an_equilibrium_says_so() -> None:
+    soft = silicone("Ecoflex 00-30", "yeoh")
+    free = Coefficients(elongation=0.0)
+    run = blocked_force(ROBOT, soft, [5e6, 0, 0], coefficients=free, numerics=Numerics(intervals=8))
+    assert [step.pose for step in run.failed] == [None]
+    loaded = blocked_force(
+        ROBOT, soft, [5e6, 0, 0], coefficients=free, loads=Loads((0.01, 0, 0)), numerics=Numerics(intervals=8)
+    )
+    assert loaded.steps[0].status is run.steps[0].status
 
 
 def test_a_draw_needs_two_samples() -> None:
