@@ -38,7 +38,16 @@ class Closure:
 class ClosureWeights:
     """Weights of the `weighted` closure; None leaves the choice to the study.
 
-    force : W_n [1/N]. moment : W_m [1/(N m)]. length : W_L [1/m]. position : W_h [1/m]; None holds e_h = 0 exactly.
+    Attributes
+    ----------
+    force
+        W_n of the force left over [1/N].
+    moment
+        W_m of the moment left over [1/(N m)].
+    length
+        W_L of the length error [1/m].
+    position
+        W_h of the contact point [1/m]; None holds e_h = 0 exactly.
     """
 
     force: float | None = None
@@ -51,11 +60,20 @@ class ClosureWeights:
 class ContactSettings:
     """Where the wall stands and how the pressurised chambers react to it.
 
-    offset : h, horizontal position at which the tip is held, along x [m]; unused when a wall is given.
-    tip_cap : L_t, length of the rigid cap on the tip [m]. closure : which equations close the problem, by name or as a
-    `Closure` of your own.
-    wall_point, wall_normal : a wall anywhere, world frame, a point [m] and a unit vector; both or neither.
-    weights : of the `weighted` closure.
+    Attributes
+    ----------
+    offset
+        h, horizontal position at which the tip is held, along x [m]; unused when a wall is given.
+    tip_cap
+        L_t, length of the rigid cap on the tip [m].
+    closure
+        Which equations close the problem, by name or as a `Closure` of your own.
+    wall_point
+        (3,) a point of a wall anywhere, world frame [m]; given with `wall_normal` or not at all.
+    wall_normal
+        (3,) the unit vector in which that wall pushes, world frame [1].
+    weights
+        Of the `weighted` closure.
     """
 
     offset: float = 0.0

@@ -10,10 +10,16 @@ from typing import Any
 class Conventions:
     """How ambiguous equations are read.
 
-    name : shown in every result.
-    stiffening_opposes_pressure : sign of the stiffening force in Eq. (10); the printed sign adds to the pressure.
-    fibre_thickness : t_f of (S3), (S4), (S6) [m].
-    mean_pressure : Eq. (12) with the mean pressure over all chambers, or with each chamber's own.
+    Attributes
+    ----------
+    name
+        Shown in every result.
+    stiffening_opposes_pressure
+        Sign of the stiffening force in Eq. (10); the printed sign adds to the pressure.
+    fibre_thickness
+        t_f of (S3), (S4), (S6) [m].
+    mean_pressure
+        Eq. (12) with the mean pressure over all chambers, or with each chamber's own.
     """
 
     name: str
@@ -23,7 +29,11 @@ class Conventions:
 
 
 REPRODUCTION = Conventions("reproduction", True, 0.0, True)
+"""The readings that reproduce the published simulations; the default."""
+
 AS_PRINTED = Conventions("as_printed", False, 0.1e-3, False)
+"""The equations as they are printed."""
+
 CONVENTIONS = {c.name: c for c in (REPRODUCTION, AS_PRINTED)}
 
 
@@ -31,12 +41,20 @@ CONVENTIONS = {c.name: c for c in (REPRODUCTION, AS_PRINTED)}
 class Coefficients:
     """Dimensionless coefficients; each may be a number or a symbol.
 
-    elongation : k_e, axial stiffening, Eqs. (10), (11).
-    bending : k_b, bending stiffening, Eq. (12).
-    area : k_a, multiplies A_0.
-    inertia : k_i, multiplies the material's I.
-    bore_fraction : phi in 0..1, how far beyond the bore towards the thread the pressure acts.
-    chamber_reaction : k_c of the `compliant` closure of the blocked force.
+    Attributes
+    ----------
+    elongation
+        k_e, axial stiffening, Eqs. (10), (11); a number [1].
+    bending
+        k_b, bending stiffening, Eq. (12); a number [1].
+    area
+        k_a, multiplies A_0; a number [1].
+    inertia
+        k_i, multiplies the material's I; a number [1].
+    bore_fraction
+        phi in 0..1, how far beyond the bore towards the thread the pressure acts; a number [1].
+    chamber_reaction
+        k_c of the `compliant` closure of the blocked force; a number [1].
     """
 
     elongation: Any = 0.41
@@ -51,3 +69,4 @@ COEFFICIENT_SETS = {
     "reproduction": Coefficients(),
     "calibrated": Coefficients(elongation=0.427, bending=2.51, bore_fraction=0.369, chamber_reaction=0.943),
 }
+"""By name: "reproduction" is the default, "calibrated" was fitted to the measured forces and angles together."""

@@ -35,7 +35,18 @@ class InputError(SoftnlpError, ValueError):
         super().__init__(self.__str__())
 
     def located(self, *, source: str | None = None, table: str | None = None, key: str | None = None) -> InputError:
-        """Return the same error with the places that it did not yet know filled in."""
+        """Return the same error with the places that it did not yet know filled in.
+
+        Parameters
+        ----------
+        source, table, key
+            The file, the table in it and the key in that; None leaves one as it is.
+
+        Returns
+        -------
+        InputError
+            Of the same class and with the same message.
+        """
         return type(self)(
             self.message,
             source=self.source or source,

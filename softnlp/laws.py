@@ -28,7 +28,15 @@ _ADVICE = "use operators and casadi functions such as casadi.exp, no numpy or ma
 
 @dataclass(frozen=True)
 class Constant:
-    """A constant of a law. `unit` is the one it has in files, "MPa" or "1"; inside the package it is in Pa or 1."""
+    """A constant of a law; in Pa or 1 inside the package.
+
+    Attributes
+    ----------
+    name
+        As the law's formula has it.
+    unit
+        The one it has in files, "MPa" or "1".
+    """
 
     name: str
     unit: str
@@ -40,12 +48,20 @@ class Constant:
 
     @property
     def scale(self) -> float:
-        """SI value of one file unit."""
+        """SI value of one file unit, [Pa] or [1]."""
         return 1.0 if self.unit == "1" else MEGAPASCAL
 
 
 class LawFunctions(NamedTuple):
-    """`casadi.Function`s of (stretch, constants in law order); each argument is a scalar."""
+    """`casadi.Function`s of (stretch, constants in law order); each argument is a scalar.
+
+    Attributes
+    ----------
+    engineering_stress, true_stress
+        Stress, a number [Pa].
+    tangent_modulus
+        E_t, a number [Pa].
+    """
 
     engineering_stress: Any
     true_stress: Any
@@ -56,8 +72,16 @@ class LawFunctions(NamedTuple):
 class Law:
     """A stress-stretch law.
 
-    formula : formula(stretch, **constants) -> engineering stress [Pa], of operators and casadi functions only.
-    modulus : modulus(stretch, **constants) -> tangent modulus [Pa], for a law where it is not that of Eq. (24),
+    Attributes
+    ----------
+    name
+        As files and scenarios call it.
+    constants
+        In the order in which its functions take them.
+    formula
+        formula(stretch, **constants) -> engineering stress [Pa], of operators and casadi functions only.
+    modulus
+        modulus(stretch, **constants) -> tangent modulus [Pa], for a law where it is not that of Eq. (24),
         d(true stress)/d(stretch).
     """
 
@@ -130,10 +154,26 @@ class _InPascal:
 
 
 def formula_law(name: str, formula: str, constants: Iterable[str]) -> Law:
-    """Return a law from text such as `"c * (stretch - stretch**-2)"`, engineering stress in MPa.
+    """Return a law from text such as `"c * (stretch - stretch**-2)"`.
 
-    `constants` are the names that the text uses beside `stretch`; their values go in as the text means them (unit "1").
-    Raises `MaterialError` with the key "formula" (`softnlp.formula` says what a formula may hold).
+    Parameters
+    ----------
+    name
+        Of the law; not that of a built-in one.
+    formula
+        Engineering stress in MPa; `softnlp.formula` says what it may hold.
+    constants
+        The names that the text uses beside `stretch`; their values go in as the text means them (unit "1").
+
+    Returns
+    -------
+    Law
+        In Pa, as every law.
+
+    Raises
+    ------
+    MaterialError
+        With the key "formula" where it is not a formula of these names.
     """
     names = _own_names(name, constants)
     try:
@@ -145,9 +185,26 @@ def formula_law(name: str, formula: str, constants: Iterable[str]) -> Law:
 
 
 def function_law(name: str, function: Callable[..., Any], constants: Iterable[str]) -> Law:
-    """Return a law from a Python function(stretch, **constants) of operators and casadi functions, in MPa.
+    """Return a law from a Python function, which is called once, with symbols.
 
-    The function is called once, with symbols; constants as in `formula_law`. Raises `MaterialError`.
+    Parameters
+    ----------
+    name
+        Of the law; not that of a built-in one.
+    function
+        function(stretch, **constants) -> engineering stress in MPa, of operators and casadi functions.
+    constants
+        The names of its other arguments, as in `formula_law`.
+
+    Returns
+    -------
+    Law
+        In Pa, as every law.
+
+    Raises
+    ------
+    MaterialError
+        For a function that is no expression of the stretch.
     """
     names = _own_names(name, constants)
     with _naming(name):

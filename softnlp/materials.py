@@ -6,24 +6,29 @@ read. Every error of a file or table is one line that names the file, the table 
 
 from __future__ import annotations
 
-import json
-import re
-import tomllib
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from numbers import Real
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from softnlp.errors import MaterialError, nearest
 from softnlp.formula import check_constant_name, shown
 from softnlp.laws import LAWS, SYMBOLS, Constant, Law, evaluate, formula_law, function_law
+from softnlp.material_reading import (
+    check_keys,
+    file_label,
+    located,
+    number,
+    quoted,
+    read_table,
+    stretch_range,
+    text_of,
+    unreadable,
+)
 from softnlp.units import MEGAPASCAL
 
 __all__ = [
@@ -41,7 +46,6 @@ __all__ = [
 
 DENSITY = 1070.0  # of a silicone whose file gives none [kg/m^3]
 FITTED_STRETCH = (1.0, 2.0)  # where the published constants were fitted
-MAX_FILE_SIZE = 1_000_000  # bytes
 _CHECK_POINTS = 101  # stretches at which a law's stress must be finite
 _ENTRY_KEYS = ("density_kg_m3", "fitted_stretch", "source")
 
@@ -53,12 +57,22 @@ class Material:
     Numbers give a float; numpy arrays, in the stretch or a constant, an array of their broadcast shape; CasADi values
     (SX, MX, DM), in either, an expression, elementwise where they are matrices.
 
-    constants : by name, in SI, each a number, an array or a symbol; kept in law order, read-only.
-    density : [kg/m^3]. fitted_stretch : range of stretch that the constants were fitted on.
-
     Raises `MaterialError` for a constant that is missing, unknown or not finite and, where no constant is a symbol, for
     a law whose stress at stretch 1 is not 0, whose tangent modulus there is not positive, or whose stress is not finite
     over the fitted range.
+
+    Attributes
+    ----------
+    name
+        Of the silicone.
+    law
+        Stress against stretch.
+    constants
+        By name, each a number, an array or a symbol [SI]; kept in law order, read-only.
+    density
+        A number [kg/m^3].
+    fitted_stretch
+        (2,) range of stretch that the constants were fitted on [1].
     """
 
     name: str
@@ -69,12 +83,12 @@ class Material:
 
     def __post_init__(self) -> None:
         names = [c.name for c in self.law.constants]
-        _check_keys(self.constants, names, what=f"constant of law {shown(self.law.name)}")
-        constants = {name: _number(self.constants[name], name) for name in names}
+        check_keys(self.constants, names, what=f"constant of law {shown(self.law.name)}")
+        constants = {name: number(self.constants[name], name) for name in names}
         # Frozen and read-only, so that constants cannot change behind the checks.
         object.__setattr__(self, "constants", MappingProxyType(constants))
-        object.__setattr__(self, "density", _number(self.density, "density", positive=True))
-        object.__setattr__(self, "fitted_stretch", _stretch_range(self.fitted_stretch))
+        object.__setattr__(self, "density", number(self.density, "density", positive=True))
+        object.__setattr__(self, "fitted_stretch", stretch_range(self.fitted_stretch))
         if not any(isinstance(value, SYMBOLS) for value in constants.values()):
             _check_response(self)
 
@@ -83,28 +97,80 @@ class Material:
         return type(self), (self.name, self.law, dict(self.constants), self.density, self.fitted_stretch)
 
     def engineering_stress(self, stretch: Any) -> Any:
-        """Return sigma_e [Pa] (Table II), force over undeformed area."""
+        """Return sigma_e (Table II), force over undeformed area.
+
+        Parameters
+        ----------
+        stretch
+            A number, an array or a symbol [1].
+
+        Returns
+        -------
+        float, array or expression
+            A number, or of the shape of the arguments [Pa].
+        """
         return evaluate(self.law.functions.engineering_stress, stretch, *self.constants.values())
 
     def true_stress(self, stretch: Any) -> Any:
-        """Return sigma_t = stretch * sigma_e [Pa], force over deformed area."""
+        """Return sigma_t = stretch * sigma_e, force over deformed area.
+
+        Parameters
+        ----------
+        stretch
+            A number, an array or a symbol [1].
+
+        Returns
+        -------
+        float, array or expression
+            A number, or of the shape of the arguments [Pa].
+        """
         return evaluate(self.law.functions.true_stress, stretch, *self.constants.values())
 
     def tangent_modulus(self, stretch: Any) -> Any:
-        """Return E_t = d sigma_t / d stretch [Pa], Eq. (24); E_l for the linear law."""
+        """Return E_t = d sigma_t / d stretch, Eq. (24); E_l for the linear law.
+
+        Parameters
+        ----------
+        stretch
+            A number, an array or a symbol [1].
+
+        Returns
+        -------
+        float, array or expression
+            A number, or of the shape of the arguments [Pa].
+        """
         return evaluate(self.law.functions.tangent_modulus, stretch, *self.constants.values())
 
     def shear_modulus(self, stretch: Any) -> Any:
-        """Return G = E_t / 3 [Pa], incompressible."""
+        """Return G = E_t / 3, incompressible.
+
+        Parameters
+        ----------
+        stretch
+            A number, an array or a symbol [1].
+
+        Returns
+        -------
+        float, array or expression
+            A number, or of the shape of the arguments [Pa].
+        """
         return self.tangent_modulus(stretch) / 3
 
 
 @dataclass(frozen=True, eq=False)
 class MaterialEntry:
-    """A silicone of a materials file: `models` has a checked `Material` for each law the file gives constants of.
+    """A silicone of a materials file.
 
-    source : where the constants come from, "" if not said. derived : by law, how constants that were not published were
-    found.
+    Attributes
+    ----------
+    name
+        Of the silicone.
+    source
+        Where the constants come from, "" if not said.
+    models
+        A checked `Material` for each law that the file gives constants of.
+    derived
+        By law, how constants that were not published were found.
     """
 
     name: str
@@ -114,20 +180,33 @@ class MaterialEntry:
 
 
 def load_materials(path: str | PathLike[str] | None = None) -> Mapping[str, MaterialEntry]:
-    """Return the silicones of a materials file by name, in the file's order; of the shipped one without a path.
+    """Return the silicones of a materials file by name, in the file's order.
 
-    Raises `MaterialError` with source, table and key for the first thing in the file that is not right.
+    Parameters
+    ----------
+    path
+        A TOML file; the shipped one by default.
+
+    Returns
+    -------
+    Mapping
+        `MaterialEntry` by name, read-only.
+
+    Raises
+    ------
+    MaterialError
+        With source, table and key of the first thing in the file that is not right.
     """
     file = _shipped_file() if path is None else path
     entries = {}
-    with _located(source=_label(file)):
-        data = _read(file)
+    with located(source=file_label(file)):
+        data = read_table(file)
         if not data:
             raise MaterialError('it is empty; expected a table for each silicone, such as ["Ecoflex 00-50"]')
         for name, table in data.items():
             if not isinstance(table, Mapping):
-                raise MaterialError(f"expected a table of a silicone, got {shown(table)}", key=_quoted(name))
-            with _located(table=_quoted(name)):
+                raise MaterialError(f"expected a table of a silicone, got {shown(table)}", key=quoted(name))
+            with located(table=quoted(name)):
                 entries[name] = _entry(name, table)
     return MappingProxyType(entries)
 
@@ -137,15 +216,32 @@ def material(
 ) -> Material:
     """Return a silicone with one of its laws, from the shipped file or one of the same form.
 
-    density : [kg/m^3], in place of the file's. Raises `MaterialError` with the nearest known name.
+    Parameters
+    ----------
+    name, model
+        Of the silicone and of the law.
+    file
+        A materials file, the shipped one by default.
+    density
+        In place of the file's, a number [kg/m^3].
+
+    Returns
+    -------
+    Material
+        Checked.
+
+    Raises
+    ------
+    MaterialError
+        With the nearest known name.
     """
     entries = load_materials(file)
-    where = "" if file is None else f" in {_label(file)}"
+    where = "" if file is None else f" in {file_label(file)}"
     if not isinstance(name, str) or name not in entries:
         raise MaterialError(f"unknown silicone {shown(name)}{where}{nearest(str(name), entries)}", key="name")
     models = entries[name].models
     if not isinstance(model, str) or model not in models:
-        no_such = f"{_quoted(name)} has no constants of law" if model in list(LAWS) else "unknown law"
+        no_such = f"{quoted(name)} has no constants of law" if model in list(LAWS) else "unknown law"
         raise MaterialError(f"{no_such} {shown(model)}{where}{nearest(str(model), models)}", key="model")
     return models[model] if density is None else replace(models[model], density=density)
 
@@ -159,13 +255,13 @@ def material_from_table(table: Mapping[str, Any], *, folder: str | PathLike[str]
 
     `density_kg_m3` is optional in each, `fitted_stretch` in the last two. Raises `MaterialError` with table and key.
     """
-    with _located(table="material"):
+    with located(table="material"):
         own = isinstance(table, Mapping) and ("constants" in table or "formula" in table)
         if own and "file" in table:
             raise MaterialError("constants come from a file or from this table, not from both", key="file")
         optional = ("constants", "formula", "fitted_stretch") if own else ("file",)
-        _check_keys(table, ("name", "model"), ("density_kg_m3", *optional))
-        name, model = _text(table, "name"), _text(table, "model")
+        check_keys(table, ("name", "model"), ("density_kg_m3", *optional))
+        name, model = text_of(table, "name"), text_of(table, "model")
         given = _given(table)
         if own:
             if "formula" in table and model in LAWS:
@@ -174,22 +270,13 @@ def material_from_table(table: Mapping[str, Any], *, folder: str | PathLike[str]
                 raise MaterialError(_unknown_law(model), key="model")
             law, constants = _law_with_constants(model, table, "material.constants")
             return _checked(name, law, constants, given, "material" if "formula" in table else "material.constants")
-        file = Path(folder, _text(table, "file")) if "file" in table else None
-        if file and (problem := _unreadable(file)):
-            raise MaterialError(f"{_label(file)}: {problem}", key="file")
+        file = Path(folder, text_of(table, "file")) if "file" in table else None
+        if file and (problem := unreadable(file)):
+            raise MaterialError(f"{file_label(file)}: {problem}", key="file")
         return material(name, model, file=file, density=given.get("density"))
 
 
 # --- reading tables ---------------------------------------------------------------------------------------------------
-
-
-@contextmanager
-def _located(*, source: str | None = None, table: str | None = None, key: str | None = None) -> Iterator[None]:
-    """Add the place to a `MaterialError` that passes; one that names its file knows its table already."""
-    try:
-        yield
-    except MaterialError as error:
-        raise (error if error.source else error.located(source=source, table=table, key=key)) from None
 
 
 def _shipped_file() -> Path:
@@ -198,63 +285,28 @@ def _shipped_file() -> Path:
     return installed if installed.is_file() else Path(__file__).parents[1] / "materials.toml"
 
 
-def _label(file: Any) -> str:
-    text = str(file)
-    return text if isinstance(file, str | PathLike) and text.isprintable() else shown(file)
-
-
-def _unreadable(file: Path) -> str | None:
-    """Return why a file cannot be opened as a materials file, in words, or None."""
-    try:
-        if file.is_dir():
-            return "expected a TOML file, this is a folder"
-        if not file.exists():
-            return "no such file"
-        if not file.is_file():
-            return "expected a TOML file, this is a device or a pipe"
-        size = file.stat().st_size
-    except OSError as error:
-        return f"cannot be read: {error.strerror}"
-    return None if size <= MAX_FILE_SIZE else f"too large for a materials file: {size} bytes, at most {MAX_FILE_SIZE}"
-
-
-def _read(file: Any) -> dict[str, Any]:
-    if not isinstance(file, str | PathLike):
-        raise MaterialError("expected the path of a TOML file")
-    if problem := _unreadable(Path(file)):
-        raise MaterialError(problem)
-    try:
-        return tomllib.loads(Path(file).read_bytes().decode("utf-8-sig"))
-    except OSError as error:
-        raise MaterialError(f"cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise MaterialError("not a TOML file: it is not UTF-8 text") from None
-    except (ValueError, RecursionError) as error:  # invalid TOML, an integer without end, brackets without end
-        raise MaterialError(f"not a TOML file: {error}") from None
-
-
 def _entry(name: str, table: Mapping[str, Any]) -> MaterialEntry:
     """Return the silicone of one top-level table of a materials file."""
     laws = {key: value for key, value in table.items() if key not in _ENTRY_KEYS and isinstance(value, Mapping)}
-    _check_keys({key: value for key, value in table.items() if key not in laws}, (), _ENTRY_KEYS)
+    check_keys({key: value for key, value in table.items() if key not in laws}, (), _ENTRY_KEYS)
     if not laws:
-        raise MaterialError(f"expected the table of a law, such as [{_quoted(name)}.mooney-rivlin]")
-    source = _text(table, "source") if "source" in table else ""
+        raise MaterialError(f"expected the table of a law, such as [{quoted(name)}.mooney-rivlin]")
+    source = text_of(table, "source") if "source" in table else ""
     given = _given(table)
     models, derived = {}, {}
     for model, law_table in laws.items():
-        table_name = f"{_quoted(name)}.{_quoted(model)}"
-        with _located(table=table_name):
+        table_name = f"{quoted(name)}.{quoted(model)}"
+        with located(table=table_name):
             written = dict(law_table)
             if "derived" in written:
-                derived[model] = _text(written, "derived")
+                derived[model] = text_of(written, "derived")
                 del written["derived"]
             if model in LAWS:
                 law, constants = _law_with_constants(model, {"constants": written}, table_name)
             else:
                 if "formula" not in written:
                     raise MaterialError(_unknown_law(model))
-                _check_keys(written, ("formula",), ("constants", "derived"))
+                check_keys(written, ("formula",), ("constants", "derived"))
                 law, constants = _law_with_constants(model, written, f"{table_name}.constants")
             models[model] = _checked(name, law, constants, given, table_name)
     return MaterialEntry(name, source, MappingProxyType(models), MappingProxyType(derived))
@@ -262,18 +314,18 @@ def _entry(name: str, table: Mapping[str, Any]) -> MaterialEntry:
 
 def _law_with_constants(model: str, written: Mapping[str, Any], constants_table: str) -> tuple[Law, dict[str, float]]:
     """Return a built-in law, or the one of `written["formula"]`, and its constants in SI."""
-    with _located(table=constants_table):
+    with located(table=constants_table):
         values = written.get("constants", {})
         if not isinstance(values, Mapping):
             raise MaterialError(f"expected a table of constants, got {shown(values)}")
         if "formula" not in written:
             law = LAWS[model]
-            _check_keys(values, [c.file_key for c in law.constants], what=f"constant of law '{model}'")
-            return law, {c.name: _number(values[c.file_key], c.file_key) * c.scale for c in law.constants}
+            check_keys(values, [c.file_key for c in law.constants], what=f"constant of law '{model}'")
+            return law, {c.name: number(values[c.file_key], c.file_key) * c.scale for c in law.constants}
         for key in values:
-            with _located(key=_quoted(str(key))):
+            with located(key=quoted(str(key))):
                 check_constant_name(key)
-        constants = {key: _number(value, key) for key, value in values.items()}
+        constants = {key: number(value, key) for key, value in values.items()}
     return formula_law(model, written["formula"], constants), constants
 
 
@@ -289,75 +341,17 @@ def _unknown_law(model: str) -> str:
     return f"unknown law {shown(model)}{nearest(model, LAWS)} (a law of your own needs a formula)"
 
 
-def _quoted(name: str) -> str:
-    """Return a key as TOML writes it."""
-    if re.fullmatch(r"[A-Za-z0-9_-]+", name):
-        return name
-    return json.dumps(name, ensure_ascii=not name.isprintable())
-
-
 # --- checks -----------------------------------------------------------------------------------------------------------
-
-
-def _check_keys(table: Any, required: Iterable[str], optional: Iterable[str] = (), *, what: str = "key") -> None:
-    """Raise `MaterialError` for a key that is unknown or missing."""
-    if not isinstance(table, Mapping):
-        raise MaterialError(f"expected a table, got {shown(table)}")
-    required = list(required)
-    known = [*required, *optional]
-    for key in table:
-        if key not in known:
-            raise MaterialError(f"unknown {what}{nearest(str(key), known)}", key=_quoted(str(key)))
-    for key in required:
-        if key not in table:
-            raise MaterialError(f"missing {what}; expected {', '.join(required)}", key=key)
-
-
-def _text(table: Mapping[str, Any], key: str) -> str:
-    value = table[key]
-    if not isinstance(value, str) or not value.strip():
-        raise MaterialError(f"expected text, got {shown(value)}", key=key)
-    return str(value)
 
 
 def _given(table: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of `Material` that a table states beside name, law and constants."""
     fields: dict[str, Any] = {}
     if "density_kg_m3" in table:
-        fields["density"] = _number(table["density_kg_m3"], "density_kg_m3", positive=True)
+        fields["density"] = number(table["density_kg_m3"], "density_kg_m3", positive=True)
     if "fitted_stretch" in table:
-        fields["fitted_stretch"] = _stretch_range(table["fitted_stretch"])
+        fields["fitted_stretch"] = stretch_range(table["fitted_stretch"])
     return fields
-
-
-def _number(value: Any, key: str, *, positive: bool = False) -> Any:
-    """Return a finite number as a float, an array of them as one of floats, a symbol as it is."""
-    if isinstance(value, SYMBOLS):
-        return value
-    if isinstance(value, ca.DM):
-        value = value.full() if value.numel() > 1 else float(value)
-    expected = "a positive number" if positive else "a finite number"
-    is_array = isinstance(value, np.ndarray) and value.dtype.kind in "iuf"
-    if not is_array and (isinstance(value, bool) or not isinstance(value, Real)):
-        raise MaterialError(f"expected {expected}, got {shown(value)}", key=key)
-    try:
-        number = value.astype(float) if is_array else float(value)
-    except OverflowError:  # an integer beyond the largest float
-        number = np.inf
-    if not np.all(np.isfinite(number)) or (positive and not np.all(number > 0)):
-        raise MaterialError(f"expected {expected}, got {shown(value)}", key=key)
-    return number
-
-
-def _stretch_range(value: Any) -> tuple[float, float]:
-    if not isinstance(value, list | tuple) or len(value) != 2:
-        raise MaterialError(f"expected two stretches such as [1.0, 2.0], got {shown(value)}", key="fitted_stretch")
-    low, high = (_number(bound, "fitted_stretch", positive=True) for bound in value)
-    if not low < high or not high > 1:
-        raise MaterialError(
-            f"expected a low and a high stretch, the high above 1, got {shown(value)}", key="fitted_stretch"
-        )
-    return low, high
 
 
 def _check_response(material: Material) -> None:

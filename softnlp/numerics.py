@@ -12,10 +12,16 @@ TRANSCRIPTIONS = ("multiple-shooting", "collocation")
 class Numerics:
     """Numerical choices of a run.
 
-    transcription : multiple shooting with RK4, or Legendre collocation.
-    intervals : number of intervals on the rod, or None to refine until `accuracy` is met.
-    accuracy : largest estimated tip position error, as a fraction of the robot's length L_0.
-    tolerance : largest scaled residual of a step that counts as solved.
+    Attributes
+    ----------
+    transcription
+        Multiple shooting with RK4, or Legendre collocation.
+    intervals
+        Number of intervals on the rod, or None to refine until `accuracy` is met.
+    accuracy
+        Largest estimated tip position error, as a fraction of the robot's length L_0 [1].
+    tolerance
+        Largest scaled residual of a step that counts as solved [1].
     """
 
     transcription: Literal["multiple-shooting", "collocation"] = "multiple-shooting"

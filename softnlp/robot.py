@@ -53,12 +53,23 @@ DIMENSIONS: tuple[Dimension, ...] = (
 class Robot:
     """A round body with a central lumen and N straight reinforced chambers on a circle.
 
-    Lengths in m, the angle in rad; each of them a number or a CasADi symbol. Counts are ints. The chamber angles are
-    measured from +x in the plane of the section; +z is the axis, from base to tip.
+    Dimensions are numbers or CasADi symbols, counts are ints. The chamber angles are measured from +x in the plane of
+    the section; +z is the axis, from base to tip.
 
-    outer_diameter : D_r. lumen_diameter : D_i. chamber_circle_diameter : D_cp. chamber_diameter : D_c, of the bore.
-    chamber_wall : delta_c, silicone between bore and thread. length : L_0, unpressurised. chamber_sets : n1, one
-    pressure each. chambers_per_set : n2. chamber_angle : alpha_1, between neighbours of one set.
+    Attributes
+    ----------
+    name
+        Shown in every result.
+    outer_diameter, lumen_diameter, chamber_circle_diameter, chamber_diameter
+        D_r, D_i, D_cp of the chambers' centres, D_c of the bore; each a number [m].
+    chamber_wall
+        delta_c, silicone between bore and thread, a number [m].
+    length
+        L_0, unpressurised, a number [m].
+    chamber_sets, chambers_per_set
+        n1, with one pressure each, and n2.
+    chamber_angle
+        alpha_1, between neighbours of one set, a number [rad].
     """
 
     name: str
@@ -79,32 +90,32 @@ class Robot:
 
     @property
     def outer_radius(self) -> Any:
-        """r_r0 [m]."""
+        """r_r0, a number [m]."""
         return self.outer_diameter / 2
 
     @property
     def lumen_radius(self) -> Any:
-        """r_i0 [m]."""
+        """r_i0, a number [m]."""
         return self.lumen_diameter / 2
 
     @property
     def chamber_circle_radius(self) -> Any:
-        """r_cp of the unstretched section [m]."""
+        """r_cp of the unstretched section, a number [m]."""
         return self.chamber_circle_diameter / 2
 
     @property
     def bore_radius(self) -> Any:
-        """r_ci0, inner radius of a chamber at zero pressure [m]."""
+        """r_ci0, inner radius of a chamber at zero pressure, a number [m]."""
         return self.chamber_diameter / 2
 
     @property
     def chamber_radius(self) -> Any:
-        """r_co = D_c/2 + delta_c, radius of the thread; it never grows [m]."""
+        """r_co = D_c/2 + delta_c, radius of the thread, a number [m]; it never grows."""
         return self.chamber_diameter / 2 + self.chamber_wall
 
     @property
     def outer_wall(self) -> Any:
-        """delta_r, silicone left between thread and surface, from Eq. (1) [m]."""
+        """delta_r, silicone left between thread and surface, from Eq. (1), a number [m]."""
         return (self.outer_diameter - self.lumen_diameter - 2 * self.chamber_diameter) / 4 - self.chamber_wall
 
     @property
@@ -113,7 +124,13 @@ class Robot:
         return tuple(n // self.chambers_per_set for n in range(self.chambers))
 
     def chamber_angles(self) -> list[Any]:
-        """Angle theta_n of each chamber from +x, set by set, (S1) [rad]; N entries."""
+        """Return the angle theta_n of each chamber from +x, set by set, (S1).
+
+        Returns
+        -------
+        list
+            (N,) angles [rad].
+        """
         n2, alpha_1 = self.chambers_per_set, self.chamber_angle
         beta = 2 * pi / self.chamber_sets - n2 * alpha_1
         theta_1 = -alpha_1 * (n2 - 1) / 2
@@ -152,6 +169,7 @@ def _library() -> dict[str, Robot]:
 
 
 ROBOTS: Mapping[str, Robot] = MappingProxyType(_library())
+"""The robots of the paper by name, read-only."""
 
 
 def robot(name: str, *, allow: Collection[str] = (), **overrides: Any) -> Robot:
@@ -159,9 +177,17 @@ def robot(name: str, *, allow: Collection[str] = (), **overrides: Any) -> Robot:
 
     Parameters
     ----------
-    name : one of `ROBOTS`.
-    allow : rules of `check` that may be broken.
-    overrides : `Robot` fields in SI (m, rad), numbers or symbols; a changed robot is renamed "NAME (modified)".
+    name
+        One of `ROBOTS`.
+    allow
+        Rules of `check` that may be broken.
+    overrides
+        `Robot` fields in SI (m, rad), numbers or symbols; a changed robot is renamed "NAME (modified)".
+
+    Returns
+    -------
+    Robot
+        Checked, where every dimension is a number.
 
     Raises
     ------

@@ -24,7 +24,14 @@ STATE_SIZE = 18
 class Loads:
     """Dead loads in the world frame.
 
-    tip_force : F_e [N]. tip_moment : M_e [N m]. gravity : acceleration g [m/s^2], (0, 0, 0) switches it off.
+    Attributes
+    ----------
+    tip_force
+        (3,) F_e [N].
+    tip_moment
+        (3,) M_e [N m].
+    gravity
+        (3,) acceleration g [m/s^2]; zeros switch it off.
     """
 
     tip_force: Any = (0.0, 0.0, 0.0)

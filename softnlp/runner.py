@@ -15,9 +15,21 @@ Progress = Callable[[int, Step], None]
 
 
 def run_scenario(scenario: Scenario, progress: Progress | None = None, branches: int = 0) -> Run:
-    """Run the study of a scenario, every step in order; `progress` is called with each step as it is done.
+    """Run the study of a scenario, every step in order.
 
-    branches : other starts for each step of a blocked force, see `softnlp.studies.blocked_force`.
+    Parameters
+    ----------
+    scenario
+        Of `softnlp.load_scenario`, of a study that is a run: forward, blocked-force or inverse.
+    progress
+        Called with the index and the step as each is done.
+    branches
+        As `softnlp.blocked_force`.
+
+    Returns
+    -------
+    Run
+        Its steps carry a solution or a named status.
 
     Raises
     ------

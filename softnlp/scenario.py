@@ -46,10 +46,28 @@ class Task(Protocol):
 class Scenario:
     """Everything that a scenario file asks for, in SI units.
 
-    path : the file as it was named. text : its content. title : the file's stem when it gives none.
-    pressures : (steps, sets) gauge [Pa], no steps where the study has none. times : (steps,) [s], or None when the
-    pressures have none. contact : the wall, where there may be one, else None. task : what else the study is asked.
-    warnings : rules of manufacture that the robot breaks with leave.
+    Attributes
+    ----------
+    path, text
+        The file as it was named, and its content.
+    title
+        The file's stem when it gives none.
+    study
+        Which study it is.
+    robot, material, coefficients, conventions, loads
+        Of its tables, or the defaults.
+    pressures
+        (steps, sets) gauge [Pa], no steps where the study has none.
+    times
+        (steps,) [s], or None when the pressures have none.
+    numerics
+        Of its [solver], or the defaults.
+    contact
+        The wall, where there may be one, else None.
+    task
+        What else the study is asked.
+    warnings
+        Rules of manufacture that the robot breaks with leave.
     """
 
     path: Path
@@ -91,6 +109,16 @@ class Read(NamedTuple):
 
 def load_scenario(path: str | PathLike[str]) -> Scenario:
     """Read and check a scenario file; files that it names are looked for in its folder.
+
+    Parameters
+    ----------
+    path
+        A TOML file.
+
+    Returns
+    -------
+    Scenario
+        Checked, in SI units.
 
     Raises
     ------

@@ -26,7 +26,16 @@ _SLACK = 100.0  # round-off may leave a residual this much above the tolerance a
 class EquationResidual:
     """One line of a certificate: the largest error of one equation, evaluated again after the solve.
 
-    `value` is in `unit` (SI); `scaled` is divided by EI/L^2 (forces), EI/L (moments) or L (lengths).
+    Attributes
+    ----------
+    equation
+        Its name.
+    value
+        In `unit` [SI].
+    unit
+        Of the value.
+    scaled
+        The value over EI/L^2 (forces), EI/L (moments) or L (lengths) [1].
     """
 
     equation: str

@@ -5,8 +5,13 @@ from __future__ import annotations
 from math import pi
 
 MILLIMETRE = 1e-3
+"""One millimetre in [m]."""
 BAR = 1e5
+"""One bar in [Pa]."""
 MEGAPASCAL = 1e6
+"""One megapascal in [Pa]."""
 NEWTON_MILLIMETRE = 1e-3
+"""One newton millimetre in [N m]."""
 DEGREE = pi / 180
+"""One degree in [rad]."""
 STANDARD_GRAVITY = 9.80665  # m/s^2

@@ -95,3 +95,21 @@ def test_weighted_is_the_minimum_of_an_objective(weights: tuple[float, float, fl
         found_error = np.abs(problem.free_values(best.x)[f"contact.{name}_error"]).max()
         assert found_error == pytest.approx(left[line], rel=1e-6, abs=1e-9)
     np.testing.assert_allclose(best.x[problem.free_size :], found.solution.x, atol=1e-6)
+
+
+def test_weighted_by_collocation_is_the_same_minimum() -> None:
+    # without a condensed step the errors left are found by a fixed-point iteration over square problems
+    contact = ContactSettings(closure="weighted", weights=ClosureWeights(2.0, 100.0, 30.0, None))
+    pressure = np.array([0.3 * BAR, 0.0, 0.0])
+    steps = []
+    for numerics in (Numerics(intervals=24), Numerics("collocation", intervals=5)):
+        solver = BlockedSolver(Model(robot("D25L40"), ECOFLEX), numerics, contact)
+        step, found = solver.solve(pressure, Loads(), WALL)
+        assert found is not None, step.message
+        assert step.contact is not None
+        steps.append(step.contact)
+    shooting, collocation = steps
+    assert collocation.force == pytest.approx(shooting.force, rel=1e-5)
+    for one, other in zip(shooting.weighted, collocation.weighted, strict=True):
+        assert (one.equation, one.unit) == (other.equation, other.unit)
+        assert other.value == pytest.approx(one.value, rel=1e-4, abs=1e-9)

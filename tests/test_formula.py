@@ -156,10 +156,10 @@ REFUSED = [
 def test_a_text_that_is_no_formula_is_one_clear_line_at_once(
     text: str, reason: str, recwarn: pytest.WarningsRecorder
 ) -> None:
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(MaterialError, match=reason) as caught:
         parse_formula(text, ["c"])
-    assert time.perf_counter() - start < 1.0
+    assert time.process_time() - start < 1.0
     line = str(caught.value)
     assert "\n" not in line
     assert line.isprintable()
@@ -190,16 +190,18 @@ def test_a_formula_must_be_text(text: object) -> None:
 )
 def test_numbers_that_cannot_be_evaluated_are_an_error_at_once(text: str, reason: str) -> None:
     formula = parse_formula(text, [])
-    start = time.perf_counter()
+    start = time.process_time()
     for stretch in (1.5, ca.SX.sym("s"), ca.MX.sym("s")):
         if text == "stretch / 0" and not isinstance(stretch, float):
             continue  # inf where it is evaluated
         with pytest.raises(MaterialError, match=reason):
             formula(stretch)
-    assert time.perf_counter() - start < 1.0
+    assert time.process_time() - start < 1.0
 
 
 def test_the_limits_themselves_are_allowed() -> None:
+    check_constant_name("c" * MAX_LENGTH)
+    assert parse_formula("stretch + 0**0.5", [])(1.0) == 1.0  # a root of 0 is real
     deepest = parse_formula("stretch" + "+1" * (MAX_NESTING - 1), [])
     assert deepest(1.0) == MAX_NESTING
     longest = "+".join(["(stretch+1+1)"] * 40) + " " * (MAX_LENGTH - 40 * 14 + 1)

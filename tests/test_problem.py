@@ -318,12 +318,32 @@ def test_a_structurally_singular_choice_is_refused_where_counting_is_content() -
     assert "square (1)" in text
 
 
+def test_free_values_are_packed_and_found_again() -> None:
+    names = ["stiffening.bending", "pressure", "robot.length", "material.C10"]
+
+    def measured(cases, given) -> list[Constraint]:
+        tip, lengths = cases[0].outputs["tip_position"], cases[0].outputs["chamber_lengths"]
+        return [equals("tip", tip, 0.0), equals("lengths", lengths[:3], 0.0)]
+
+    problem = pose(MODEL, free=names, constraints=measured).problem
+    given = {"stiffening.bending": [1.5], "pressure": [1e4, 2e4, 3e4], "robot.length": [0.05], "material.C10": [4e3]}
+    x = problem.pack_free(given)
+    assert problem.free_size == x.size == 6
+    assert np.abs(x).max() < 3  # scaled
+    found = problem.free_values(np.concatenate([x, np.full(4, 99.0)]))
+    assert list(found) == names
+    for name, value in given.items():
+        np.testing.assert_allclose(found[name], value, rtol=1e-14)
+
+
 def test_a_value_for_what_is_not_fixed_is_refused() -> None:
     posed = pose(MODEL)
     with pytest.raises(IllPosedError, match=r"'presure'.*'pressure'"):
         posed.problem.pack({"presure": PRESSURE})
     with pytest.raises(IllPosedError, match=r"'pressure' takes 3 numbers, got 2"):
         posed.problem.pack({"pressure": PRESSURE[:2]})
+    with pytest.raises(IllPosedError, match=r"'gravity' takes 3 numbers, got 2"):
+        posed.problem.pack({"gravity": [0.0, 1.0]})
     with pytest.raises(IllPosedError, match="not a free quantity"):
         posed.problem.pack_free({"pressure": PRESSURE})
     np.testing.assert_array_equal(posed.problem.pack({"pressure": 2.0})[:3], 2.0)

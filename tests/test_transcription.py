@@ -22,6 +22,7 @@ from softnlp.transcription import (
 )
 
 C = 5.0  # x'' = -C sin x, swinging to 2 arcsin(K)
+CONSTANTS = [2.0, 2.5, 1.0]  # C in three factors
 K = 0.85
 EULER = Tableau(a=((),), b=(1.0,), order=1)
 HEUN = Tableau(a=((), (1.0,)), b=(0.5, 0.5), order=2)
@@ -39,8 +40,8 @@ def named(method: Transcription) -> str:
 
 
 def pendulum() -> ca.Function:
-    x, c = ca.SX.sym("x", 2), ca.SX.sym("c", 1)
-    return ca.Function("pendulum", [x, c], [ca.vertcat(x[1], -c * ca.sin(x[0]))])
+    x, c = ca.SX.sym("x", 2), ca.SX.sym("c", 3)
+    return ca.Function("pendulum", [x, c], [ca.vertcat(x[1], -c[0] * c[1] * c[2] * ca.sin(x[0]))])
 
 
 def exact(s: np.ndarray) -> np.ndarray:
@@ -53,7 +54,7 @@ class Solved:
     """The pendulum's initial value problem on a grid, solved by Newton from a straight line."""
 
     def __init__(self, method: Transcription) -> None:
-        c = ca.MX.sym("c", 1)
+        c = ca.MX.sym("c", 3)
         self.posed: Transcribed = method.transcribe(pendulum(), c)
         x = self.posed.unknowns
         start = ca.DM(exact(np.zeros(1)))
@@ -67,12 +68,12 @@ class Solved:
         self.fine = ca.Function("fine", [x, c], [rows(self.posed.fine_residuals)])
         self.x = np.tile(np.asarray(start), (x.numel() // 2, 1)).ravel()
         for _ in range(30):
-            r, J, _ = self.functions(self.x, C)
+            r, J, _ = self.functions(self.x, CONSTANTS)
             self.x = self.x - spsolve(J.sparse(), np.asarray(r).ravel())
             if np.abs(np.asarray(r)).max() < 1e-13:
                 break
-        self.nodes = np.asarray(self.functions(self.x, C)[2])
-        self.jacobian = np.asarray(self.functions(self.x, C)[1])
+        self.nodes = np.asarray(self.functions(self.x, CONSTANTS)[2])
+        self.jacobian = np.asarray(self.functions(self.x, CONSTANTS)[1])
 
     @property
     def error(self) -> float:
@@ -81,7 +82,7 @@ class Solved:
 
     def correction(self) -> np.ndarray:
         """Return the change of the nodes that one Newton step on the fine equations gives."""
-        step = -np.linalg.solve(self.jacobian, np.asarray(self.fine(self.x, C)).ravel())
+        step = -np.linalg.solve(self.jacobian, np.asarray(self.fine(self.x, CONSTANTS)).ravel())
         return step.reshape(-1, 2).T[:, self.posed.node_index]
 
 
@@ -109,9 +110,11 @@ def test_the_fine_equations_estimate_the_error(method: Transcription) -> None:
 
 @pytest.mark.parametrize("method", METHODS[2:], ids=named)
 def test_quadratures_converge_with_the_method(method: Transcription) -> None:
-    x, c = ca.SX.sym("x", 2), ca.SX.sym("c", 1)
+    x, c = ca.SX.sym("x", 2), ca.SX.sym("c", 3)
     # energy is constant; the integral of speed is the angle; of sin(angle), what the speed lost
-    quadrature = ca.Function("q", [x, c], [ca.vertcat(x[1] ** 2 / 2 - c * ca.cos(x[0]), x[1], ca.sin(x[0]))])
+    quadrature = ca.Function(
+        "q", [x, c], [ca.vertcat(x[1] ** 2 / 2 - c[0] * c[1] * c[2] * ca.cos(x[0]), x[1], ca.sin(x[0]))]
+    )
     angle, speed = exact(np.ones(1))[:, 0]
     start_speed = exact(np.zeros(1))[1, 0]
     expected = np.array([start_speed**2 / 2 - C, angle, (start_speed - speed) / C])
@@ -120,7 +123,7 @@ def test_quadratures_converge_with_the_method(method: Transcription) -> None:
         solved = Solved(method.with_intervals(K))
         inputs = ca.symvar(solved.posed.integrate(quadrature))
         f = ca.Function("f", inputs, [solved.posed.integrate(quadrature)])
-        given = [C if v.numel() == 1 else solved.x for v in inputs]
+        given = [CONSTANTS if v.numel() == 3 else solved.x for v in inputs]
         return float(np.abs(np.asarray(f(*given)).ravel() - expected).max())
 
     assert measured_order(error, 20 if method.order <= 4 else 4) > method.order - 0.2
@@ -158,7 +161,7 @@ def test_multiple_shooting_is_the_same_as_stepping() -> None:
     field = pendulum()
     step, x = rk_step(field, KUTTA3), exact(np.zeros(1)).ravel()
     for _ in range(12):
-        x = np.asarray(step(x, C, 1 / 12)).ravel()
+        x = np.asarray(step(x, CONSTANTS, 1 / 12)).ravel()
     np.testing.assert_allclose(Solved(MultipleShooting(12, KUTTA3)).nodes[:, -1], x, atol=1e-12)
 
 
@@ -170,9 +173,9 @@ def test_one_step_of_rk4_is_the_taylor_series_to_fourth_order() -> None:
 
 
 def test_a_quadrature_is_appended_to_the_state() -> None:
-    x, c = ca.SX.sym("x", 2), ca.SX.sym("c", 1)
+    x, c = ca.SX.sym("x", 2), ca.SX.sym("c", 3)
     both = with_quadrature(pendulum(), ca.Function("q", [x, c], [x[0] * x[1]]))
-    found = np.asarray(both([0.3, 0.7, 99.0], C)).ravel()
+    found = np.asarray(both([0.3, 0.7, 99.0], CONSTANTS)).ravel()
     np.testing.assert_allclose(found, [0.7, -C * np.sin(0.3), 0.21], rtol=1e-15)
 
 

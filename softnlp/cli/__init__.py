@@ -56,6 +56,7 @@ def _app() -> App:
     from softnlp import __version__
     from softnlp.cli.compare import compare
     from softnlp.cli.design import design
+    from softnlp.cli.example import example
     from softnlp.cli.gui import gui
     from softnlp.cli.identify import identify
     from softnlp.cli.inverse import inverse
@@ -86,6 +87,7 @@ def _app() -> App:
     app.command(design)
     app.command(gui)
     app.command(mesh)
+    app.command(example)
     app.command(robots)
     app.command(materials)
     plot = App(name="plot", help="Draw a cross-section, silicones, or the results of a run.")

@@ -46,9 +46,19 @@ STABLE_FLAGS = {"not_solved": -1, "unstable": 0, "stable": 1}
 def to_dataset(run: Run) -> xr.Dataset:
     """Return a run as a dataset; every variable has `units` and `long_name`, every name its unit.
 
-    Dimensions: `step`, `set` and `chamber` count from 1; `axis`, `row` (world) and `col` (body) are x, y, z; `s` runs
-    along the rod, with the coordinate `s` = s/L where all solved steps share it (else see `arc`); `equation` names the
-    lines of the certificate. Numbers of a step without a solution are NaN (`stable` is -1).
+    Parameters
+    ----------
+    run
+        Of any study that returns one.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions: `step`, `set` and `chamber` count from 1; `axis`, `row` (world) and `col` (body) are x, y, z; `s`
+        runs
+        along the rod, with the coordinate `s` = s/L where all solved steps share it (else see `arc`); `equation` names
+        the
+        lines of the certificate. Numbers of a step without a solution are NaN (`stable` is -1).
     """
     import xarray as xr
 

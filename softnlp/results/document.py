@@ -28,8 +28,16 @@ from softnlp.studies.step import Run, Step
 def to_json(run: Run) -> dict[str, Any]:
     """Return a run as plain dicts, lists, strings, numbers and None; no NaN or infinity.
 
-    A step without a solution keeps pressure, time, status, message, residual, certificate and warnings; its other
-    numbers are None.
+    Parameters
+    ----------
+    run
+        Of any study that returns one.
+
+    Returns
+    -------
+    dict
+        Numbers under keys with their unit, such as "tip_position_mm". A step without a solution keeps pressure, time,
+        status, message, residual, certificate and warnings; its other numbers are None.
     """
     contact = {} if run.contact is None else {"contact": contact_table(run.contact)}
     return {

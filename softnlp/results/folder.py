@@ -31,13 +31,23 @@ def save(
     scenario_text: str | None = None,
     figure: Callable[[RunView], Figure] | None = None,
 ) -> list[Path]:
-    """Write a run to a folder, made where missing; return the files written, each whole.
+    """Write a run to a folder, made where missing; each file whole or not at all.
 
     Parameters
     ----------
-    directory : gets results.nc, table.csv, results.json and versions.json; files of those names are replaced.
-    scenario_text : what was asked, kept as scenario.toml.
-    figure : draws the run, `softnlp.plots.run_figure` for instance; kept as figure.png.
+    run
+        Of any study that returns one.
+    directory
+        Gets results.nc, table.csv, results.json and versions.json; files of those names are replaced.
+    scenario_text
+        What was asked, kept as scenario.toml.
+    figure
+        Draws the run, `softnlp.plots.run_figure` for instance; kept as figure.png.
+
+    Returns
+    -------
+    list
+        The files written.
 
     Raises
     ------

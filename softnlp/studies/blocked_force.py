@@ -48,10 +48,12 @@ def blocked_force(
 
     Parameters
     ----------
-    robot, material, pressures, loads, coefficients, conventions, numerics, times, title, progress
-        As `softnlp.forward`; k_c of `compliant` is `coefficients.chamber_reaction`.
+    robot, material, pressures
+        As `softnlp.forward`.
     contact
         The wall, the tip's cap and the closure.
+    loads, coefficients, conventions, numerics, times, title, progress
+        As `softnlp.forward`; k_c of `compliant` is `coefficients.chamber_reaction`.
     branches
         How many other first guesses are tried at each step; other equilibria found are warnings of the step.
     weight_sensitivity
@@ -68,7 +70,6 @@ def blocked_force(
         For a robot that is geometrically impossible.
     InputError
         For pressures, loads or a contact of the wrong shape, not finite, or out of range.
-
     """
     warnings = check(robot, allow=LOWERABLE_RULES)
     P = pressure_table(pressures, robot.chamber_sets)
@@ -116,9 +117,29 @@ def force_against_offset(
 ) -> Run:
     """Solve the characteristic curve: the blocked force at one pressure against where the wall stands.
 
-    pressure : (sets,) [Pa]. offsets : (steps,) h [m], along x; for a wall given by a point, how far it is moved
-    from it in the direction in which it pushes. Each is followed from the last while there is contact.
-    The rest is as for `blocked_force`; one step an offset.
+    Parameters
+    ----------
+    robot, material
+        As `softnlp.blocked_force`.
+    pressure
+        (sets,) gauge [Pa].
+    offsets
+        (steps,) h [m], along x; for a wall given by a point, how far it is moved from it in the direction in which it
+        pushes. Each is followed from the last while there is contact.
+    contact, loads, coefficients, conventions, numerics, title, progress
+        As `softnlp.blocked_force`.
+
+    Returns
+    -------
+    Run
+        One step an offset, as of `softnlp.blocked_force`.
+
+    Raises
+    ------
+    RobotError
+        For a robot that is geometrically impossible.
+    InputError
+        For more than one pressure a set, or offsets that are not a list of finite numbers.
     """
     warnings = check(robot, allow=LOWERABLE_RULES)
     P = pressure_table(pressure, robot.chamber_sets)
@@ -158,8 +179,32 @@ def constrained_pose(
 ) -> Step:
     """Solve the pose under dead loads whose pressurised chambers are held at the lengths they have without loads.
 
-    This is the paper's constrained loaded kinematics; the closure says how they are held, as for a wall. The step's
-    `contact` carries the chamber reactions and the shape without loads; its force and normal are 0.
+    This is the paper's constrained loaded kinematics; the closure says how they are held, as for a wall.
+
+    Parameters
+    ----------
+    robot, material
+        As `softnlp.forward`.
+    pressure
+        (sets,) gauge [Pa].
+    loads
+        As `softnlp.forward`.
+    closure, weights
+        As of `ContactSettings`.
+    coefficients, conventions, numerics
+        As `softnlp.blocked_force`.
+
+    Returns
+    -------
+    Step
+        Its `contact` carries the chamber reactions and the shape without loads; its force and normal are 0.
+
+    Raises
+    ------
+    RobotError
+        For a robot that is geometrically impossible.
+    InputError
+        For more than one pressure a set, or an unknown closure.
     """
     check(robot, allow=LOWERABLE_RULES)
     P = pressure_table(pressure, robot.chamber_sets)

@@ -32,8 +32,20 @@ _CHUNK = 8  # candidates that a process is given at once; most of one structure,
 class Design:
     """A finished design study: what was asked, and every candidate in the order of the combinations.
 
-    free_closure_force : blocked force of the best candidate by the closure `free` [N], where a force was asked for by
-    another one and can be found.
+    Attributes
+    ----------
+    setting
+        What no choice changed.
+    task
+        Choices, requirements, what is best.
+    candidates
+        All of them, feasible or not.
+    title
+        Kept with the results.
+    free_closure_force
+        Blocked force of the best candidate by the closure `free` [N], where a force was asked for by another one and
+        can
+        be found.
     """
 
     setting: Setting
@@ -80,18 +92,26 @@ def design(
         What choices do not change.
     task
         Choices, requirements, what is best.
-    loads, contact, coefficients, conventions, numerics, title
-        As for `softnlp.forward` and `softnlp.blocked_force`.
+    loads
+        As `softnlp.forward`.
+    contact
+        As `softnlp.blocked_force`.
+    coefficients, conventions, numerics, title
+        As `softnlp.forward`.
     workers
         Processes; above 1 a script needs `if __name__ == "__main__"`.
     progress
         Called with the number done and each candidate as it is done; what it raises ends the study.
 
+    Returns
+    -------
+    Design
+        Every candidate; `best` is None where none is feasible.
+
     Raises
     ------
     InputError
         For a task that cannot be meant, or a search without optuna.
-
     """
     setting = Setting(
         robot, material, coefficients, conventions, checked_loads(loads), checked_contact(contact), numerics

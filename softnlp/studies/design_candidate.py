@@ -24,14 +24,37 @@ _LEVELS = 32  # pressures at which a free pressure is looked at before it is opt
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One combination of the discrete choices, with the continuous ones and the pressure found for it; SI.
+    """One combination of the discrete choices, with the continuous ones and the pressure found for it.
 
-    number : from 1. choices : by name; whole robots and silicones by their `Robot` and `Material`.
-    status : "feasible", "infeasible", or "failed" where a solver gave up. reasons : why it is not feasible.
-    outputs : by name, of the design chosen or, where none is feasible, of the one that misses least; may be empty.
-    objective : the output asked for, nan where there is none. active : limits that hold the objective back, of
-    continuous choices. agreeing, starts : how many of how many first guesses led here. step : of the free or blocked
-    shape.
+    Attributes
+    ----------
+    number
+        From 1.
+    choices
+        By name, whole robots and silicones by their `Robot` and `Material`; numbers [SI].
+    robot, material
+        With the choices in them.
+    status
+        "feasible", "infeasible", or "failed" where a solver gave up.
+    reasons
+        Why it is not feasible.
+    outputs
+        By name, numbers [SI] of the design chosen or, where none is feasible, of the one that misses least; may be
+        empty.
+    objective
+        The output asked for [SI], nan where there is none.
+    active
+        Limits that hold the objective back, of continuous choices.
+    agreeing, starts
+        How many of how many first guesses led here.
+    iterations, intervals
+        Of the optimisation, and of the grid it was solved again on.
+    warnings
+        Of the robot and of the step.
+    step
+        Of the free or blocked shape.
+    solve_time
+        Of the whole candidate [s].
     """
 
     number: int

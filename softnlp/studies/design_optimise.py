@@ -41,8 +41,16 @@ _NEAR = 0.2  # part by which a choice may move in one step of the slow way
 class Active:
     """A limit that holds the objective back.
 
-    name : of a choice, an output or a rule of manufacture. side : "lower" or "upper". limit : its value, nan where it
-    has none of its own. rate : what the objective gains for each unit by which the limit is loosened, SI over SI.
+    Attributes
+    ----------
+    name
+        Of a choice, an output or a rule of manufacture.
+    side
+        "lower" or "upper".
+    limit
+        Its value [SI], nan where it has none of its own.
+    rate
+        What the objective gains for each unit by which the limit is loosened [SI].
     """
 
     name: str

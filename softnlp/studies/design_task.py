@@ -74,7 +74,13 @@ the lumen, `wall` is delta_c + delta_r of Eq. (1), for which the chambers are ta
 
 @dataclass(frozen=True)
 class Range:
-    """A continuous choice, chosen by optimisation: lower <= value <= upper, SI."""
+    """A continuous choice, chosen by optimisation: lower <= value <= upper.
+
+    Attributes
+    ----------
+    lower, upper
+        Of the quantity chosen [SI].
+    """
 
     lower: float
     upper: float
@@ -82,45 +88,100 @@ class Range:
 
 @dataclass(frozen=True)
 class PressureSteps:
-    """A pressure that is the lowest multiple of `step` up to `highest` at which every requirement holds [Pa]."""
+    """A pressure that is the lowest multiple of `step` up to `highest` at which every requirement holds.
+
+    Attributes
+    ----------
+    step, highest
+        Gauge pressures [Pa].
+    """
 
     step: float
     highest: float
 
     def values(self) -> list[float]:
-        """Return the pressures in order, `highest` among them only where it is a multiple."""
+        """Return the pressures in order, `highest` among them only where it is a multiple.
+
+        Returns
+        -------
+        list
+            (levels,) from `step` on [Pa].
+        """
         return [k * self.step for k in range(1, int(self.highest / self.step + 1e-9) + 1)]
 
 
 @dataclass(frozen=True)
 class Limits:
-    """A requirement: lower <= output <= upper, SI."""
+    """A requirement: lower <= output <= upper.
+
+    Attributes
+    ----------
+    lower, upper
+        Of the output required [SI].
+    """
 
     lower: float = -inf
     upper: float = inf
 
 
 def at_least(value: float) -> Limits:
-    """Return the requirement that an output be at least a value, SI."""
+    """Return the requirement that an output be at least a value.
+
+    Parameters
+    ----------
+    value
+        Of the output required [SI].
+
+    Returns
+    -------
+    Limits
+        With this lower end.
+    """
     return Limits(lower=value)
 
 
 def at_most(value: float) -> Limits:
-    """Return the requirement that an output be at most a value, SI."""
+    """Return the requirement that an output be at most a value.
+
+    Parameters
+    ----------
+    value
+        Of the output required [SI].
+
+    Returns
+    -------
+    Limits
+        With this upper end.
+    """
     return Limits(upper=value)
 
 
 @dataclass(frozen=True, eq=False)
 class DesignTask:
-    """What may be chosen, what is required and what is best; SI.
+    """What may be chosen, what is required and what is best.
 
-    choices : by name, a `Range` or a sequence of values. The names are those of the dimensions of `softnlp.Robot`,
-    "robot" for whole robots and "material" for silicones. Counts and whole things take sequences only.
-    pressure : in each of `sets` (counted from 0), the same [Pa]: a number, a `Range` or `PressureSteps`.
-    requirements : `Limits` by name of `OUTPUTS`. maximise, minimise : one of them, a name of `OUTPUTS`.
-    allow, minimum_wall : rules of manufacture that may be broken, and delta_s of Eq. (1) [m].
-    starts : first guesses of each optimisation; None is 4, and 2 where one number alone is free.
-    trials : of the search, where there are more than `MOST_ENUMERATED` combinations.
+    Attributes
+    ----------
+    choices
+        By name, a `Range` or a sequence of values (choices,) [SI]. The names are those of the dimensions of
+        `softnlp.Robot`,
+        "robot" for whole robots and "material" for silicones. Counts and whole things take sequences only.
+    pressure
+        In each of `sets`, the same [Pa]: a number, a `Range` or `PressureSteps`.
+    sets
+        Counted from 0; the others are at 0.
+    requirements
+        `Limits` by name of `OUTPUTS`.
+    maximise, minimise
+        One of them, a name of `OUTPUTS`.
+    allow
+        Rules of manufacture that may be broken.
+    minimum_wall
+        delta_s of Eq. (1) [m].
+    starts
+        First guesses of each optimisation; None is 4, and 2 where one number alone is free.
+    trials
+        Of the search, where there are more than `MOST_ENUMERATED` combinations.
     """
 
     choices: Mapping[str, Range | Sequence[Any]]
@@ -141,7 +202,7 @@ class DesignTask:
 
     @property
     def sign(self) -> float:
-        """1 where the objective is maximised, -1 where it is minimised."""
+        """1 where the objective is maximised, -1 where it is minimised [1]."""
         return 1.0 if self.maximise else -1.0
 
     @property
@@ -156,7 +217,7 @@ class DesignTask:
 
     @property
     def lists(self) -> dict[str, Sequence[Any]]:
-        """The discrete choices by name."""
+        """The discrete choices by name, each (choices,) [SI]."""
         return {name: values for name, values in self.choices.items() if not isinstance(values, Range)}
 
     @property
@@ -170,19 +231,42 @@ class DesignTask:
         return self.starts or (4 if len(self.ranges) + isinstance(self.pressure, Range) > 1 else 2)
 
     def combinations(self) -> Iterator[dict[str, Any]]:
-        """Yield every combination of the discrete choices, the last one changing first."""
+        """Yield every combination of the discrete choices, the last one changing first.
+
+        Returns
+        -------
+        iterator
+            A value by the name of each choice (choices,) [SI].
+        """
         for values in product(*self.lists.values()):
             yield dict(zip(self.lists, values, strict=True))
 
     def step_count(self, pressures: int = 0) -> int:
-        """Return how many candidates there are."""
+        """Return how many candidates there are.
+
+        Parameters
+        ----------
+        pressures
+            Steps of the scenario's pressures, which change nothing.
+
+        Returns
+        -------
+        int
+            Combinations, or trials of a search.
+        """
         every = prod(len(values) for values in self.lists.values())
         return every if every <= MOST_ENUMERATED else min(self.trials, every)
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """Everything that no choice changes, and what the choices start from."""
+    """Everything that no choice changes, and what the choices start from.
+
+    Attributes
+    ----------
+    robot, material, coefficients, conventions, loads, contact, numerics
+        As `softnlp.design`.
+    """
 
     robot: Robot
     material: Material

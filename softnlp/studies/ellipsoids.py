@@ -15,9 +15,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Ellipsoid:
-    """Semi-axes (3,), largest first, and their directions as the columns of axes (3, 3), right-handed, world frame.
+    """The image of a unit ball, world frame.
 
-    unit : of the semi-axes. A semi-axis of 0 is a direction in which nothing moves.
+    Attributes
+    ----------
+    axes
+        (3, 3) directions of the semi-axes as columns, right-handed [1].
+    semi_axes
+        (3,) largest first, in `unit` [SI]. A semi-axis of 0 is a direction in which nothing moves.
+    unit
+        Of the semi-axes.
     """
 
     axes: Array
@@ -29,8 +36,14 @@ class Ellipsoid:
 class Manipulability:
     """What a unit ball of pressures, sum of squares at most 1 Pa^2, does to the tip.
 
-    translation [m/Pa], rotation [rad/Pa] : as ellipsoids. measure : sqrt(det J J^T) of the translation, its volume
-    over that of the unit ball, 0 at a singular pose. isotropy : least over largest semi-axis.
+    Attributes
+    ----------
+    translation, rotation
+        As ellipsoids, in m/Pa and rad/Pa.
+    measure
+        sqrt(det J J^T) of the translation [m^3/Pa^3], its volume over that of the unit ball, 0 at a singular pose.
+    isotropy
+        Least over largest semi-axis of the translation [1].
     """
 
     translation: Ellipsoid
@@ -40,7 +53,18 @@ class Manipulability:
 
 
 def manipulability(jacobian: Sensitivities) -> Manipulability:
-    """Return the manipulability of a tip Jacobian, of `softnlp.studies.sensitivity.tip_jacobian`; NaN if not solved."""
+    """Return the manipulability of a tip Jacobian.
+
+    Parameters
+    ----------
+    jacobian
+        Of `softnlp.tip_jacobian`.
+
+    Returns
+    -------
+    Manipulability
+        NaN where the pose is not solved.
+    """
     linear, angular = jacobian.of("tip_position", "pressure"), jacobian.of("tip_rotation", "pressure")
     translation = _image(linear, "m/Pa")
     a = translation.semi_axes
@@ -50,17 +74,35 @@ def manipulability(jacobian: Sensitivities) -> Manipulability:
 
 
 def compliance_ellipsoid(compliance: Sensitivities) -> Ellipsoid:
-    """Return how far a unit force moves the tip [m/N]; the tip may turn.
+    """Return how far a unit force moves the tip, which may turn: the image of the unit ball of forces.
 
-    compliance : of `tip_compliance`. The image of the unit ball of forces.
+    Parameters
+    ----------
+    compliance
+        Of `softnlp.tip_compliance`.
+
+    Returns
+    -------
+    Ellipsoid
+        In m/N.
     """
     return _image(compliance.of("tip_position", "tip_force"), "m/N")
 
 
 def stiffness_ellipsoid(compliance: Sensitivities, *, rotation_held: bool = False) -> Ellipsoid:
-    """Return the force that moves the tip by a unit displacement [N/m], the image of the unit ball of displacements.
+    """Return the force that moves the tip by a unit displacement, the image of the unit ball of displacements.
 
-    rotation_held : the tip may not turn, which takes a moment beside the force; by default it is free to turn.
+    Parameters
+    ----------
+    compliance
+        Of `softnlp.tip_compliance`.
+    rotation_held
+        The tip may not turn, which takes a moment beside the force; by default it is free to turn.
+
+    Returns
+    -------
+    Ellipsoid
+        In N/m.
     """
     rows = ("tip_position", "tip_rotation") if rotation_held else ("tip_position",)
     columns = ("tip_force", "tip_moment") if rotation_held else ("tip_force",)

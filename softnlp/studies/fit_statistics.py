@@ -20,9 +20,18 @@ SINGULAR = 1e10  # beyond it a combination of constants is open altogether
 class Uncertainty:
     """What is known of fitted constants, in their order.
 
-    standard_errors : (n,) in the units of the constants; inf where the data leave the constant open, nan where it was
-    held or there are as many constants as data. correlation : (n, n), nan where it is not defined. condition : of the
-    Jacobian with its columns scaled to length one. warnings : what the data cannot tell apart, by name.
+    Attributes
+    ----------
+    standard_errors
+        (n,) in the units of the constants [SI]; inf where the data leave the constant open, nan where it was held or
+        there
+        are as many constants as data.
+    correlation
+        (n, n) of the estimates [1], nan where it is not defined.
+    condition
+        Of the Jacobian with its columns scaled to length one [1].
+    warnings
+        What the data cannot tell apart, by name.
     """
 
     standard_errors: Array

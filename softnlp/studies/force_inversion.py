@@ -47,13 +47,32 @@ def pressure_for_force(
     conventions: Conventions = REPRODUCTION,
     numerics: Numerics = Numerics(),
 ) -> tuple[Array, Step]:
-    """Return the pressures (sets,) [Pa] that give a blocked force, and the step.
+    """Find the pressure, the same in some sets and 0 in others, that gives a blocked force.
 
-    The pressure is the same in each of `sets` and 0 in others.
+    The branch from zero pressure is followed until it passes the force; there both shapes are solved at once with the
+    pressure free.
 
-    sets : counted from 0. force : [N], above 0. highest : the largest pressure allowed [Pa]. The branch from zero
-    pressure is followed until it passes the force; there both shapes are solved at once with the pressure free. Where
-    the force is not reached the step is `out_of_reach`, or says how the branch ended before, and the pressures are nan.
+    Parameters
+    ----------
+    robot, material
+        As `softnlp.blocked_force`.
+    sets
+        Counted from 0.
+    force
+        Above 0 [N].
+    contact
+        As `softnlp.blocked_force`.
+    highest
+        The largest pressure allowed [Pa].
+    loads, coefficients, conventions, numerics
+        As `softnlp.blocked_force`.
+
+    Returns
+    -------
+    tuple
+        The pressures (sets,) [Pa] and the step. Where the force is not reached the step is `out_of_reach`, or says how
+        the
+        branch ended before, and the pressures are nan.
 
     Raises
     ------

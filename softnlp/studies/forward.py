@@ -49,6 +49,8 @@ def forward(
         Transcription, intervals, accuracy, tolerance.
     times
         (steps,) [s], kept with the steps.
+    title
+        Kept with the run.
     progress
         Called with the index and the step as each is done.
 
@@ -63,7 +65,6 @@ def forward(
         For a robot that is geometrically impossible; the rules that a scenario may lower are warnings here.
     InputError
         For pressures or loads of the wrong shape, not finite, or negative.
-
     """
     warnings = check(robot, allow=LOWERABLE_RULES)
     P = pressure_table(pressures, robot.chamber_sets)

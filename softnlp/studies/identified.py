@@ -21,13 +21,32 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """What an identification found. SI units.
+    """What an identification found.
 
-    status : solved, or why the model could not be compared with the measurements; `message` says where. free : names,
-    start and bounds. constants : (n,) found, nan where nothing was. at_bound : names of those at a bound.
-    uncertainty : of the constants. material, coefficients : with the constants found.
-    data : the measurements; before, after : (rows, 6) each, the model at the start and at the end, in the order of
-    `COLUMNS`, nan where nothing was measured. evaluations : how often all poses were solved.
+    Attributes
+    ----------
+    status, message
+        Solved, or why the model could not be compared with the measurements, and where.
+    free
+        Names, start and bounds.
+    constants
+        (n,) found [SI], nan where nothing was.
+    at_bound
+        Names of those at a bound.
+    uncertainty
+        Of the constants.
+    material, coefficients
+        With the constants found.
+    data
+        The measurements as they were checked, one entry a robot.
+    before, after
+        (rows, 6) for each robot, the model at the start and at the end, in the order of `COLUMNS` [m, rad or N]; nan
+        where
+        nothing was measured.
+    evaluations
+        How often all poses were solved.
+    warnings
+        What the data leave open, and bounds that were reached.
     """
 
     status: Status
@@ -49,6 +68,16 @@ class Identified:
 
         A tip position's error is a distance, compared with the robot's length; others are compared with the number
         measured.
+
+        Parameters
+        ----------
+        after
+            With the constants found, or else with those at the start.
+
+        Returns
+        -------
+        dict
+            `Misfit` by observable, in m, rad or N.
         """
         return observable_misfits(self.data, self.after if after else self.before)
 

@@ -65,23 +65,29 @@ def identify(
     ----------
     measurements
         Of one robot or of several that share the constants.
-    material, coefficients
-        Where the constants start, and the values of those that are not free.
+    material
+        Where its constants start, and the values of those that are not free.
     free
         Of "k_e", "k_b", "k_a", "k_i", "phi", "k_c" and the names of the material's constants, such as "C10".
+    coefficients
+        The same for the stiffening, the corrections and k_c.
     bounds
-        (lower, upper) by name, SI, in place of the default ones.
+        (2,) lower and upper by name, in place of the default ones [SI].
     contact, loads, conventions, numerics
         As `softnlp.blocked_force`; the same in every measurement.
     progress
         Called with the number of evaluations and the root mean square of the residuals.
+
+    Returns
+    -------
+    Identified
+        Constants with their uncertainty; nan, with a status that says why, where the model could not be solved.
 
     Raises
     ------
     InputError
         For measurements, names or bounds that are not right, fewer numbers than constants, or a constant that no
         measurement depends on.
-
     """
     given = (measurements,) if isinstance(measurements, Measurements) else tuple(measurements)
     if not given:

@@ -43,20 +43,24 @@ def inverse(
 
     Parameters
     ----------
-    robot, material, loads, coefficients, conventions, numerics, title, progress
-        As `softnlp.forward`; the loads act on every pose.
+    robot, material
+        As `softnlp.forward`.
     positions
         (targets, 3) or (3,) of the tip [m]. None: any.
     directions
-        (targets, 3) or (3,) of the tip's axis, normalised here. None: any. With both, rows belong together.
+        (targets, 3) or (3,) of the tip's axis [1], normalised here. None: any. With both, rows belong together.
     bounds
         Lowest and highest gauge pressure [Pa], a number or one a set.
     length_per_radian
         What a radian of misfit counts for beside a distance, where position and direction cannot both be met [m];
         L_0 by default.
+    loads, coefficients, conventions, numerics
+        As `softnlp.forward`; the loads act on every pose.
     method
         "newton": an active-set Gauss-Newton iteration in the pressures. "nlp": the pressures freed in the rod's own
         problem and solved by IPOPT, started from the same places; slower, and a check of the other.
+    title, progress
+        As `softnlp.forward`.
 
     Returns
     -------
@@ -70,7 +74,6 @@ def inverse(
         For a robot that is geometrically impossible.
     InputError
         For targets, bounds or loads of the wrong shape or out of range, or no target.
-
     """
     warnings = check(robot, allow=LOWERABLE_RULES)
     loads = checked_loads(loads)

@@ -31,15 +31,31 @@ _FLOOR = 0.1  # of an observable's root mean square: smaller numbers count as if
 
 @dataclass(frozen=True, eq=False)
 class Measurements:
-    """What was measured of one robot, a row a measurement; nan where a number was not measured. SI, world frame.
+    """What was measured of one robot, a row a measurement; nan where a number was not measured. World frame.
 
-    robot : whose it is. pressure : (rows, sets) [Pa]. tip_position : (rows, 3) [m]. bending_angle : (rows,) integral of
-    the curvature over the backbone [rad]. elongation : (rows,) backbone length - L_0 [m]. blocked_force : (rows,) [N];
-    the tip is free in the other observables of the same row. tilt : (rows,) angle between the tip's axis and +z [rad];
-    it can be compared, not fitted.
-    sigma : standard deviation of an observable by name, a number or (rows,); by default 1 % of each number, where
-    those below a tenth of the observable's root mean square over this robot's rows count as that tenth does.
-    weight : (rows,) of the squared misfit, 1 by default. label : of the robot in results.
+    Attributes
+    ----------
+    robot
+        Whose it is.
+    pressure
+        (rows, sets) gauge [Pa].
+    tip_position
+        (rows, 3) [m].
+    bending_angle
+        (rows,) integral of the curvature over the backbone [rad].
+    elongation
+        (rows,) backbone length - L_0 [m].
+    blocked_force
+        (rows,) [N]; the tip is free in the other observables of the same row.
+    tilt
+        (rows,) angle between the tip's axis and +z [rad]; it can be compared, not fitted.
+    sigma
+        Standard deviation of an observable by name, a number or (rows,) [m, rad or N]; by default 1 % of each number,
+        where those below a tenth of the observable's root mean square over this robot's rows count as that tenth does.
+    weight
+        (rows,) of the squared misfit [1]; 1 by default.
+    label
+        Of the robot in results.
     """
 
     robot: Robot
@@ -56,9 +72,18 @@ class Measurements:
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """Checked measurements. values, sigma : (rows, 6) in the order of `COLUMNS`; nan where not measured.
+    """Checked measurements of one robot.
 
-    root_weight : (rows,) what a residual is multiplied by.
+    Attributes
+    ----------
+    robot, label
+        Whose they are, and what results call it.
+    pressure
+        (rows, sets) gauge [Pa].
+    values, sigma
+        (rows, 6) in the order of `COLUMNS` [m, rad or N]; nan where not measured.
+    root_weight
+        (rows,) what a residual is multiplied by [1].
     """
 
     robot: Robot
@@ -70,11 +95,22 @@ class Data:
 
     @property
     def measured(self) -> NDArray[np.bool_]:
-        """Which entries of `values` there are."""
+        """Which entries of `values` there are, (rows, 6) [1]."""
         return np.asarray(np.isfinite(self.values))
 
     def of(self, observable: str) -> Array:
-        """Return the columns of an observable, (rows, 1 or 3)."""
+        """Return the columns of an observable.
+
+        Parameters
+        ----------
+        observable
+            A name of `OBSERVABLES`.
+
+        Returns
+        -------
+        array
+            (rows, columns), three of a tip position and one of others [m, rad or N].
+        """
         return self.values[:, column_slice(observable)]
 
 

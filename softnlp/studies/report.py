@@ -37,7 +37,18 @@ OUTPUTS = ("tip_position", "tip_rotation", "bending_angle", "elongation", "stret
 class SensitivityReport:
     """Sensitivities of one pose by every quantity, and what follows from them; NaN where the pose did not solve.
 
-    bars, sampled : with tolerances, else None.
+    Attributes
+    ----------
+    robot, material
+        As given.
+    sensitivities
+        Of every output by every quantity.
+    manipulability
+        Of the tip by the pressures.
+    compliance, stiffness
+        Of the tip, which is free to turn.
+    bars, sampled
+        Error bars to first order and by Monte Carlo, with tolerances; else None.
     """
 
     robot: Robot
@@ -75,8 +86,28 @@ def sensitivity_report(
 ) -> SensitivityReport:
     """Solve one pose and differentiate it by every quantity of the model.
 
-    tolerances : standard deviations by name, SI, as `softnlp.studies.tolerances.error_bars` takes them. samples : of
-    the check by Monte Carlo, 0 for none. The rest as `sensitivities`, and raises as it.
+    Parameters
+    ----------
+    robot, material, pressure
+        As `softnlp.sensitivities`.
+    tolerances
+        As `softnlp.error_bars`; None for no error bars.
+    loads, coefficients, conventions, numerics
+        As `softnlp.forward`.
+    samples
+        Of the check of the error bars by Monte Carlo, 0 for none.
+    progress
+        Called with the number of samples done.
+
+    Returns
+    -------
+    SensitivityReport
+        Without numbers where the pose has no solution.
+
+    Raises
+    ------
+    InputError
+        As `softnlp.sensitivities` and `softnlp.error_bars`.
     """
     every = list(quantities(Model(robot, material, coefficients, conventions)))
     found = sensitivities(

@@ -43,12 +43,26 @@ WRENCH = ("tip_force", "tip_moment")
 
 @dataclass(frozen=True, eq=False)
 class Sensitivities:
-    """Derivatives of outputs by quantities at one solved step, SI, world frame.
+    """Derivatives of outputs by quantities at one solved step, world frame.
 
-    matrix : (outputs, quantities). outputs, quantities : a name for each row and column, "tip_position.x",
-    "robot.length", with units beside. values, nominal : of the outputs and of the quantities. step : the pose; where
-    it has no solution every number here is NaN. point : for solving again nearby; None where no equation was
-    differentiated. warnings : of the step, and why a row has no derivative.
+    Attributes
+    ----------
+    step
+        The pose; where it has no solution every number here is NaN.
+    outputs, output_units
+        A name for each row, such as "tip_position.x", and its unit.
+    quantities, quantity_units
+        A name for each column, such as "robot.length", and its unit.
+    values
+        (outputs,) in their units [SI].
+    nominal
+        (quantities,) in their units [SI].
+    matrix
+        (outputs, quantities) derivatives, unit of the output over that of the quantity [SI].
+    point
+        For solving again nearby; None where no equation was differentiated.
+    warnings
+        Of the step, and why a row has no derivative.
     """
 
     step: Step
@@ -68,9 +82,22 @@ class Sensitivities:
         return bool(np.isfinite(self.matrix).any())
 
     def of(self, output: str, quantity: str) -> Array:
-        """Return the rows of one output and the columns of one quantity: ("tip_position", "pressure") is (3, sets).
+        """Return the derivatives of one output by one quantity: of "tip_position" by "pressure" they are (3, sets).
 
-        A single entry, "tip_position.x", is a row of its own. Raises `InputError` for a name that is not there.
+        Parameters
+        ----------
+        output, quantity
+            A vector such as "tip_position", all its entries, or one entry, "tip_position.x".
+
+        Returns
+        -------
+        array
+            (rows, columns) of `matrix` [SI].
+
+        Raises
+        ------
+        InputError
+            For a name that is not there.
         """
         rows, columns = _where(self.outputs, output, "output"), _where(self.quantities, quantity, "quantity")
         block: Array = self.matrix[np.ix_(rows, columns)]
@@ -78,7 +105,7 @@ class Sensitivities:
 
     @property
     def relative(self) -> Array:
-        """Per cent of an output for a per cent of a quantity, (outputs, quantities); NaN where an output is 0."""
+        """Per cent of an output for a per cent of a quantity, (outputs, quantities) [1]; NaN where an output is 0."""
         with np.errstate(divide="ignore", invalid="ignore"):
             share: Array = self.matrix * self.nominal / self.values[:, None]
         return np.where(np.isfinite(share), share, np.nan)
@@ -109,7 +136,7 @@ def sensitivities(
 
     Parameters
     ----------
-    robot, material, loads, coefficients, conventions, numerics
+    robot, material
         As `softnlp.forward`.
     pressure
         (sets,) gauge [Pa].
@@ -120,8 +147,12 @@ def sensitivities(
         Any of pressure, tip_force, tip_moment, gravity, robot.DIMENSION, material.CONSTANT, material.density,
         stiffening.elongation, stiffening.bending, corrections.area, corrections.inertia, corrections.bore_fraction and,
         with `contact`, contact.wall_point, contact.tip_cap, contact.chamber_reaction; see `softnlp.quantities`.
+    loads
+        As `softnlp.forward`.
     contact
         A wall: the outputs are those of the blocked shape, and its free chamber lengths move along.
+    coefficients, conventions, numerics
+        As `softnlp.forward`.
 
     Returns
     -------
@@ -134,7 +165,6 @@ def sensitivities(
         For unknown names, blocked_force without a wall, closure "weighted", pressures or loads out of range.
     RobotError
         For a robot that is geometrically impossible.
-
     """
     check(robot, allow=LOWERABLE_RULES)
     P = pressure_table(pressure, robot.chamber_sets)
@@ -294,17 +324,49 @@ def _assembled(step: Step, point: LinearPoint, rows: tuple[str, ...], columns: t
 
 
 def tip_jacobian(robot: Robot, material: Material, pressure: Any, **settings: Any) -> Sensitivities:
-    """Return how the tip moves with each pressure: matrix (6, sets), position [m/Pa] above rotation vector [rad/Pa].
+    """Return how the tip moves with each pressure.
 
-    settings : those of `sensitivities`. Raises as it.
+    Parameters
+    ----------
+    robot, material, pressure
+        As `softnlp.sensitivities`.
+    settings
+        Its others, except `outputs` and `by`.
+
+    Returns
+    -------
+    Sensitivities
+        Its matrix is (6, sets): position [m/Pa] above rotation vector [rad/Pa].
+
+    Raises
+    ------
+    InputError
+        As `softnlp.sensitivities`.
     """
     return sensitivities(robot, material, pressure, outputs=TIP, by=("pressure",), **settings)
 
 
 def tip_compliance(robot: Robot, material: Material, pressure: Any, **settings: Any) -> Sensitivities:
-    """Return how the tip gives way to a wrench: matrix (6, 6), position and rotation by force [N] and moment [N m].
+    """Return how the tip gives way to a wrench.
 
-    settings : those of `sensitivities`. Raises as it. The matrix is symmetric where no tip moment acts. A dead moment M
-    has no potential: it leaves the inverse, the stiffness, an antisymmetric part in the rotations.
+    The matrix is symmetric where no tip moment acts. A dead moment M has no potential: it leaves the inverse, the
+    stiffness, an antisymmetric part in the rotations.
+
+    Parameters
+    ----------
+    robot, material, pressure
+        As `softnlp.sensitivities`.
+    settings
+        Its others, except `outputs` and `by`.
+
+    Returns
+    -------
+    Sensitivities
+        Its matrix is (6, 6): position [m] above rotation vector [rad], by force [N] and moment [N m].
+
+    Raises
+    ------
+    InputError
+        As `softnlp.sensitivities`.
     """
     return sensitivities(robot, material, pressure, outputs=TIP, by=WRENCH, **settings)

@@ -22,9 +22,18 @@ Array = NDArray[np.float64]
 class Shape:
     """The rod at M points from base to tip.
 
-    arc : (M,) s/L, from 0 to 1. position : (M, 3) p [m]. rotation : (M, 3, 3) R, columns are the body axes.
-    force : (M, 3) n [N]. moment : (M, 3) m [N m] (both world frame).
-    shear_extension : (M, 3) v [-]. curvature : (M, 3) u [1/m] (both body frame).
+    Attributes
+    ----------
+    arc
+        (M,) s/L, from 0 to 1 [1].
+    position
+        (M, 3) p, world frame [m].
+    rotation
+        (M, 3, 3) R, columns are the body axes in the world frame [1].
+    force, moment
+        (M, 3) n [N] and m [N m], world frame.
+    shear_extension, curvature
+        (M, 3) v [1] and u [1/m], body frame.
     """
 
     arc: Array
@@ -38,7 +47,15 @@ class Shape:
 
 @dataclass(frozen=True)
 class SectionRadii:
-    """Deformed section, Eqs. (22), (S2) [m]; bore is r_ci, chamber is r_co."""
+    """Deformed section, Eqs. (22), (S2).
+
+    Attributes
+    ----------
+    outer, lumen, chamber_circle
+        r_r, r_i, r_cp [m].
+    chamber, bore
+        r_co, which the thread keeps, and r_ci [m].
+    """
 
     outer: float
     lumen: float
@@ -49,11 +66,32 @@ class SectionRadii:
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """A solved static pose; frames and units as in `Shape`.
+    """A solved static pose, world frame.
 
-    tip_displacement : against the shape at the same pressure without gravity or tip load.
-    bending_angle : integral of sqrt(u_x^2 + u_y^2) over s [rad]. tilt : angle between tip axis and +z [rad].
-    backbone_length : integral of |v| [m]. chamber_length : (N,) [m]. stable : no conjugate point on the rod.
+    Attributes
+    ----------
+    stretch
+        lambda, of the pressure alone [1].
+    stable
+        No conjugate point on the rod.
+    tip_position
+        (3,) [m].
+    tip_displacement
+        (3,) against the shape at the same pressure without gravity or tip load [m].
+    tip_rotation
+        (3, 3) R, columns are the body axes [1].
+    bending_angle
+        Integral of sqrt(u_x^2 + u_y^2) over s [rad].
+    tilt
+        Angle between tip axis and +z [rad].
+    backbone_length
+        Integral of the norm of v [m].
+    chamber_length
+        (N,) [m].
+    radii
+        Of the deformed section.
+    shape
+        The whole rod.
     """
 
     stretch: float
@@ -71,9 +109,18 @@ class Pose:
 
 @dataclass(frozen=True)
 class WeightSensitivity:
-    """How the force of `weighted` answers to one weight: d ln F / d ln W at the value used, in `unit`.
+    """How the force of `weighted` answers to one weight.
 
-    weight : force, moment, length or position.
+    Attributes
+    ----------
+    weight
+        "force", "moment", "length" or "position".
+    value
+        The weight used, in `unit` [SI].
+    unit
+        Of the weight.
+    elasticity
+        d ln F / d ln W at that value [1].
     """
 
     weight: str
@@ -84,14 +131,32 @@ class WeightSensitivity:
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """The wall and what it does to the tip in one step of a blocked force; SI, world frame.
+    """The wall and what it does to the tip in one step of a blocked force, world frame.
 
-    force : what the wall pushes with, not negative [N]. normal : (3,) unit, the direction in which it pushes the robot.
-    wall_point : (3,) a point of the wall [m]. tip_cap : L_t [m]. closure : which equations closed the problem.
-    chamber_reaction : (N,) T_i, without P A_c [N]. free : the free shape at the same pressure and loads.
-    gap : distance of the free shape's contact point in front of the wall, negative beyond it [m].
-    length_error : e_L, Eq. (14) [m]. weighted : what `weighted` left of e_n, e_m, e_L, e_h. sensitivity : of its force
-    to its weights, where that was asked for.
+    Attributes
+    ----------
+    force
+        What the wall pushes with, not negative [N].
+    normal
+        (3,) unit, the direction in which it pushes the robot [1].
+    wall_point
+        (3,) a point of the wall [m].
+    tip_cap
+        L_t [m].
+    closure
+        Which equations closed the problem.
+    chamber_reaction
+        (N,) T_i, without P A_c [N].
+    free
+        The free shape at the same pressure and loads.
+    gap
+        Distance of the free shape's contact point in front of the wall, negative beyond it [m].
+    length_error
+        e_L, Eq. (14) [m].
+    weighted
+        What `weighted` left of e_n, e_m, e_L, e_h.
+    sensitivity
+        Of its force to its weights, where that was asked for.
     """
 
     force: float
@@ -109,11 +174,17 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class Aimed:
-    """A target of inverse kinematics and how near the tip comes to it at the step's pressure; SI, world frame.
+    """A target of inverse kinematics and how near the tip comes to it at the step's pressure, world frame.
 
-    position, direction : (3,) of the target, or None where it has none. distance, angle : what is left of them [m],
-    [rad], or None. tip_position, tip_direction : (3,) where the tip is then, also where that is the nearest reachable
-    point only; None without any pose.
+    Attributes
+    ----------
+    position, direction
+        (3,) of the target, [m] and [1], or None where it has none.
+    distance, angle
+        What is left of them, [m] and [rad], or None.
+    tip_position, tip_direction
+        (3,) where the tip is then, [m] and [1], also where that is the nearest reachable point only; None without any
+        pose.
     """
 
     position: Array | None
@@ -126,11 +197,34 @@ class Aimed:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One step of a run: its input, how it ended, and the pose when it was solved (else None).
+    """One step of a run: its input, how it ended, and the pose when it was solved.
 
-    pressure : (sets,) [Pa]. residual : largest scaled equation error, or None when nothing was evaluated.
-    discretisation_error : estimated tip position error over L_0. solve_time : [s].
-    contact : of a blocked force, whose `pose` is the blocked shape. aimed : of inverse kinematics. Else None.
+    Attributes
+    ----------
+    pressure
+        (sets,) gauge [Pa].
+    status, message
+        How it ended, and what that means.
+    time
+        As given with the pressures [s].
+    pose
+        None where it was not solved; of a blocked force it is the blocked shape.
+    residual
+        Largest scaled equation error [1], or None when nothing was evaluated.
+    certificate
+        Every equation's own.
+    discretisation_error
+        Estimated tip position error over L_0 [1].
+    intervals, iterations
+        Of the grid and of every attempt that led here.
+    solve_time
+        Of the step [s].
+    warnings
+        What to know of the pose.
+    contact
+        Of a blocked force, else None.
+    aimed
+        Of inverse kinematics, else None.
     """
 
     pressure: Array
@@ -151,7 +245,23 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A finished study: what was asked and its steps, in order. contact : of a blocked force, else None."""
+    """A finished study: what was asked and its steps.
+
+    Attributes
+    ----------
+    study
+        As a scenario names it.
+    robot, material, coefficients, conventions, loads
+        As given.
+    steps
+        In order.
+    title
+        As given.
+    warnings
+        Of the robot.
+    contact
+        Of a blocked force, else None.
+    """
 
     study: str
     robot: Robot

@@ -36,13 +36,33 @@ _LOOK_AHEAD = 1.5  # beyond the largest measured stretch, times its extension, s
 
 @dataclass(frozen=True, eq=False)
 class LawFit:
-    """A law fitted to a tensile test. SI units.
+    """A law fitted to a tensile test.
 
-    constants, standard_errors : by name, in law order; an error is inf where the data leave the constant open.
-    correlation : of the estimates, in law order. condition : of the scaled Jacobian. r_squared : of the engineering
-    stress. misfit : rmse [Pa] and mape [%]. fitted_stretch : range of the data with 1. unstable_from : first stretch
-    at which the tangent modulus is not positive, None where there is none up to 1.5 times the measured extension.
-    material : ready to use, None where the fitted law is no material, which `problem` then explains.
+    Attributes
+    ----------
+    law
+        What was fitted.
+    constants, standard_errors
+        By name, in law order [SI]; an error is inf where the data leave the constant open.
+    correlation
+        (n, n) of the estimates, in law order [1].
+    condition
+        Of the scaled Jacobian [1].
+    r_squared
+        Of the engineering stress [1].
+    misfit
+        Of the engineering stress: rmse in Pa, mape in %.
+    fitted_stretch
+        (2,) range of the data with 1 [1].
+    unstable_from
+        First stretch at which the tangent modulus is not positive [1], None where there is none up to 1.5 times the
+        measured extension.
+    material
+        Ready to use, None where the fitted law is no material.
+    problem
+        Why it is none.
+    warnings
+        What the data leave open.
     """
 
     law: Law
@@ -60,18 +80,39 @@ class LawFit:
 
     @property
     def spread(self) -> float:
-        """The standard deviation of the stress about the fitted law [Pa], which counts the law's constants."""
+        """The standard deviation of the stress about the fitted law, which counts the law's constants [Pa]."""
         freedom = self.misfit.count - len(self.constants)
         return float("inf") if freedom <= 0 else self.misfit.rmse * float(np.sqrt(self.misfit.count / freedom))
 
     def stress(self, stretch: Any) -> Array:
-        """Return the engineering stress [Pa] of the fitted law."""
+        """Return the engineering stress of the fitted law.
+
+        Parameters
+        ----------
+        stretch
+            A number or (points,) [1].
+
+        Returns
+        -------
+        array
+            (points,) [Pa].
+        """
         return _Curve(self.law).stress(np.asarray(stretch, float), np.array(list(self.constants.values())))
 
 
 @dataclass(frozen=True, eq=False)
 class TensileFit:
-    """Laws fitted to the same test. stretch, stress : (points,), [-] and [Pa]. fits : by law, as asked."""
+    """Laws fitted to the same test.
+
+    Attributes
+    ----------
+    stretch
+        (points,) [1].
+    stress
+        (points,) engineering stress [Pa].
+    fits
+        By law, as asked.
+    """
 
     stretch: Array
     stress: Array
@@ -98,16 +139,23 @@ def fit_tensile(
 
     Parameters
     ----------
-    stretch, stress
-        (points,) axial stretch and engineering stress [Pa]; repeats are simply more points.
+    stretch
+        (points,) axial stretch [1]; repeats are simply more points.
+    stress
+        (points,) engineering stress [Pa].
     laws
         Names of built-in laws or laws of your own, one or several; all built-in ones by default.
     true_stress
         Whether `stress` is true stress, which is divided by the stretch.
     name, density
-        Of the material that comes out; density in kg/m^3.
+        Of the material that comes out [kg/m^3].
     start
-        First guess of the constants of a law of your own, SI; needed where the stress is not linear in them.
+        First guess of the constants of a law of your own [SI]; needed where the stress is not linear in them.
+
+    Returns
+    -------
+    TensileFit
+        A fit for each law.
 
     Raises
     ------

@@ -19,11 +19,22 @@ _FEWEST = 2
 
 @dataclass(frozen=True, eq=False)
 class ErrorBars:
-    """Standard deviations of outputs whose quantities scatter independently, to first order, SI.
+    """Standard deviations of outputs whose quantities scatter independently, to first order.
 
-    outputs, output_units : as in `Sensitivities`. quantities : those with a tolerance, one entry each. tolerance :
-    their standard deviations. total : (outputs,). contribution : (outputs, quantities) derivative times tolerance, with
-    its sign; total is the root of the sum of their squares.
+    Attributes
+    ----------
+    outputs, output_units
+        As in `Sensitivities`.
+    values
+        (outputs,) in their units [SI].
+    quantities
+        Those with a tolerance, one name an entry.
+    tolerance
+        (quantities,) their standard deviations [SI].
+    total
+        (outputs,) the root of the sum of squares of the contributions [SI].
+    contribution
+        (outputs, quantities) derivative times tolerance, with its sign [SI].
     """
 
     outputs: tuple[str, ...]
@@ -37,10 +48,18 @@ class ErrorBars:
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """Standard deviations found by solving again for drawn quantities, SI.
+    """Standard deviations found by solving again for drawn quantities.
 
-    deviation : (outputs,). mean_shift : (outputs,) mean less nominal, what the first order does not see.
-    standard_error : (outputs,) of the deviation, from so few samples. solved, asked : how many samples have a solution.
+    Attributes
+    ----------
+    deviation
+        (outputs,) [SI].
+    mean_shift
+        (outputs,) mean less nominal, what the first order does not see [SI].
+    standard_error
+        (outputs,) of the deviation, from so few samples [SI].
+    solved, asked
+        How many samples have a solution.
     """
 
     deviation: Array
@@ -53,8 +72,18 @@ class Sampled:
 def error_bars(sensitivities: Sensitivities, tolerances: Mapping[str, float]) -> ErrorBars:
     """Return first-order error bars.
 
-    tolerances : standard deviation by name, SI: of a quantity, for each of its entries ("pressure"), or of one entry
-    ("pressure.1"). The sensitivities must hold it among their quantities.
+    Parameters
+    ----------
+    sensitivities
+        Of the outputs by the quantities that have a tolerance, and others.
+    tolerances
+        Standard deviation by name [SI]: of a quantity, for each of its entries ("pressure"), or of one entry
+        ("pressure.1").
+
+    Returns
+    -------
+    ErrorBars
+        Of every output.
 
     Raises
     ------
@@ -85,7 +114,23 @@ def monte_carlo(
     """Draw the quantities from independent normal distributions, solve each draw, and return what the outputs do.
 
     The draws are symmetric: each has its mirror image, so that the mean shift is of second order. A quantity with a
-    lower bound of 0 that is drawn below it is set to 0. seed : of the draws, the same ones each time.
+    lower bound of 0 that is drawn below it is set to 0.
+
+    Parameters
+    ----------
+    sensitivities, tolerances
+        As `softnlp.error_bars`.
+    samples
+        How many draws.
+    seed
+        Of the draws, the same ones each time.
+    progress
+        Called with the number of draws done.
+
+    Returns
+    -------
+    Sampled
+        Of every output; nan where fewer than 2 draws have a solution.
 
     Raises
     ------

@@ -74,9 +74,25 @@ def weight_sensitivity(
     numerics: Numerics = Numerics(),
     factor: float = FACTOR,
 ) -> tuple[Step, tuple[WeightSensitivity, ...]]:
-    """Return the step of `weighted` at a pressure (sets,) [Pa] and how its force changes with each weight given.
+    """Return the step of `weighted` at a pressure and how its force changes with each weight given.
 
-    By central differences over weights `factor` times larger and smaller; empty where the step has no force.
+    Parameters
+    ----------
+    robot, material
+        As `softnlp.blocked_force`.
+    pressure
+        (sets,) gauge [Pa].
+    contact
+        With closure `weighted` and at least one weight.
+    loads, coefficients, conventions, numerics
+        As `softnlp.blocked_force`.
+    factor
+        Of the weights: central differences over weights that much larger and smaller [1].
+
+    Returns
+    -------
+    tuple
+        The step, and a `WeightSensitivity` for each weight; none where the step has no force.
 
     Raises
     ------
