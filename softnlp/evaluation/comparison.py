@@ -23,9 +23,18 @@ AXES = ("tip_x", "tip_y", "tip_z")
 class Comparison:
     """Variants of the model against measurements of robots. SI units, world frame.
 
-    observed : of each robot. variants : what was simulated. simulated : for each variant, of each robot; numbers are
-    nan where nothing was measured or the row has no solution. contact : the wall of blocked forces. shape : "free" or
-    "blocked", the shape that poses are taken of.
+    Attributes
+    ----------
+    observed
+        Of each robot.
+    variants
+        What was simulated.
+    simulated
+        For each variant, of each robot; numbers are nan where nothing was measured or the row has no solution.
+    contact
+        The wall of blocked forces.
+    shape
+        "free" or "blocked", the shape that poses are taken of.
     """
 
     observed: tuple[Observed, ...]
@@ -58,13 +67,40 @@ class Comparison:
         return sum(len(o.pressure) for o in self.observed)
 
     def measured(self, name: str, robot: int | None = None) -> int:
-        """Return how many numbers were measured of an observable, of one robot or of all."""
+        """Return how many numbers were measured of an observable, of one robot or of all.
+
+        Parameters
+        ----------
+        name
+            Of `OBSERVABLES`.
+        robot
+            Its index in `observed`; None for all.
+
+        Returns
+        -------
+        int
+            The number.
+        """
         return sum(int(np.isfinite(self._measured(name, o)).sum()) for o in self._of(robot))
 
     def errors(self, variant: int, name: str, robot: int | None = None) -> tuple[Array, Array]:
         """Return the errors (M,), simulated less measured, and what each is compared with; of one robot or of all.
 
         The error of "tip_position" is a distance. Numbers without a solution are left out.
+
+        Parameters
+        ----------
+        variant
+            Its index in `variants`.
+        name
+            Of `OBSERVABLES`.
+        robot
+            Its index in `observed`; None for all.
+
+        Returns
+        -------
+        tuple
+            Two arrays (M,) [m, rad or N].
         """
         pairs = [self._errors(variant, name, k) for k in self._which(robot)]
         error, whole = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
@@ -72,12 +108,38 @@ class Comparison:
         return error[kept], whole[kept]
 
     def statistics(self, variant: int, name: str, robot: int | None = None) -> Statistics:
-        """Return the statistics of the errors; a distance has no bias."""
+        """Return the statistics of the errors; a distance has no bias.
+
+        Parameters
+        ----------
+        variant
+            Its index in `variants`.
+        name
+            Of `OBSERVABLES`.
+        robot
+            Its index in `observed`; None for all.
+
+        Returns
+        -------
+        Statistics
+            Of the errors of `errors` [m, rad or N].
+        """
         found = statistics(*self.errors(variant, name, robot))
         return replace(found, bias=float("nan")) if name == "tip_position" else found
 
     def lost(self, variant: int) -> int:
-        """Return how many rows of a variant have no solution."""
+        """Return how many rows of a variant have no solution.
+
+        Parameters
+        ----------
+        variant
+            Its index in `variants`.
+
+        Returns
+        -------
+        int
+            The number.
+        """
         return sum(not s.has_solution for solved in self.simulated[variant] for s in solved.status if s is not None)
 
     @cached_property
@@ -90,7 +152,18 @@ class Comparison:
         return self._least(self.main_observables)
 
     def best_of(self, name: str) -> int | None:
-        """Return the variant with the least root mean square error of one observable, as `best`."""
+        """Return the variant with the least root mean square error of one observable, as `best`.
+
+        Parameters
+        ----------
+        name
+            Of `OBSERVABLES`.
+
+        Returns
+        -------
+        int or None
+            Its index in `variants`.
+        """
         return self._least((name,))
 
     def _least(self, names: tuple[str, ...]) -> int | None:

@@ -55,7 +55,16 @@ OBSERVABLES: Mapping[str, Observable] = {
 class Observed:
     """Measurements of one robot.
 
-    pressure : (rows, sets) [Pa]. values : (rows, 7) as `NUMBERS`, nan where nothing was measured.
+    Attributes
+    ----------
+    robot
+        Whose they are.
+    label
+        Of the robot in results.
+    pressure
+        (rows, sets) gauge [Pa].
+    values
+        (rows, 7) as `NUMBERS` [m, rad, N]; nan where nothing was measured.
     """
 
     robot: Robot
@@ -65,12 +74,12 @@ class Observed:
 
     @property
     def has_pose(self) -> NDArray[np.bool_]:
-        """Whether each row has a number of a pose."""
+        """(rows,) whether each has a number of a pose [1]."""
         return np.asarray(np.isfinite(self.values[:, POSE]).any(axis=1))
 
     @property
     def has_force(self) -> NDArray[np.bool_]:
-        """Whether each row has a blocked force."""
+        """(rows,) whether each has a blocked force [1]."""
         return np.asarray(np.isfinite(self.values[:, FORCE]))
 
 

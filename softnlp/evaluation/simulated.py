@@ -34,8 +34,15 @@ Solve = Callable[[Array, Any], tuple[Step, Any]]
 class Solved:
     """What came of rows.
 
-    values : (rows, 7) as `softnlp.evaluation.observed.NUMBERS`, nan where there is no solution (the force also where
-    there is no wall). status, message : of each; None and "" of a row that nothing was asked of.
+    Attributes
+    ----------
+    values
+        (rows, 7) as `softnlp.evaluation.observed.NUMBERS` [m, rad, N]; nan where there is no solution, the force also
+        where there is no wall.
+    status
+        Of each row; None of one that nothing was asked of.
+    message
+        Of each row; "" of one that nothing was asked of.
     """
 
     values: Array

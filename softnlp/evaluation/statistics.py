@@ -19,9 +19,24 @@ MOST_GROUPS = 8
 class Statistics:
     """How far a model is from data; in the data's unit, nan where there is nothing to tell.
 
-    count : of errors. rmse : root mean square. mean, median, largest : of the errors' sizes. bias : mean of the errors
-    with their sign. mape : mean size [%] of what each error is compared with. left_out : errors that the mape leaves
-    out, for what they are compared with is next to nothing.
+    Attributes
+    ----------
+    count
+        Of errors.
+    rmse
+        Root mean square [m, rad or N].
+    mape
+        Mean size of what each error is compared with [%].
+    mean
+        Of the errors' sizes [m, rad or N].
+    median
+        Of the errors' sizes [m, rad or N].
+    largest
+        Of the errors' sizes [m, rad or N].
+    bias
+        Mean of the errors with their sign [m, rad or N].
+    left_out
+        How many errors the mape leaves out, for what they are compared with is next to nothing.
     """
 
     count: int

@@ -20,8 +20,18 @@ OWN = "scenario"
 class Variant:
     """One way to simulate what was measured.
 
-    material : silicone and law. named : what the coefficients are called. closure : of a blocked force, None for that
-    of the wall's settings.
+    Attributes
+    ----------
+    material
+        Silicone and law.
+    coefficients
+        Stiffening and corrections [1].
+    conventions
+        How ambiguous equations are read.
+    closure
+        Of a blocked force; None for that of the wall's settings.
+    named
+        What the coefficients are called.
     """
 
     material: Material

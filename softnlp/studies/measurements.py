@@ -47,8 +47,6 @@ class Measurements:
         (rows,) backbone length - L_0 [m].
     blocked_force
         (rows,) [N]; the tip is free in the other observables of the same row.
-    tilt
-        (rows,) angle between the tip's axis and +z [rad]; it can be compared, not fitted.
     sigma
         Standard deviation of an observable by name, a number or (rows,) [m, rad or N]; by default 1 % of each number,
         where those below a tenth of the observable's root mean square over this robot's rows count as that tenth does.
@@ -56,6 +54,8 @@ class Measurements:
         (rows,) of the squared misfit [1]; 1 by default.
     label
         Of the robot in results.
+    tilt
+        (rows,) angle between the tip's axis and +z [rad]; it can be compared, not fitted.
     """
 
     robot: Robot
