@@ -14,7 +14,7 @@ from softnlp.app.view import frame_of
 from softnlp.errors import InputError
 from softnlp.results import Body
 from softnlp.scenario import Scenario
-from softnlp.studies.step import Contact, Pose, Run
+from softnlp.studies.step import Contact, Pose, Run, Step
 from softnlp.studies.wall import Wall
 from softnlp.units import BAR
 
@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 _PATIENCE_S = 0.6  # of a person, before the page says that it works
 _SOLVING = "Solving …"
+_NUMBERS_AFTER_S = 0.04
 
 
 class LiveView:
@@ -38,6 +39,7 @@ class LiveView:
         self._wanted = False
         self._working = False
         self._last: tuple[Scenario, Array] | None = None
+        self._told: Run | None = None
         self._client = ui.context.client
         stage.session.on_scenario(self.request)
         stage.session.on_pressure(self.request)
@@ -74,26 +76,39 @@ class LiveView:
                 self._say(str(error))
             return
         with self._client:
-            self._show(scenario, pressure, run, ghost)
+            step = run.steps[0]
+            if not step.status.has_solution and self._stays(scenario, pressure):
+                assert self._last is not None
+                self._say(f"{step.message}. The sliders stay at {_listed(self._last[1])} bar.")
+                session.set_pressure(self._last[1])
+                return
+            if step.pose is not None and step.status.has_solution:
+                self._show(scenario, pressure, step, step.pose, ghost)
+            else:
+                self._say(f"{step.message}. The picture is of the last pose that was solved.")
+        self._tell(run)
 
-    def _show(self, scenario: Scenario, pressure: Array, run: Run, ghost: Pose | None) -> None:
-        step = run.steps[0]
-        if not step.status.has_solution and self._stays(scenario, pressure):
-            assert self._last is not None
-            self._say(f"{step.message}. The sliders stay at {_listed(self._last[1])} bar.")
-            self._stage.session.set_pressure(self._last[1])
-            return
-        self._shown(run)
-        if step.pose is None or not step.status.has_solution:
-            self._say(f"{step.message}. The picture is of the last pose that was solved.")
-            return
+    def _tell(self, run: Run) -> None:
+        """Give the panels the numbers a moment after the picture, which they would hold up in the browser."""
+        telling = self._told is not None
+        self._told = run
+        if not telling:
+            asyncio.get_running_loop().call_later(_NUMBERS_AFTER_S, self._tell_now)
+
+    def _tell_now(self) -> None:
+        run, self._told = self._told, None
+        if run is not None and not self._client.is_deleted:
+            with self._client:
+                self._shown(run)
+
+    def _show(self, scenario: Scenario, pressure: Array, step: Step, pose: Pose, ghost: Pose | None) -> None:
         if self._last is None or not np.array_equal(self._last[1], pressure) or self._last[0] is not scenario:
             self._say("")
         self._last = (scenario, pressure)
         self._stage.view.show(
             frame_of(
                 scenario.robot,
-                _body(step.pose),
+                _body(pose),
                 pressure,
                 ghost=None if ghost is None else _body(ghost),
                 tip_force=scenario.loads.tip_force,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import socket
+import sys
 from pathlib import Path
 
 from nicegui import Client, app, ui
@@ -40,6 +41,8 @@ def serve(scenario: Path | None, port: int | None, show: bool) -> None:
         first.open_path(scenario)
     first.close()
     chosen = free_port(port)
+    # Poses are solved in threads in many short calls; each would else wait 5 ms wherever the page is busy.
+    sys.setswitchinterval(0.0005)
 
     @ui.page("/", title="softnlp")
     async def page(client: Client) -> None:

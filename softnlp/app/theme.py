@@ -24,17 +24,15 @@ body {{ overflow: hidden; }}
 
 
 # Plotly resizes a plot a moment after its place changed, when that may be hidden or gone, and complains to the console.
-_QUIET = """<script>
-for (const kind of ["unhandledrejection", "error"]) window.addEventListener(kind, event => {
+_QUIET = """for (const kind of ["unhandledrejection", "error"]) window.addEventListener(kind, event => {
   const words = String(event.reason?.message ?? event.reason ?? event.message);
   if (/Resize must be passed|container is not an object/.test(words)) event.preventDefault();
-});
-</script>"""
+});"""
 
 
 def style_page() -> None:
     """Give the page its colours and spacing; the accents are those of the figures."""
-    ui.add_head_html(_QUIET)
+    ui.run_javascript(_QUIET)
     ui.colors(primary=_BLUE, secondary=_VERMILION, accent=_GREEN, warning=_ORANGE, negative=WRONG)
     ui.add_css(_STYLE)
 

@@ -10,6 +10,7 @@ import numpy as np
 from nicegui import ui
 
 from softnlp.app.pressure_units import PRESSURE_UNITS, PressureUnit
+from softnlp.app.redraw import Redraw
 from softnlp.app.session import Session
 from softnlp.plots.style import colour
 from softnlp.pressures import HIGHEST_BAR
@@ -80,8 +81,9 @@ def pressure_panel(session: Session) -> None:
             refresh()
 
     rebuild()
-    session.on_pressure(follow)
-    session.on_scenario(follow)
+    later = Redraw(rows, follow, 0.08)  # the robot moves first
+    session.on_pressure(later)
+    session.on_scenario(later)
 
 
 def _row(session: Session, state: _Shown, k: int) -> Any:
