@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
-import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from benchmarks.app import FLAGS, chromium
+from softnlp.cli import main
 
 WAIT_MS = 30_000  # for anything to appear
 
@@ -72,11 +72,12 @@ class Watched:
 
     def settled(self) -> None:
         """Wait until the pose shown is that of the controls: nothing changes for a while."""
-        before = None
-        for _ in range(100):
-            self.page.wait_for_timeout(350)
+        before, same = None, 0
+        for _ in range(300):
+            self.page.wait_for_timeout(120)
             now = (self.numbers(), self.page.get_attribute("[data-frame]", "data-frame"), self.text("certificate"))
-            if now == before:
+            same = same + 1 if now == before else 0
+            if same == 4:
                 return
             before = now
         raise AssertionError("the page does not come to rest")
@@ -156,9 +157,10 @@ def _note_request(watched: Watched, address: str, url: str) -> None:
 
 def run_json(scenario: Path) -> dict[str, Any]:
     """Return what the command prints for a scenario."""
-    command = [sys.executable, "-m", "softnlp", "run", str(scenario), "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    document: dict[str, Any] = json.loads(done.stdout)
+    printed = io.StringIO()
+    with redirect_stdout(printed):
+        main(["run", str(scenario), "--json"])
+    document: dict[str, Any] = json.loads(printed.getvalue())
     return document
 
 
