@@ -14,7 +14,7 @@ pytest.importorskip("nicegui", reason="the extra gui is not installed")
 pytest.importorskip("playwright", reason="playwright is not installed")
 
 from benchmarks.app import chromium, served
-from tests.browser import Watched, browser, run_json, shown_like
+from tests.browser import WINDOW, Watched, browser, run_json, shown_like
 
 pytestmark = [
     pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine"),
@@ -265,6 +265,9 @@ WILD = (
     ("robot-length_mm", "-60", "robot"),
     ("robot-length_mm", "1e300", "robot"),
     ("robot-outer_diameter_mm", "0", "robot"),
+    ("robot-chamber_wall_mm", "1e-300", "robot"),
+    ("robot-chambers_per_set", "0.5", "robot"),
+    ("robot-chamber_angle_deg", "-20", "robot"),
     ("tip_load-force_N-x", "1e308", "loads"),
     ("stiffening-elongation", "-1", "coefficients"),
     ("corrections-bore_fraction", "7", "coefficients"),
@@ -471,6 +474,7 @@ def test_a_workspace_is_swept_stopped_and_shown(tab: Watched, pictures: Path) ->
     tab.press("tab-workspace")
     tab.type("workspace.workers", "1")
     run(tab, "workspace")
+    tab.page.set_viewport_size(WINDOW)
     tab.page.mouse.move(600, 700)
     tab.page.wait_for_timeout(1500)  # still pictures are drawn smoothly
     tab.page.screenshot(path=pictures / "app.png")
@@ -550,6 +554,7 @@ def test_constants_are_identified_from_a_dropped_file(tab: Watched) -> None:
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 def test_nothing_is_cut_off_and_texts_can_be_read(tab: Watched, dark: bool, pictures: Path) -> None:
     """Contrast of every text against its background, and no part wider than its column."""
+    tab.page.set_viewport_size(WINDOW)
     if dark:
         tab.press("dark")
     for name in ("kinematics", "blocked", "workspace", "inverse", "identify", "scenario"):
