@@ -43,4 +43,4 @@ def put(user: User, marker: str, value: object, index: int = 0) -> None:
 
 async def drawn() -> None:
     """Wait until what is drawn a moment after a change is drawn."""
-    await asyncio.sleep(0.2)
+    await asyncio.sleep(0.4)

@@ -63,6 +63,7 @@ def force(step: Step) -> float:
     return step.contact.force
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closure", ["free", "compliant"])
 @pytest.mark.parametrize("name", NAMES)
 def test_every_robot_is_solved_up_to_full_pressure(name: str, closure: str) -> None:
@@ -80,6 +81,7 @@ def test_the_published_force_without_the_chamber_constraint() -> None:
     assert 0.72 <= force(sequence("D25L60", "free").steps[-1]) <= 0.80
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "bar", "cap"),
     [
@@ -142,6 +144,7 @@ def test_weighted_agrees_with_the_witness(weights: tuple[float, float, float, fl
     assert (left["e_h"] == 0) == (weights[3] is None)
 
 
+@pytest.mark.slow
 def test_weighted_goes_on_where_the_square_equations_are_singular_and_folds_where_the_minimum_ends() -> None:
     weights = (10.0, 10.0, 20.0, None)
     contact = ContactSettings(closure="weighted", weights=ClosureWeights(*weights))
@@ -227,6 +230,7 @@ def test_the_characteristic_curve_falls_to_the_free_tip() -> None:
     assert forces[1] == pytest.approx(force(one(1.2, ContactSettings(offset=-0.02))), rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_leaning_wall_is_moved_along_the_normal_in_which_it_pushes() -> None:
     lean = (float(np.cos(0.2)), 0.0, float(np.sin(0.2)))
     wall = ContactSettings(wall_point=(-0.02, 0.0, 0.01), wall_normal=lean)
@@ -240,6 +244,7 @@ def test_a_leaning_wall_is_moved_along_the_normal_in_which_it_pushes() -> None:
         assert forces[k] == pytest.approx(force(alone), rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closure", ["free", "compliant", "rigid", "weighted"])
 def test_a_force_gives_back_its_pressure(closure: str) -> None:
     contact = ContactSettings(closure=closure)  # type: ignore[arg-type]
@@ -329,6 +334,7 @@ def test_collocation_gives_the_same_force() -> None:
     assert force(step) == pytest.approx(force(one(0.6)), rel=1e-5)
 
 
+@pytest.mark.slow
 def test_constrained_chambers_resist_a_tip_load() -> None:
     loads = Loads(tip_force=(0.1, 0.0, -0.05))
     free, compliant, rigid, weighted = (
@@ -361,6 +367,7 @@ def test_weights_matter_as_they_are_said_to() -> None:
     assert by_name["length"] == pytest.approx(np.log(up / down) / (2 * np.log(1.02)), rel=0.02)
 
 
+@pytest.mark.slow
 def test_weight_sensitivity_of_a_run_is_that_of_its_steps() -> None:
     contact = ContactSettings(closure="weighted", weights=ClosureWeights(force=1.0, moment=1.0, length=5.0))
     run = blocked_force(D25L60, ECOFLEX, [[0.45 * BAR, 0, 0], [0.9 * BAR, 0, 0]], contact, weight_sensitivity=True)
@@ -373,6 +380,7 @@ def test_weight_sensitivity_of_a_run_is_that_of_its_steps() -> None:
         blocked_force(D25L60, ECOFLEX, [0, 0, 0], ContactSettings(closure="weighted"), weight_sensitivity=True)
 
 
+@pytest.mark.slow
 def test_a_fold_is_not_stepped_over_onto_the_part_of_the_curve_beyond_it() -> None:
     # the branch folds at 1.292 bar; close by the curve rises again, with other forces and the same sign
     for bars in ([1.5], [1.36, 1.5], [0.9, 1.2, 1.32, 1.5]):
@@ -382,6 +390,7 @@ def test_a_fold_is_not_stepped_over_onto_the_part_of_the_curve_beyond_it() -> No
             assert step.status is Status.FOLD if bar > 1.3 else step.status.has_solution
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "bar", "closure", "other"), [("D10L60", 1.3, "compliant", 2), ("D15L60", 1.3, "free", 2)]
 )

@@ -64,6 +64,7 @@ def test_a_closure_may_bring_an_unknown_and_its_equation() -> None:
     assert forces(own, 1)[0] > 2 * forces("compliant", 1)[0]
 
 
+@pytest.mark.slow
 def test_a_closure_of_ones_own_has_sensitivities() -> None:
     def slope(closure: Any) -> float:
         found = sensitivities(

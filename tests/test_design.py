@@ -397,6 +397,7 @@ def test_the_papers_case_has_the_published_angles() -> None:
             assert candidate.is_feasible == (angle >= 100)
 
 
+@pytest.mark.slow
 def test_a_free_pressure_pushes_harder_than_the_lowest(tmp_path: Path) -> None:
     """The shipped scenario with its winner alone, which the paper's question would have left at 0.14 N."""
     text = (FOLDER / "laparoscope_free_pressure.toml").read_text()

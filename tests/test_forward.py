@@ -20,6 +20,7 @@ from designs import (
     silicone,
 )
 from euler_elastica import cantilever
+from slow import some_slow
 from witness import Witnessed, arc, shoot
 from witness_section import section
 
@@ -168,7 +169,7 @@ def agrees(pose: Pose, w: Witnessed, L: float) -> float:
     return error
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", some_slow(30, quick=12))
 def test_a_loaded_pose_is_the_witness_s(seed: int) -> None:
     robot, material, pressure, loads, w = witnessed(seed)
     step = solve(robot, material, pressure, loads=loads)

@@ -122,6 +122,7 @@ def test_the_nearest_point_is_stationary() -> None:
     assert slope < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("loads", "asked"),
     [

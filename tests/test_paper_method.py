@@ -55,6 +55,7 @@ def test_its_integration_is_of_fourth_order() -> None:
     assert np.log2(np.abs(coarse - exact).max() / np.abs(fine - exact).max()) == pytest.approx(4, abs=0.3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("W_L", [0.0, 1.0, 5.0])
 def test_in_the_plane_and_followed_its_blocked_force_is_the_witness_s(W_L: float) -> None:
     fractions = np.arange(1, 11) / 10

@@ -29,6 +29,7 @@ def blocked_steps(name: str) -> list[dict[str, Any]]:
         return steps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BLOCKED)
 def test_a_blocked_force_runs(name: str) -> None:
     for step in blocked_steps(name):
@@ -56,6 +57,7 @@ def documented_forces() -> dict[str, list[float]]:
     return {name: [float("nan") if c in ("fold", "") else float(c) for c in row] for name, row in rows.items()}
 
 
+@pytest.mark.slow
 def test_the_documented_comparison_is_that_of_the_benchmark() -> None:
     from benchmarks.blocked_measured import LENGTH_WEIGHTS, MEASURED, MODELS, forces, with_length_weight
 

@@ -64,6 +64,7 @@ def test_d25l60_with_compliant_chambers() -> None:
     assert curve("D25L60", "compliant")[-1].force == pytest.approx(1.22, rel=0.02)
 
 
+@pytest.mark.slow
 def test_mean_errors_over_the_eight_robots() -> None:
     compliant, calibrated = relative_errors("compliant"), relative_errors("compliant", calibrated=True)
     assert compliant[:, -1].mean() == pytest.approx(0.065, abs=0.002)
@@ -102,6 +103,7 @@ def test_compliant_lies_between_free_and_rigid() -> None:
     assert abs(rigid.e_L) < 1e-12
 
 
+@pytest.mark.slow
 def test_weighted_runs_from_free_to_the_length_constraint() -> None:
     bar = 0.9
     free = one(bar, Wall("free")).force

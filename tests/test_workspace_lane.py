@@ -215,6 +215,7 @@ def test_blocked_poses_are_those_of_the_study(closure: str, loads: Loads, offset
         assert row["chamber_length"] == pytest.approx(step.pose.chamber_length, abs=2e-7)
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_a_blocked_pose_out_of_the_walls_plane_is_solved_in_space() -> None:
     pressures = np.array([[1.0, 0.2, 0.0], [0.8, 0.0, 0.3]]) * BAR
