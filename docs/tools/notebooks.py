@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import re
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from docs.tools import cache
@@ -42,9 +43,12 @@ def run(path: Path) -> Any:
     from nbclient import NotebookClient
 
     notebook = nbformat.read(path, as_version=4)
-    kernel = AsyncKernelManager(kernel_name="python3", transport="ipc")
     where = {"metadata": {"path": str(cache.ROOT)}}
-    NotebookClient(notebook, km=kernel, timeout=120, resources=where).execute()
+    with TemporaryDirectory() as folder:
+        # The sockets stand beside this file; without it those of two notebooks would be the same
+        file = f"{folder}/kernel.json"
+        kernel = AsyncKernelManager(kernel_name="python3", transport="ipc", connection_file=file)
+        NotebookClient(notebook, km=kernel, timeout=120, resources=where).execute()
     return notebook
 
 
