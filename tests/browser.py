@@ -108,13 +108,6 @@ class Watched:
             self.page.wait_for_timeout(250)
         raise AssertionError(f"{self.numbers()} instead of {numbers}")
 
-    def well(self) -> None:
-        """Wait until the page says of nothing that it is wrong."""
-        self.page.wait_for_function(
-            "() => ![...document.querySelectorAll('.q-field__messages [role=alert], [data-testid=message]')]"
-            ".some(e => e.checkVisibility() && e.textContent)"
-        )
-
     def said(self) -> list[str]:
         """Return what the page says is wrong, beside fields and below the view, once it says something."""
         places = self.page.locator(".q-field__messages [role=alert], [data-testid=message]:visible")

@@ -286,7 +286,7 @@ def test_wild_input_leaves_the_page_alive_with_a_message(tab: Watched, tmp_path:
         tab.type(field, value)
         assert tab.said(), f"{field} = {value!r}: nothing is said"
         tab.type(field, was)
-        tab.well()
+        tab.settled()
     tab.shows_again(good)
     tab.page.locator("input[data-testid=pressure-number-1]").press_sequentially("abc")
     tab.shows_again(good)

@@ -69,6 +69,9 @@ class LiveView:
         if not (await asyncio.wait({task}, timeout=_PATIENCE_S))[0]:
             with self._client:
                 self._say(_SOLVING)
+            await asyncio.wait({task})
+            with self._client:
+                self._say("")
         try:
             run, ghost = await task
         except InputError as error:
