@@ -417,9 +417,9 @@ def test_a_sequence_is_run_and_shown(tab: Watched, tmp_path: Path) -> None:
     tab.choose("sequence.quantity", "ength")
     tab.choose("sequence.axis", "step")
     tab.page.locator("[data-testid='sequence.step'] [tabindex='0']").first.focus()
-    for _ in range(4):
+    for _ in range(8):  # the first step is the last of as many presses as it takes
         tab.page.keyboard.press("ArrowLeft")
-        tab.page.wait_for_timeout(150)
+        tab.page.wait_for_timeout(500)
     tab.value_becomes("pressure-number-1", "0.1")
     tab.press("sequence.table.copy")
     tab.page.locator("[data-testid='pressure.source'] button", has_text="CSV").click()
