@@ -114,7 +114,8 @@ def _curve(
 
 
 def _axis(title: str, reach: list[float] | None) -> dict[str, Any]:
-    return {"title": {"text": title, "font": {"size": 12}, "standoff": 6}, "range": reach}
+    axis: dict[str, Any] = {"title": {"text": title, "font": {"size": 12}, "standoff": 6}}
+    return axis if reach is None else axis | {"range": reach}  # plotly fails, later, on a range that is null
 
 
 def _pose() -> dict[str, Any]:

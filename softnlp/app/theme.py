@@ -23,10 +23,9 @@ body {{ overflow: hidden; }}
 """
 
 
-# Plotly resizes a plot a moment after its place changed, when that may be hidden or gone, and complains to the console.
-_QUIET = """for (const kind of ["unhandledrejection", "error"]) window.addEventListener(kind, event => {
-  const words = String(event.reason?.message ?? event.reason ?? event.message);
-  if (/Resize must be passed|container is not an object/.test(words)) event.preventDefault();
+# NiceGUI resizes a plot when its size changes, which it does too when it is hidden: plotly refuses that by a promise.
+_QUIET = """window.addEventListener("unhandledrejection", event => {
+  if (/Resize must be passed/.test(String(event.reason?.message))) event.preventDefault();
 });"""
 
 
