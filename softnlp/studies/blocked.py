@@ -85,9 +85,12 @@ class BlockedSolver:
 
     def with_contact(self, contact: ContactSettings) -> BlockedSolver:
         """Return a solver with other settings that shares what both need compiled."""
-        other = BlockedSolver(self.model, self.numerics, contact, wall=self.has_wall, poses=self.poses)
-        if contact.closure == self.contact.closure:
-            other.functions, other._compiled = self.functions, self._compiled
+        if contact.closure != self.contact.closure:
+            return BlockedSolver(self.model, self.numerics, contact, wall=self.has_wall, poses=self.poses)
+        other = copy(self)
+        other.contact = contact
+        if contact.weights != self.contact.weights:
+            other._grids = {}  # what they minimise has the weights in it
         return other
 
     def with_model(self, model: Model) -> BlockedSolver:
