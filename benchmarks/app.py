@@ -35,7 +35,7 @@ FLAGS = (
 )
 CASES = {
     "no load": {},
-    "tip force and gravity": {"tip_load-force_N-x": "0.05", "tip_load-force_N-y": "0.02"},
+    "tip force and gravity": {"tip_load.force_N.0": "0.05", "tip_load.force_N.1": "0.02"},
 }
 # Notes when a key goes down and when the view has drawn the next frame.
 WATCH = """

@@ -27,6 +27,7 @@ from softnlp.transcription import MultipleShooting, Tableau, rk_step
 Array = NDArray[np.float64]
 
 _FORCE = slice(12, 18)
+_LARGEST = 1e150  # whose square is finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +67,7 @@ class CondensedSolver:
         rows, known = len(self._into[0]), self._base.shape[1]
         given = np.zeros(x.size) if g is None else g
         directions, tip, turned = (np.asarray(part) for part in self._sweep(1)(x, p, given))
-        if not np.all(np.isfinite(tip)):
+        if not np.max(np.abs(tip)) < _LARGEST:  # nan is not either
             raise np.linalg.LinAlgError("the linearised tip equations are not finite")
         matrix = np.delete(tip, known, axis=1)
         every = directions.reshape(*self._shape, known + 1)
@@ -84,7 +85,7 @@ class CondensedSolver:
         """Return the columns dx for as many right sides G (n, r) in one sweep. Raises as `solve`."""
         r, rows, known = G.shape[1], len(self._into[0]), self._base.shape[1]
         directions, tip, turned = (np.asarray(part) for part in self._sweep(r)(x, p, G))
-        if not np.all(np.isfinite(tip)):
+        if not np.max(np.abs(tip)) < _LARGEST:  # nan is not either
             raise np.linalg.LinAlgError("the linearised tip equations are not finite")
         matrix = np.delete(tip, np.s_[known : known + r], axis=1)
         right = tip[:, known : known + r] + G[-rows:]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -57,6 +57,18 @@ class Model:
     material: Material
     coefficients: Coefficients = Coefficients()
     conventions: Conventions = REPRODUCTION
+
+    @property
+    def kind(self) -> Hashable:
+        """What the compiled equations depend on; models of one kind differ by the values of quantities only."""
+        robot, law = self.robot, self.material.law
+        chambers = (robot.chamber_sets, robot.chambers_per_set)
+        return chambers, (law.name, law.constants, law.formula, law.modulus), self.conventions
+
+    def check_kind(self, other: Model) -> None:
+        """Raise `ValueError` for a model of another kind, whose numbers do not fit the compiled equations."""
+        if self.kind != other.kind:
+            raise ValueError("a model with other chambers, law or conventions needs a solver of its own")
 
 
 _SIZES = tuple(d.field for d in DIMENSIONS if d.scale is not None)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from softnlp.runner_blocked import run_blocked
 from softnlp.runner_inverse import run_inverse
+from softnlp.runner_run import run_of
 from softnlp.scenario import Scenario
 from softnlp.studies.forward import forward
 from softnlp.studies.step import Run, Step
@@ -42,18 +43,7 @@ def run_scenario(scenario: Scenario, progress: Progress | None = None, branches:
 def partial_run(scenario: Scenario, steps: Sequence[Step]) -> Run:
     """Return the run of a scenario that was stopped after some steps; a warning says so."""
     note = f"stopped by the user after {len(steps)} of {scenario.step_count} steps"
-    return Run(
-        study=scenario.study,
-        robot=scenario.robot,
-        material=scenario.material,
-        coefficients=scenario.coefficients,
-        conventions=scenario.conventions,
-        loads=scenario.loads,
-        steps=tuple(steps),
-        title=scenario.title,
-        warnings=(*scenario.warnings, note),
-        contact=scenario.contact,
-    )
+    return run_of(scenario, steps, note)
 
 
 def _forward(scenario: Scenario, progress: Progress | None, branches: int) -> Run:

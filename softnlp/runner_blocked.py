@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from softnlp.contact_settings import ContactTask
+from softnlp.runner_run import run_of
 from softnlp.scenario import Scenario
 from softnlp.studies.blocked_force import blocked_force, constrained_pose, force_against_offset
 from softnlp.studies.force_inversion import pressure_for_force
@@ -43,7 +44,7 @@ def run_blocked(scenario: Scenario, progress: Progress | None, branches: int = 0
         _, step = pressure_for_force(*model, sets, task.target_force, contact, highest=float(bound.max()), **settings)
         if progress is not None:
             progress(0, step)
-        return _run(scenario, (step,))
+        return run_of(scenario, [step])
     settings |= {"title": scenario.title, "progress": progress}
     if task.offsets is not None:
         return force_against_offset(*model, scenario.pressures[0], task.offsets, contact, **settings)
@@ -71,18 +72,4 @@ def _constrained(scenario: Scenario, progress: Progress | None, settings: dict[s
         steps.append(step)
         if progress is not None:
             progress(k, step)
-    return _run(scenario, tuple(steps))
-
-
-def _run(scenario: Scenario, steps: tuple[Step, ...]) -> Run:
-    return Run(
-        study=scenario.study,
-        robot=scenario.robot,
-        material=scenario.material,
-        coefficients=scenario.coefficients,
-        conventions=scenario.conventions,
-        loads=scenario.loads,
-        steps=steps,
-        title=scenario.title,
-        contact=scenario.contact,
-    )
+    return run_of(scenario, steps)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from softnlp.quantities import Model
 from softnlp.scenario import Scenario
 from softnlp.studies.inverse import follow_targets
 from softnlp.studies.inverse_solver import InverseSolver
@@ -18,7 +17,7 @@ def run_inverse(scenario: Scenario, progress: Progress | None, branches: int = 0
     """Run inverse kinematics; `branches` means nothing here."""
     task = scenario.task
     assert isinstance(task, InverseTask)
-    model = Model(scenario.robot, scenario.material, scenario.coefficients, scenario.conventions)
+    model = scenario.model
     solver = InverseSolver(model, scenario.numerics, scenario.loads, task, "newton")
     return Run(
         study=scenario.study,

@@ -18,6 +18,7 @@ from softnlp.errors import InputError, nearest
 from softnlp.materials import Material, material_from_table
 from softnlp.numerics import Numerics
 from softnlp.pressures import PressurePath, pressure_path
+from softnlp.quantities import Model
 from softnlp.reading import LONGEST_NAME, one_line, read_text, shown
 from softnlp.robot import DIMENSIONS, ROBOTS, Robot, Violation, check, violations
 from softnlp.rod import Loads
@@ -85,6 +86,11 @@ class Scenario:
     contact: ContactSettings | None
     task: Task | None
     warnings: tuple[str, ...]
+
+    @property
+    def model(self) -> Model:
+        """Its robot, silicone, coefficients and conventions."""
+        return Model(self.robot, self.material, self.coefficients, self.conventions)
 
     @property
     def step_count(self) -> int:

@@ -118,6 +118,15 @@ class Watched:
             self.page.wait_for_timeout(200)
         return []
 
+    def says_nothing(self) -> None:
+        """Wait until the page says of nothing that it is wrong."""
+        places = self.page.locator(".q-field__messages [role=alert], [data-testid=message]:visible")
+        for _ in range(150):
+            if not any(places.all_inner_texts()):
+                return
+            self.page.wait_for_timeout(100)
+        raise AssertionError(f"still said: {places.all_inner_texts()}")
+
     def saved(self, folder: Path) -> Path:
         """Save what is on the screen and return the file."""
         with self.page.expect_download(timeout=WAIT_MS) as waiting:

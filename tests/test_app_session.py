@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("tomlkit", reason="the extra gui is not installed")
 
-from softnlp.app.numbers import certificate_words, chamber_lines, step_lines
+from softnlp.app.numbers import certificate_words, step_lines
 from softnlp.app.session import LARGEST_FILE, Session
 from softnlp.errors import InputError
 from softnlp.results import to_json
@@ -112,9 +112,9 @@ def test_a_shipped_scenario_opens_with_its_files(session: Session, file: Path) -
     asked = session.asked()
     assert asked.study == session.document.study
     again = Session()
-    again.folder = session.folder
-    again.recall(session.kept())
+    again.recall(session.kept(), session.kept_files())
     assert again.text() == session.text()
+    assert np.array_equal(again.asked().pressures, asked.pressures)
     again.close()
 
 
@@ -134,8 +134,13 @@ def test_what_cannot_be_opened_leaves_the_screen_as_it_was(session: Session) -> 
             session.open(text, "x.toml")
     with pytest.raises(InputError, match="open both together"):
         session.open(before.replace("sequence_bar = [[0.8, 0.0, 0.0]]", 'file = "p.csv"'), "x.toml")
-    with pytest.raises(InputError, match="beside the scenario"):
-        session.open(before.replace("sequence_bar = [[0.8, 0.0, 0.0]]", 'file = "/etc/passwd"'), "x.toml")
+    for elsewhere in ("/etc/passwd", "../p.csv", "sub/p.csv"):
+        with pytest.raises(InputError, match="beside the scenario"):
+            session.open(before.replace("sequence_bar = [[0.8, 0.0, 0.0]]", f'file = "{elsewhere}"'), "x.toml")
+    session.keep("p.csv", b"of the screen")
+    with pytest.raises(InputError):  # read, and not a table of pressures
+        session.open(before.replace("sequence_bar = [[0.8, 0.0, 0.0]]", 'file = "p.csv"'), "x.toml", {"p.csv": b"x"})
+    assert (session.folder / "p.csv").read_bytes() == b"of the screen"
     with pytest.raises(InputError, match="at most"):
         session.keep("big.csv", b"0" * (LARGEST_FILE + 1))
     with pytest.raises(InputError, match="with a name"):
@@ -143,6 +148,9 @@ def test_what_cannot_be_opened_leaves_the_screen_as_it_was(session: Session) -> 
     for kept in ("{", "{}", json.dumps({"name": "a", "source": "=", "study": "forward", "pressure": None})):
         with pytest.raises(InputError):
             session.recall(kept)
+    for files in ("{", "[]", '{"a.csv": 3}', '{"a.csv": "x"}'):
+        with pytest.raises(InputError):
+            session.recall(session.kept(), files)
     assert session.text() == before
 
 
@@ -161,14 +169,15 @@ def test_the_page_says_in_words_how_a_step_ended(session: Session) -> None:
     run, ghost = session.live.pose(session.scenario, session.pressure)
     assert ghost is None  # nothing loads it
     assert certificate_words(run).startswith("Solved, residual")
-    lines = {line.key: line for line in (*step_lines(run), *chamber_lines(run))}
+    shown = step_lines(run)
+    lines = {line.key: line for line in (*shown.numbers, *shown.chambers)}
     assert lines["bending_angle_deg"].text == f"{np.degrees(run.steps[0].pose.bending_angle):.3f}"  # type: ignore[union-attr]
     assert lines["chamber_length_mm.5"].unit == "mm"
     session.change_all("stiffening", {"elongation": 0.0, "bending": 0.0})
     run, _ = session.live.pose(session.scenario, np.full(3, 9 * BAR))
     assert not run.steps[0].status.has_solution
     assert "lower the pressure" in certificate_words(run)
-    assert {line.text for line in step_lines(run)} == {"–"}
+    assert {line.text for line in step_lines(run).numbers} == {"–"}
 
 
 def test_a_load_leaves_the_free_shape_as_a_ghost(session: Session) -> None:

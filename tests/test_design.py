@@ -33,6 +33,7 @@ from softnlp import (
 )
 from softnlp.cli import main
 from softnlp.contact_settings import ContactSettings
+from softnlp.conventions import AS_PRINTED
 from softnlp.quantities import Model
 from softnlp.runner_design import run_design
 from softnlp.scenario import scenario_from_text
@@ -205,6 +206,13 @@ def test_a_solver_takes_another_model_without_compiling() -> None:
     assert again.contact is not None
     assert before.contact is not None
     assert again.contact.force == before.contact.force != changed.force
+    for unlike in (
+        Model(robot("D25L60", chambers_per_set=1), SOFT),
+        Model(D25, material("Ecoflex 00-50", "yeoh")),
+        Model(D25, SOFT, conventions=AS_PRINTED),
+    ):
+        with pytest.raises(ValueError, match="a solver of its own"):
+            first.with_model(unlike)
 
 
 def test_the_closed_form_is_the_solved_free_shape() -> None:

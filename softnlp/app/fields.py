@@ -7,6 +7,7 @@ from math import isfinite
 from typing import Any
 
 from nicegui import ui
+from nicegui.elements.mixins.value_element import ValueElement
 
 from softnlp.app.session import Session
 
@@ -47,13 +48,7 @@ def number_field(
     if unit:
         field.props(f'suffix="{unit}"')
 
-    def refresh() -> None:
-        # While a person types, the field is theirs: only a value that means something else is put in its place.
-        if field.value != shown():
-            field.set_value(shown())
-        tell_problem(session, field, table, key)
-
-    session.on_scenario(refresh)
+    _follow(session, table, key, [field], lambda: [shown()])
     return field
 
 
@@ -85,13 +80,72 @@ def choice_field(
     )
     field.without_auto_validation()
 
+    _follow(session, table, key, [field], lambda: [shown()])
+    return field
+
+
+def vector_field(
+    session: Session,
+    table: str,
+    key: str,
+    labels: Sequence[str],
+    unit: str,
+    *,
+    default: Sequence[float] = (0.0, 0.0, 0.0),
+    step: float | None = None,
+    written: bool = True,
+) -> None:
+    """Show a list of numbers of the scenario, a field for each. written : whether the file says the default too."""
+
+    def shown() -> list[float]:
+        value = session.document.get(table, key)
+        usable = isinstance(value, list) and len(value) == len(labels)
+        usable = usable and all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
+        return [float(v) for v in value] if usable else list(default)
+
+    def entered(index: int, value: float | None) -> None:
+        if value is None or not isfinite(value):
+            say_beside(fields[index], "expected a number")
+            return
+        vector = shown()
+        if value != vector[index]:
+            vector[index] = float(value)
+            session.change(table, key, vector if written or vector != list(default) else None)
+
+    fields: list[ui.number] = []
+    with ui.row().classes("w-full no-wrap gap-2"):
+        for index, label in enumerate(labels):
+            field = ui.number(label, value=shown()[index], step=step)
+            field.on_value_change(lambda event, index=index: entered(index, event.value))
+            field.props("dense outlined debounce=250 hide-bottom-space").classes("min-w-0 grow basis-0")
+            field.mark(f"{table}.{key}.{index}").props(f"data-testid={table}.{key}.{index}")
+            if unit:
+                field.props(f'suffix="{unit}"')
+            field.without_auto_validation()
+            fields.append(field)
+    _follow(session, table, key, fields, shown)
+
+
+def _follow(
+    session: Session,
+    table: str,
+    key: str,
+    fields: Sequence[ValueElement[Any]],
+    shown: Callable[[], Sequence[Any]],
+) -> None:
+    """Let fields follow the scenario, and the first say what is wrong with the key.
+
+    While a person types, a field is theirs: only a value that means something else is put in its place.
+    """
+
     def refresh() -> None:
-        if field.value != shown():
-            field.set_value(shown())
-        tell_problem(session, field, table, key)
+        for field, value in zip(fields, shown(), strict=True):
+            if field.value != value:
+                field.set_value(value)
+            say_beside(field, "")
+        tell_problem(session, fields[0], table, key)
 
     session.on_scenario(refresh)
-    return field
 
 
 def tell_problem(session: Session, field: ui.element, table: str, *keys: str) -> None:

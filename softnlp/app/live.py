@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from dataclasses import replace
 from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.contact_settings import ContactSettings, ContactTask
-from softnlp.quantities import Model
 from softnlp.rod import Loads
+from softnlp.runner_run import run_of
 from softnlp.scenario import Scenario
 from softnlp.studies.arc import arc_pose, unloaded_arc
 from softnlp.studies.blocked import BlockedSolver
@@ -20,11 +21,6 @@ from softnlp.studies.step import Pose, Run, Step
 from softnlp.studies.wall import standing_wall
 
 Array = NDArray[np.float64]
-
-
-def model_of(scenario: Scenario) -> Model:
-    """Return the model of a scenario."""
-    return Model(scenario.robot, scenario.material, scenario.coefficients, scenario.conventions)
 
 
 class LivePoses:
@@ -49,7 +45,8 @@ class LivePoses:
             solver = self._solver(scenario)
             step, solved = solver.solve(pressure, scenario.loads, self._start(scenario))
             self._near, self._near_kind = solved or self._near, _kind(scenario)
-            return _run("forward", scenario, step), self._ghost(solver, scenario, step)
+            run = replace(run_of(scenario, [step]), study="forward", contact=None)  # a pose of whatever study it is
+            return run, self._ghost(solver, scenario, step)
 
     def blocked(self, scenario: Scenario, pressure: Array) -> tuple[Run, Pose | None]:
         """Return a run of one step of the blocked force at a pressure (sets,) [Pa], and the free shape there.
@@ -70,7 +67,7 @@ class LivePoses:
                 wall = standing_wall(solver.poses, scenario.contact, np.atleast_2d(pressure), scenario.loads)
             step, _ = solver.solve(pressure, scenario.loads, wall)
         free = None if step.contact is None else step.contact.free
-        return _run("blocked-force", scenario, step), free
+        return run_of(scenario, [step]), free
 
     def _start(self, scenario: Scenario) -> Solved | None:
         """Return the last pose, where it is one of the same kind of problem."""
@@ -80,15 +77,15 @@ class LivePoses:
         kind = _kind(scenario)
         if kind not in self._poses:
             self._poses.clear()  # one kind at a time: a compiled grid is some megabytes
-            self._poses[kind] = PoseSolver(model_of(scenario), scenario.numerics)
-        return self._poses[kind].with_model(model_of(scenario))
+            self._poses[kind] = PoseSolver(scenario.model, scenario.numerics)
+        return self._poses[kind].with_model(scenario.model)
 
     def _blocked_solver(self, scenario: Scenario, contact: ContactSettings, wall: bool) -> BlockedSolver:
         kind = (_kind(scenario), contact.closure, wall)
         if kind not in self._blocked:
             self._blocked.clear()
-            self._blocked[kind] = BlockedSolver(model_of(scenario), scenario.numerics, contact, wall=wall)
-        return self._blocked[kind].with_contact(contact).with_model(model_of(scenario))
+            self._blocked[kind] = BlockedSolver(scenario.model, scenario.numerics, contact, wall=wall)
+        return self._blocked[kind].with_contact(contact).with_model(scenario.model)
 
     def _ghost(self, solver: PoseSolver, scenario: Scenario, step: Step) -> Pose | None:
         if step.pose is None or not np.any(_loads(scenario.loads)):
@@ -102,25 +99,4 @@ def _loads(loads: Loads) -> Array:
 
 def _kind(scenario: Scenario) -> Hashable:
     """Return what a compiled solver is made for; numbers may differ."""
-    robot, law = scenario.robot, scenario.material.law
-    return (
-        (robot.chamber_sets, robot.chambers_per_set),
-        (law.name, law.constants, law.formula),
-        scenario.conventions,
-        scenario.numerics,
-    )
-
-
-def _run(study: str, scenario: Scenario, step: Step) -> Run:
-    return Run(
-        study=study,
-        robot=scenario.robot,
-        material=scenario.material,
-        coefficients=scenario.coefficients,
-        conventions=scenario.conventions,
-        loads=scenario.loads,
-        steps=(step,),
-        title=scenario.title,
-        warnings=scenario.warnings,
-        contact=scenario.contact if study == "blocked-force" else None,
-    )
+    return scenario.model.kind, scenario.numerics

@@ -23,9 +23,21 @@ class Line:
     unit: str
 
 
-def step_lines(run: Run) -> list[Line]:
-    """Return the numbers of the only step of a run; without a solution each is a dash."""
+@dataclass(frozen=True)
+class Lines:
+    """The numbers of a step. numbers : without a solution each is a dash. chambers : of each chamber."""
+
+    numbers: list[Line]
+    chambers: list[Line]
+
+
+def step_lines(run: Run) -> Lines:
+    """Return what the document of a run says of its only step."""
     step = to_json(run)["steps"][0]
+    return Lines(_numbers(run, step), _chambers(run, step))
+
+
+def _numbers(run: Run, step: dict[str, Any]) -> list[Line]:
     length = run.robot.length / MILLIMETRE
     lines = [Line(f"tip_position_mm.{k}", f"Tip {axis}", _fixed(_entry(step, "tip_position_mm", k), 3), "mm")
              for k, axis in enumerate("xyz")]  # fmt: skip
@@ -45,9 +57,8 @@ def step_lines(run: Run) -> list[Line]:
     return [*lines, *_contact(step)]
 
 
-def chamber_lines(run: Run) -> list[Line]:
+def _chambers(run: Run, step: dict[str, Any]) -> list[Line]:
     """Return the length of each chamber, and of a blocked force the reaction of each."""
-    step = to_json(run)["steps"][0]
     lines = [Line(f"chamber_length_mm.{n}", f"Chamber {n + 1}", _fixed(_entry(step, "chamber_length_mm", n), 3), "mm")
              for n in range(run.robot.chambers)]  # fmt: skip
     if "chamber_reaction_N" in step:

@@ -10,9 +10,8 @@ from typing import Any, TypeVar
 
 from nicegui import events, ui
 
-from softnlp.app.fields import tell_problem
 from softnlp.app.job import Progress, Stopped, in_background
-from softnlp.app.session import LARGEST_FILE, Session
+from softnlp.app.session import LARGEST_FILE
 from softnlp.app.theme import darkness, figure_config, figure_layout, on_dark
 from softnlp.errors import InputError, SoftnlpError
 
@@ -175,10 +174,6 @@ class NumberTable:
         self._more.set_text(f"first {MOST_ROWS} of {len(rows)} rows" if len(rows) > MOST_ROWS else "")
         self._box.set_visibility(True)
 
-    def hide(self) -> None:
-        """Show nothing."""
-        self._box.set_visibility(False)
-
     def _copy(self) -> None:
         ui.clipboard.write(self._csv)
         ui.notify("Copied as CSV", position="bottom-right", timeout=1500)
@@ -285,35 +280,3 @@ _DROP = """
 
 def _too_large(name: str) -> str:
     return f"{name} is not taken: expected a CSV table of at most {LARGEST_FILE / 1e6:.0f} MB"
-
-
-def vector_field(
-    session: Session, table: str, key: str, labels: Sequence[str], unit: str, default: Sequence[float]
-) -> ui.row:
-    """Show a list of numbers of the scenario, a field for each."""
-
-    def value() -> list[Any]:
-        found = session.document.get(table, key)
-        return found if isinstance(found, list) and len(found) == len(labels) else list(default)
-
-    def entered(k: int, new: float | None) -> None:
-        if new is not None and isfinite(new) and new != value()[k]:
-            session.change(table, key, [new if j == k else v for j, v in enumerate(value())])
-
-    fields: list[ui.number] = []
-    with ui.row().classes("w-full gap-2 no-wrap") as row:
-        for k, label in enumerate(labels):
-            field = ui.number(label, value=value()[k], on_change=lambda event, k=k: entered(k, event.value))
-            field.props(f'dense outlined debounce=250 hide-bottom-space suffix="{unit}"').classes("grow")
-            field.mark(f"{table}.{key}.{k}").props(f"data-testid={table}.{key}.{k}")
-            field.without_auto_validation()  # it would take away what `tell_problem` says
-            fields.append(field)
-
-    def refresh() -> None:
-        for field, number in zip(fields, value(), strict=True):
-            if field.value != number:
-                field.set_value(number)
-        tell_problem(session, fields[0], table, key)
-
-    session.on_scenario(refresh)
-    return row

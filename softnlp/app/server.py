@@ -16,7 +16,8 @@ from softnlp.errors import InputError, SoftnlpError
 HOST = "127.0.0.1"
 FIRST_PORT, LAST_PORT = 8080, 8179
 RECONNECT_S = 60.0
-_KEPT = "softnlp.scenario"  # where a browser tab keeps its scenario, for when the connection or the server was lost
+# Where a browser tab keeps its scenario and the files of it, for when the connection or the server was lost.
+_KEPT, _FILES = "softnlp.scenario", "softnlp.files"
 
 
 def serve(scenario: Path | None, port: int | None, show: bool) -> None:
@@ -52,7 +53,10 @@ def serve(scenario: Path | None, port: int | None, show: bool) -> None:
         session = Session()
         client.on_delete(session.close)
         if scenario is not None:
-            session.open_path(scenario)
+            try:
+                session.open_path(scenario)
+            except SoftnlpError as error:  # it was there when the server started
+                ui.notify(f"not opened: {error}", type="warning", multi_line=True)
         await _recall(session)
         build_page(session)
         _keep(session)
@@ -91,8 +95,9 @@ def free_port(port: int | None) -> int:
 
 
 def _keep(session: Session) -> None:
-    """Let the browser tab keep its scenario, so that a reload or a lost connection loses nothing."""
+    """Let the browser tab keep its scenario and files, so that a reload or a lost connection loses nothing."""
     changed = [True]
+    written: dict[str, str] = {}
 
     def note() -> None:
         changed[0] = True
@@ -100,7 +105,10 @@ def _keep(session: Session) -> None:
     def write() -> None:
         if changed[0]:
             changed[0] = False
-            ui.run_javascript(f"sessionStorage.setItem({json.dumps(_KEPT)}, {json.dumps(session.kept())})")
+            for key, text in ((_KEPT, session.kept()), (_FILES, session.kept_files())):
+                if written.get(key) != text:
+                    written[key] = text
+                    ui.run_javascript(f"sessionStorage.setItem({json.dumps(key)}, {json.dumps(text)})")
 
     session.on_scenario(note)
     session.on_pressure(note)
@@ -109,10 +117,11 @@ def _keep(session: Session) -> None:
 
 async def _recall(session: Session) -> None:
     """Show what the browser tab kept."""
-    kept = await ui.run_javascript(f"return sessionStorage.getItem({json.dumps(_KEPT)})", timeout=10.0)
+    asked = f"return {json.dumps([_KEPT, _FILES])}.map(key => sessionStorage.getItem(key))"
+    kept, files = await ui.run_javascript(asked, timeout=10.0)
     if isinstance(kept, str):
         try:
-            session.recall(kept)
+            session.recall(kept, files if isinstance(files, str) else "{}")
         except SoftnlpError as error:
             ui.notify(f"what this tab showed before could not be opened again: {error}", type="warning")
 

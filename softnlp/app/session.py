@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from base64 import b64decode, b64encode
 from collections.abc import Callable, Mapping
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
@@ -22,6 +23,23 @@ Listener = Callable[[], None]
 
 LARGEST_FILE = 5_000_000
 """Bytes of a file that is taken in."""
+_MOST_KEPT = 2_000_000  # characters of files; a browser keeps some five million for a tab
+
+
+def plain_name(name: str) -> str:
+    """Return the name of a file without its folders; raises `InputError` where nothing is left."""
+    plain = PurePath(name.replace("\\", "/")).name
+    if not plain or plain.startswith("."):
+        raise InputError(f"expected a file with a name, got {shown(name)}")
+    return plain
+
+
+def checked_size(name: str, content: bytes) -> bytes:
+    """Return the content of a file; raises `InputError` for one too large."""
+    if len(content) > LARGEST_FILE:
+        size = len(content) / 1e6
+        raise InputError(f"{shown(name)} has {size:.0f} MB; expected a table of at most {LARGEST_FILE / 1e6:.0f} MB")
+    return content
 
 
 class Session:
@@ -62,17 +80,22 @@ class Session:
         InputError
             Where it cannot be read; the screen stays as it was.
         """
-        for key, content in (files or {}).items():
-            self.keep(key, content)
         name = PurePath(name).name or "scenario.toml"
         document = Document(text)
-        for file in document.files():
-            if PurePath(file).is_absolute() or ".." in PurePath(file).parts:
-                raise InputError(f"expected the name of a file beside the scenario, got {shown(file)}", key="file")
-            if not (self.folder / file).exists():
-                raise InputError(f"names the file {shown(file)}; open both together", source=one_line(name), key="file")
-        scenario = scenario_from_text(document.text(), self.folder / name)
-        self.document, self.scenario, self.problem = document, scenario, None
+        given = {plain_name(key): checked_size(key, content) for key, content in (files or {}).items()}
+        with TemporaryDirectory(prefix="softnlp-") as trial:  # what the screen shows keeps its files until all is well
+            for file in document.files():
+                if PurePath(file).name != file:
+                    raise InputError(f"expected the name of a file beside the scenario, got {shown(file)}", key="file")
+                if file not in given and not (self.folder / file).exists():
+                    missing = f"names the file {shown(file)}; open both together"
+                    raise InputError(missing, source=one_line(name), key="file")
+                (Path(trial) / file).write_bytes(given[file] if file in given else (self.folder / file).read_bytes())
+            scenario_from_text(document.text(), Path(trial) / name)
+        for file, content in given.items():
+            (self.folder / file).write_bytes(content)
+        self.document, self.problem = document, None
+        self.scenario = scenario_from_text(document.text(), self.folder / name)
         self.name, self.follows_file = name, True
         self.pressure = self._last_pressure()
         self._tell(self._scenario_listeners)
@@ -92,15 +115,8 @@ class Session:
 
     def keep(self, name: str, content: bytes) -> str:
         """Put a file beside the scenario and return the name it has there; raises `InputError` for one too large."""
-        if len(content) > LARGEST_FILE:
-            size = len(content) / 1e6
-            raise InputError(
-                f"{shown(name)} has {size:.0f} MB; expected a table of at most {LARGEST_FILE / 1e6:.0f} MB"
-            )
-        plain = PurePath(name.replace("\\", "/")).name
-        if not plain or plain.startswith("."):
-            raise InputError(f"expected a file with a name, got {shown(name)}")
-        (self.folder / plain).write_bytes(content)
+        plain = plain_name(name)
+        (self.folder / plain).write_bytes(checked_size(name, content))
         return plain
 
     def change(self, table: str, key: str, value: object) -> None:
@@ -145,14 +161,24 @@ class Session:
         kept = {"name": self.name, "source": self.document.source(), "study": self.document.study}
         return json.dumps(kept | {"pressure": None if self.follows_file else self.pressure.tolist()})
 
-    def recall(self, text: str) -> None:
-        """Show again what `kept` returned; raises `InputError` where that cannot be read."""
+    def kept_files(self) -> str:
+        """Return the files that the scenario names as text, for `recall`; without those that are too much to keep."""
+        contents: dict[str, str] = {}
+        for name in dict.fromkeys(self.document.files()):
+            file = self.folder / name
+            if file.is_file():
+                contents[name] = b64encode(file.read_bytes()).decode()
+        return json.dumps(contents if sum(map(len, contents.values())) <= _MOST_KEPT else {})
+
+    def recall(self, text: str, files: str = "{}") -> None:
+        """Show again what `kept` and `kept_files` returned; raises `InputError` where that cannot be read."""
         try:
             kept = json.loads(text)
             name, source, study, pressure = (kept[key] for key in ("name", "source", "study", "pressure"))
-        except (ValueError, KeyError, TypeError):
+            contents = {str(key): b64decode(content) for key, content in json.loads(files).items()}
+        except (ValueError, KeyError, TypeError, AttributeError):
             raise InputError("expected what a tab of this app had kept") from None
-        self.open(str(source), str(name))
+        self.open(str(source), str(name), contents)
         self.choose(str(study))
         if pressure is not None and len(pressure) == len(self.pressure):
             self.set_pressure(np.asarray(pressure, dtype=float))

@@ -7,7 +7,6 @@ from collections.abc import Hashable
 import casadi as ca
 import numpy as np
 
-from softnlp.app.live import model_of
 from softnlp.app.session import Session
 from softnlp.branch import branch_function, stretch_on_branch
 from softnlp.quantities import quantities
@@ -27,15 +26,9 @@ class PoseStretch:
         scenario, pressure = self._session.scenario, self._session.pressure
         if scenario is None or len(pressure) != scenario.robot.chamber_sets:
             return None
-        model = model_of(scenario)
-        robot, law = scenario.robot, scenario.material.law
-        kind = (
-            (robot.chamber_sets, robot.chambers_per_set),
-            (law.name, law.constants, law.formula),
-            scenario.conventions,
-        )
-        if self._branch is None or self._kind != kind:
-            self._branch, self._kind = branch_function(model), kind
+        model = scenario.model
+        if self._branch is None or self._kind != model.kind:
+            self._branch, self._kind = branch_function(model), model.kind
         nominal = {name: q.nominal for name, q in quantities(model).items()} | {"pressure": pressure}
         point = stretch_on_branch(self._branch, np.concatenate([np.ravel(v) for v in nominal.values()]), pressure)
         return point.stretch if point.status is Status.SOLVED else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -56,8 +56,8 @@ class RowSolver:
     def __init__(self, numerics: Numerics, loads: Loads) -> None:
         self._numerics = numerics
         self._loads = loads
-        self._free: dict[tuple[Any, ...], PoseSolver] = {}
-        self._blocked: dict[tuple[Any, ...], BlockedSolver] = {}
+        self._free: dict[Hashable, PoseSolver] = {}
+        self._blocked: dict[Hashable, BlockedSolver] = {}
 
     def solve(self, model: Model, pressure: Array, contact: ContactSettings | None, tell: Tell) -> Solved:
         """Return the poses at pressures (rows, sets) [Pa], against the wall of `contact` if there is one."""
@@ -73,24 +73,19 @@ class RowSolver:
         return Solved(values, tuple(step.status for step in steps), tuple(step.message for step in steps))
 
     def _free_solve(self, model: Model) -> Solve:
-        kind = _kind(model)
+        kind = model.kind
         if kind not in self._free:
             self._free[kind] = PoseSolver(model, self._numerics)
         solver = self._free[kind].with_model(model)
         return lambda P, near: solver.solve(P, self._loads, near)
 
     def _blocked_solve(self, model: Model, pressure: Array, contact: ContactSettings) -> Solve:
-        kind = (*_kind(model), contact)
+        kind = (model.kind, contact)
         if kind not in self._blocked:
             self._blocked[kind] = BlockedSolver(model, self._numerics, contact)
         solver = self._blocked[kind].with_model(model)
         wall = standing_wall(solver.poses, contact, pressure, self._loads)
         return lambda P, near: solver.solve(P, self._loads, wall, near)
-
-
-def _kind(model: Model) -> tuple[Any, ...]:
-    """Return what the compiled problem of a model depends on."""
-    return model.robot.chamber_sets, model.robot.chambers_per_set, id(model.material.law), model.conventions
 
 
 def _numbers(step: Step, length: float) -> list[float]:

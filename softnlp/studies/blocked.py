@@ -19,7 +19,7 @@ from softnlp.numerics import Numerics
 from softnlp.problem import CompiledProblem, compile_problem
 from softnlp.quantities import Model
 from softnlp.rod import STATE_SIZE, Loads
-from softnlp.solver import Engine, Solution, discretisation_correction
+from softnlp.solver import Engine, Solution
 from softnlp.studies.blocked_grid import Blocked, BlockedGrid
 from softnlp.studies.blocked_step import failed_step, solved_step, touching_step
 from softnlp.studies.free_shape import Free, FreeShapes, free_shape, from_zero
@@ -94,7 +94,7 @@ class BlockedSolver:
         return other
 
     def with_model(self, model: Model) -> BlockedSolver:
-        """Return a solver for other numbers of the same kind of robot and law, which shares everything compiled."""
+        """Return a solver for other numbers that shares what is compiled; `ValueError` for another `Model.kind`."""
         other = copy(self)
         other.model, other.poses = model, self.poses.with_model(model)
         return other
@@ -386,16 +386,8 @@ class BlockedSolver:
         aside: tuple[float | None, tuple[float, float]],
         free: Free,
     ) -> Blocked:
-        """Estimate the discretisation error of a solution."""
-        linear = grid.engine.linear
-        correction = discretisation_correction(grid.problem, solution, linear)
-        order = method_named(self.numerics.transcription, 1).order
-        change = correction * 2**order / (2**order - 1)
-        tip = grid.nodes(change)[:, -1]
-        position = float(np.linalg.norm(tip[:3]))
-        rotation = float(np.linalg.norm(tip[3:12]) / np.sqrt(2))
-        forces = grid.tip_forces(change) / np.maximum(1.0, np.abs(grid.tip_forces(solution.x)))
-        force = float(np.max(np.abs(forces), initial=0.0))
+        """Return a solution with its discretisation error."""
+        position, rotation, force = grid.refinement(solution, method_named(self.numerics.transcription, 1).order)
         constants = np.asarray(grid.problem.case_constants(solution.x, solution.p)).ravel()
         worst = max(position, rotation / 5, force / 5)
         return Blocked(situation, pressed, grid, solution, constants, position, worst, *aside, free)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from softnlp.condensed import CondensedSolver, plane_directions
 from softnlp.loadcase import LoadCase
 from softnlp.problem import CompiledProblem
-from softnlp.solver import Engine, Solution
+from softnlp.solver import Engine, Solution, discretisation_correction
 from softnlp.studies.free_shape import Free
 from softnlp.studies.wall import Situation
 from softnlp.studies.weighted import Weighted
@@ -97,6 +97,18 @@ class BlockedGrid:
             return float(np.linalg.det(matrix)), 1.0
         inside, outside = (float(np.linalg.det(V.T @ matrix @ V)) for V in plane_directions(plane, len(matrix)))
         return inside, outside
+
+    def refinement(self, solution: Solution, order: int) -> tuple[float, float, float]:
+        """Return how far the tip's position [L_0], its rotation [rad] and the forces are from those of finer grids.
+
+        Of forces relative to those above one; of a transcription that converges with this order.
+        """
+        correction = discretisation_correction(self.problem, solution, self.engine.linear)
+        change = correction * 2**order / (2**order - 1)
+        tip = self.nodes(change)[:, -1]
+        forces = self.tip_forces(change) / np.maximum(1.0, np.abs(self.tip_forces(solution.x)))
+        rotation = np.linalg.norm(tip[3:12]) / np.sqrt(2)
+        return float(np.linalg.norm(tip[:3])), float(rotation), float(np.max(np.abs(forces), initial=0.0))
 
     def _at_nodes(self, x: Array) -> Array:
         """Return x with the states of the nodes alone."""

@@ -67,7 +67,8 @@ class PoseSolver:
         self._numbers: dict[str, Array] = {}
 
     def with_model(self, model: Model) -> PoseSolver:
-        """Return a solver for other numbers of the same kind of robot and law, which shares everything compiled."""
+        """Return a solver for other numbers that shares what is compiled; `ValueError` for another `Model.kind`."""
+        self.model.check_kind(model)
         other = copy(self)
         other.model = model
         other._numbers = {name: q.nominal for name, q in quantities(model).items()}

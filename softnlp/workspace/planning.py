@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.quantities import Model
 from softnlp.scenario import Scenario
 from softnlp.workspace.plan import CHUNK, Plan, cells
 from softnlp.workspace.table import pressure_table, varied_table
@@ -23,7 +22,7 @@ def plan_of(scenario: Scenario) -> Plan:
     task = scenario.task
     if not isinstance(task, WorkspaceTask):
         raise TypeError(f"expected a scenario of study 'workspace', got {scenario.study!r}")
-    model = Model(scenario.robot, scenario.material, scenario.coefficients, scenario.conventions)
+    model = scenario.model
     pressures = pressure_table(task, scenario.robot.chamber_sets, scenario.pressures)
     varied, columns = _varied(task, scenario, len(pressures))
     values = np.ascontiguousarray(np.concatenate([pressures, *columns], axis=1))

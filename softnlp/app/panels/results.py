@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Callable, Mapping
 
@@ -11,8 +9,8 @@ import numpy as np
 from nicegui import ui
 from numpy.typing import NDArray
 
-from softnlp.app.numbers import Line, certificate_words, chamber_lines, step_lines
-from softnlp.app.parts import Chart, line
+from softnlp.app.numbers import Line, certificate_words, step_lines
+from softnlp.app.parts import Chart, csv_text, line
 from softnlp.plots.style import COLOURS
 from softnlp.results import table_text, to_json
 from softnlp.studies.step import Run, Shape
@@ -100,8 +98,9 @@ class ResultsPanel:
         self._icon.classes(replace=f"text-xl shrink-0 {tint}")
         _set(self._warnings, "\n".join((*run.warnings, *step.warnings)))
         self._warnings.set_visibility(bool(self._warnings.text))
-        self._fill(self._numbers, "numbers", step_lines(run))
-        self._fill(self._chambers, "chambers", chamber_lines(run))
+        lines = step_lines(run)
+        self._fill(self._numbers, "numbers", lines.numbers)
+        self._fill(self._chambers, "chambers", lines.chambers)
         equations = [
             Line(f"equation.{line.equation}", line.equation, f"{line.value:.1e}", line.unit)
             for line in step.certificate
@@ -146,9 +145,8 @@ class ResultsPanel:
     def _copy(self) -> None:
         if self._run is None:
             return
-        rows = [
-            f"{line.label}\t{line.text}\t{line.unit}" for line in (*step_lines(self._run), *chamber_lines(self._run))
-        ]
+        lines = step_lines(self._run)
+        rows = [f"{line.label}\t{line.text}\t{line.unit}" for line in (*lines.numbers, *lines.chambers)]
         ui.clipboard.write("\n".join(rows))
         ui.notify("copied", type="positive")
 
@@ -170,14 +168,11 @@ def along_csv(run: Run) -> str:
     pose = run.steps[0].pose
     if pose is None:
         raise ValueError("the step has no pose")
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
     names = {"curvature": "curvature_{}_per_m", "strain": "shear_extension_{}", "force": "force_{}_N",
              "moment": "moment_{}_Nmm", "position": "position_{}_mm"}  # fmt: skip
-    writer.writerow(["arc", *(names[key].format(axis) for key in _ALONG for axis in "xyz")])
+    header = ["arc", *(names[key].format(axis) for key in _ALONG for axis in "xyz")]
     columns = np.hstack([np.asarray(pose.shape.arc)[:, None], *(of(pose.shape) for *_, of in _ALONG.values())])
-    writer.writerows(columns.tolist())
-    return text.getvalue()
+    return csv_text(header, columns.tolist())
 
 
 def _set(label: ui.label, text: str) -> None:

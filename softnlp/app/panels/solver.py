@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
-from typing import Any
-
-from nicegui import ui
-
-from softnlp.app.fields import choice_field, number_field, tell_problem
+from softnlp.app.fields import choice_field, number_field
 from softnlp.app.session import Session
 from softnlp.numerics import Numerics
 
@@ -19,36 +14,12 @@ def solver_panel(session: Session) -> None:
     choice_field(
         session, "solver", "transcription", "Transcription", _TRANSCRIPTIONS, default=Numerics.transcription
     ).props("data-testid=solver-transcription")
-    _intervals(session)
+    intervals = number_field(session, "solver", "intervals", "Intervals", step=1, whole=True)
+    intervals.props("clearable stack-label placeholder=auto data-testid=solver-intervals")
+    intervals.tooltip("Empty: as many as the accuracy needs")
     number_field(
         session, "solver", "accuracy", "Accuracy of the tip", "of L0", default=lambda: Numerics.accuracy, step=1e-6
     ).props("data-testid=solver-accuracy")
     number_field(
         session, "solver", "tolerance", "Tolerance of the equations", "scaled", default=lambda: Numerics.tolerance
     ).props("data-testid=solver-tolerance")
-
-
-def _intervals(session: Session) -> None:
-    """Show the number of intervals; an empty field means auto."""
-
-    def shown() -> float | None:
-        value = session.document.get("solver", "intervals")
-        return float(value) if isinstance(value, int) and not isinstance(value, bool) else None
-
-    def entered(event: Any) -> None:
-        value = event.value
-        if value == shown() or (value is not None and not isfinite(value)):
-            return
-        session.change("solver", "intervals", value if value is None or value != int(value) else int(value))
-
-    field = ui.number("Intervals", value=shown(), placeholder="auto", on_change=entered, step=1)
-    field.props("dense outlined clearable stack-label debounce=250 hide-bottom-space data-testid=solver-intervals")
-    field.without_auto_validation()
-    field.classes("w-full").mark("solver.intervals").tooltip("Empty: as many as the accuracy needs")
-
-    def refresh() -> None:
-        if field.value != shown():
-            field.set_value(shown())
-        tell_problem(session, field, "solver", "intervals")
-
-    session.on_scenario(refresh)

@@ -10,14 +10,13 @@ from nicegui import ui
 from numpy.typing import NDArray
 
 from softnlp.app.asking import failures, run_steps, said, scenario_with, step_rows
-from softnlp.app.fields import number_field, tell_problem
-from softnlp.app.parts import Chart, NumberTable, RunRow, line, plain_words, vector_field
+from softnlp.app.fields import number_field, tell_problem, vector_field
+from softnlp.app.parts import Chart, NumberTable, RunRow, line, plain_words
 from softnlp.app.session import Session
 from softnlp.app.stage import Stage
 from softnlp.app.tabs.contact_table import (
     CLOSURES,
     WEIGHTS,
-    blocked_lines,
     force_points,
     of_a_curve,
     of_a_target,
@@ -32,8 +31,6 @@ from softnlp.plots.style import colour
 from softnlp.results.csv_table import table_text
 from softnlp.studies.step import Run, Step
 from softnlp.units import BAR
-
-__all__ = ["blocked_lines", "blocked_tab"]
 
 Array = NDArray[np.float64]
 
@@ -86,8 +83,8 @@ def _contact_fields(session: Session) -> None:
             session, "contact", "offset_mm", "Offset of the wall, h", "mm", default=lambda: 0.0, step=1
         )
         with ui.column().classes("w-full gap-2") as place:
-            vector_field(session, "contact", "wall_point_mm", ("Point x", "y", "z"), "mm", (0.0, 0.0, 0.0))
-            vector_field(session, "contact", "wall_normal", ("Normal x", "y", "z"), "", (1.0, 0.0, 0.0))
+            vector_field(session, "contact", "wall_point_mm", ("Point x", "y", "z"), "mm")
+            vector_field(session, "contact", "wall_normal", ("Normal x", "y", "z"), "", default=(1.0, 0.0, 0.0))
             ui.label("The normal is the way in which the wall pushes the robot.").classes("text-xs opacity-70")
 
     def put(new: dict[str, Any]) -> None:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.studies.step import Run, Step
-from softnlp.units import BAR, MILLIMETRE
+from softnlp.studies.step import Step
+from softnlp.units import BAR
 
 Table = dict[str, Any]
 Array = NDArray[np.float64]
@@ -80,26 +80,6 @@ def force_points(steps: tuple[Step, ...] | list[Step]) -> tuple[list[float], lis
     bars = [float(step.pressure.max()) / BAR for step in steps]
     forces = [step.contact.force if step.status.has_solution and step.contact else float("nan") for step in steps]
     return bars, forces
-
-
-def blocked_lines(run: Run) -> list[tuple[str, str, str]]:
-    """Return what the last step of a blocked force says of wall and chambers: (label, value, unit)."""
-    step = run.steps[-1] if run.steps else None
-    if step is None or step.contact is None or not step.status.has_solution:
-        return []
-    contact = step.contact
-    lines = []
-    if contact.normal.any():  # else the chambers alone are held
-        lines += [("Blocked force", f"{contact.force:.4g}", "N"), ("Gap to the wall", _mm(contact.gap), "mm")]
-    lines.append(("Chamber length error", _mm(contact.length_error), "mm"))
-    reactions = contact.chamber_reaction
-    lines += [(f"Reaction of chamber {n}", f"{T:.4g}", "N") for n, T in enumerate(reactions, start=1) if T]
-    lines += [(f"Left of {left.equation}", f"{left.value:.3g}", left.unit) for left in contact.weighted]
-    return lines
-
-
-def _mm(length: float) -> str:
-    return f"{length / MILLIMETRE:.4g}"
 
 
 def _with(table: Table, key: str, value: Any, default: Any) -> Table:
