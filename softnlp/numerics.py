@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-TRANSCRIPTIONS = ("multiple-shooting", "collocation")
-
 
 @dataclass(frozen=True)
 class Numerics:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from softnlp.runner_run import run_of
 from softnlp.scenario import Scenario
 from softnlp.studies.inverse import follow_targets
 from softnlp.studies.inverse_solver import InverseSolver
@@ -17,15 +18,5 @@ def run_inverse(scenario: Scenario, progress: Progress | None, branches: int = 0
     """Run inverse kinematics; `branches` means nothing here."""
     task = scenario.task
     assert isinstance(task, InverseTask)
-    model = scenario.model
-    solver = InverseSolver(model, scenario.numerics, scenario.loads, task, "newton")
-    return Run(
-        study=scenario.study,
-        robot=scenario.robot,
-        material=scenario.material,
-        coefficients=scenario.coefficients,
-        conventions=scenario.conventions,
-        loads=scenario.loads,
-        steps=follow_targets(solver, progress),
-        title=scenario.title,
-    )
+    solver = InverseSolver(scenario.model, scenario.numerics, scenario.loads, task, "newton")
+    return run_of(scenario, follow_targets(solver, progress))

@@ -134,7 +134,7 @@ def load_scenario(path: str | PathLike[str]) -> Scenario:
     try:
         text = read_text(Path(path))
     except InputError as error:
-        raise _placed(error, fspath(path)) from None
+        raise placed(error, fspath(path)) from None
     return scenario_from_text(text, path)
 
 
@@ -149,7 +149,7 @@ def scenario_from_text(text: str, path: str | PathLike[str]) -> Scenario:
     try:
         return _scenario(text, Path(path))
     except InputError as error:
-        raise _placed(error, fspath(path)) from None
+        raise placed(error, fspath(path)) from None
 
 
 def robot_of_scenario(path: str | PathLike[str]) -> tuple[Robot, tuple[Violation, ...]]:
@@ -161,16 +161,16 @@ def robot_of_scenario(path: str | PathLike[str]) -> tuple[Robot, tuple[Violation
         As `load_scenario`, for everything but those rules.
     """
     try:
-        file = parse(_toml(read_text(Path(path))))
+        file = parse(parse_toml(read_text(Path(path))))
         robot = _dimensions(file.robot)
         return robot, violations(robot, file.robot.minimum_wall_mm * MILLIMETRE)
     except InputError as error:
-        raise _placed(error.located(table="robot"), fspath(path)) from None
+        raise placed(error.located(table="robot"), fspath(path)) from None
 
 
 def _scenario(text: str, path: Path) -> Scenario:
     """Build a scenario; errors do not name the file yet."""
-    data = _toml(text)
+    data = parse_toml(text)
     file = parse(data)
     errors: list[InputError] = []
     made = _attempt(errors, "robot", lambda: _robot(file.robot))
@@ -226,15 +226,15 @@ def _quoted(error: InputError, table: str) -> InputError:
     return type(error)(str(error), table=table, key="file")
 
 
-def _placed(error: InputError, source: str) -> InputError:
-    """Name the file; whatever it quotes stays printable and on the same line."""
+def placed(error: InputError, source: str) -> InputError:
+    """Return an error that names the file; whatever it quotes stays printable and on the same line."""
     table = error.table and one_line(error.table, LONGEST_NAME)
     key = error.key and one_line(error.key, LONGEST_NAME)
     return type(error)(one_line(error.message), source=one_line(source), table=table, key=key)
 
 
-def _toml(text: str) -> dict[str, Any]:
-    """Parse TOML 1.0."""
+def parse_toml(text: str) -> dict[str, Any]:
+    """Return the tables of TOML 1.0; raises `InputError` where the text is not."""
     if not text.strip():
         raise InputError("expected a scenario, got an empty file")
     try:

@@ -16,6 +16,7 @@ from softnlp.app.session import LARGEST_FILE, Session
 from softnlp.errors import InputError
 from softnlp.results import to_json
 from softnlp.runner import run_scenario
+from softnlp.scenario import load_scenario
 from softnlp.units import BAR
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
@@ -152,6 +153,22 @@ def test_what_cannot_be_opened_leaves_the_screen_as_it_was(session: Session) -> 
         with pytest.raises(InputError):
             session.recall(session.kept(), files)
     assert session.text() == before
+
+
+def test_a_file_that_cannot_be_opened_is_named_as_the_commands_name_it(session: Session, tmp_path: Path) -> None:
+    (tmp_path / "broken.toml").write_text("study = [")
+    (tmp_path / "unknown.toml").write_text('study = "forward"\n[robot]\nname = "D25L61"\n')
+    for name in ("broken.toml", "unknown.toml", "missing.toml"):
+        with pytest.raises(InputError) as opened:
+            session.open_path(tmp_path / name)
+        with pytest.raises(InputError) as loaded:
+            load_scenario(tmp_path / name)
+        assert str(opened.value) == str(loaded.value)
+        assert name in str(opened.value)
+    with pytest.raises(InputError, match=r"^x\.toml: \[pressure\] file: p\.csv: line 1: "):
+        session.open(
+            session.text().replace("sequence_bar = [[0.8, 0.0, 0.0]]", 'file = "p.csv"'), "x.toml", {"p.csv": b"x"}
+        )
 
 
 def test_two_sessions_do_not_mix(session: Session) -> None:

@@ -13,6 +13,7 @@ from tomlkit.items import InlineTable, Table
 from softnlp.errors import InputError
 from softnlp.reading import one_line
 from softnlp.robot import ROBOTS
+from softnlp.scenario import parse_toml
 from softnlp.scenario_check import SCHEMAS
 from softnlp.scenario_identify import UNUSED_BY_TENSILE
 
@@ -51,6 +52,7 @@ class Document:
 
     def __init__(self, text: str = START) -> None:
         """Parse a scenario; raises `InputError` for text that is not TOML or has a table where a value belongs."""
+        parse_toml(text)  # says the same of a broken file as the commands
         try:
             self._tables = tomlkit.parse(text)
         except (TOMLKitError, ValueError, RecursionError) as error:

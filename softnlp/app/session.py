@@ -15,7 +15,7 @@ from softnlp.app.document import START, Document
 from softnlp.app.live import LivePoses
 from softnlp.errors import InputError
 from softnlp.reading import one_line, read_text, shown
-from softnlp.scenario import Scenario, scenario_from_text
+from softnlp.scenario import Scenario, load_scenario, placed, scenario_from_text
 from softnlp.units import BAR
 
 Array = NDArray[np.float64]
@@ -81,17 +81,12 @@ class Session:
             Where it cannot be read; the screen stays as it was.
         """
         name = PurePath(name).name or "scenario.toml"
-        document = Document(text)
-        given = {plain_name(key): checked_size(key, content) for key, content in (files or {}).items()}
-        with TemporaryDirectory(prefix="softnlp-") as trial:  # what the screen shows keeps its files until all is well
-            for file in document.files():
-                if PurePath(file).name != file:
-                    raise InputError(f"expected the name of a file beside the scenario, got {shown(file)}", key="file")
-                if file not in given and not (self.folder / file).exists():
-                    missing = f"names the file {shown(file)}; open both together"
-                    raise InputError(missing, source=one_line(name), key="file")
-                (Path(trial) / file).write_bytes(given[file] if file in given else (self.folder / file).read_bytes())
-            scenario_from_text(document.text(), Path(trial) / name)
+        try:
+            document = Document(text)
+            given = {plain_name(key): checked_size(key, content) for key, content in (files or {}).items()}
+            self._try(document, name, given)
+        except InputError as error:
+            raise placed(error, name) from None  # and not where it was tried
         for file, content in given.items():
             (self.folder / file).write_bytes(content)
         self.document, self.problem = document, None
@@ -101,8 +96,21 @@ class Session:
         self._tell(self._scenario_listeners)
         self._tell(self._pressure_listeners)
 
+    def _try(self, document: Document, name: str, given: Mapping[str, bytes]) -> None:
+        """Read a scenario with its files away from those of the screen, which stay as they are until all is well."""
+        with TemporaryDirectory(prefix="softnlp-") as folder:
+            for file in document.files():
+                if PurePath(file).name != file:
+                    raise InputError(f"expected the name of a file beside the scenario, got {shown(file)}", key="file")
+                if file not in given and not (self.folder / file).exists():
+                    raise InputError(f"names the file {shown(file)}; open both together", key="file")
+                content = given[file] if file in given else (self.folder / file).read_bytes()
+                (Path(folder) / file).write_bytes(content)
+            scenario_from_text(document.text(), Path(folder) / name)
+
     def open_path(self, path: Path) -> None:
         """Show the scenario of a file, with the files that it names; raises `InputError` where one cannot be read."""
+        load_scenario(path)  # says the same of a broken file as the commands
         document = Document(read_text(path))
         files = {}
         for file in document.files():
