@@ -18,6 +18,9 @@ const REST = 400; // after which a picture is smoothed, where that is not done f
 
 const radians = (degrees) => (degrees * Math.PI) / 180;
 
+// How much further away the robot has to be seen from to fit the width of the picture.
+const narrowness = (aspect) => Math.max(1, 1.5 / aspect);
+
 function drawnInSoftware() {
   const gl = document.createElement("canvas").getContext("webgl2");
   const known = gl?.getExtension("WEBGL_debug_renderer_info");
@@ -123,8 +126,7 @@ export class Stage {
     this.controls.enableDamping = true;
     const size = this.frame.length;
     const [a, e] = [radians(AZIMUTH), radians(ELEVATION)];
-    const narrow = Math.max(1, 1.5 / this.camera.aspect);
-    const away = 4.8 * size * narrow;
+    const away = 4.8 * size * narrowness(this.camera.aspect);
     this.controls.target.set(0, 0, 0.45 * size);
     this.camera.position.set(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e));
     this.camera.position.multiplyScalar(away).add(this.controls.target);
@@ -170,8 +172,11 @@ export class Stage {
     const { clientWidth: width, clientHeight: height } = this.element;
     if (width === 0 || height === 0) return;
     this.renderer.setSize(width, height);
+    const nearer = narrowness(width / height) / narrowness(this.camera.aspect);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+    // In another window the robot still fills as much of it.
+    this.camera.position.sub(this.controls.target).multiplyScalar(nearer).add(this.controls.target);
     this.rescale();
     this.request();
   }
