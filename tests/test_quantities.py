@@ -172,3 +172,38 @@ def test_the_unit_of_force_takes_the_model_s_own_corrections_and_readings() -> N
     EI_x, EI_y = (float(x) for x in made.bending_stiffness)
     assert abs(EI_x - EI_y) > 1e-2 * EI_x
     assert float(force_unit(Model(two, MODEL.material))) == pytest.approx((EI_x + EI_y) / 2 / 0.06**2, rel=1e-12)
+
+
+def test_models_of_a_kind_differ_by_numbers_alone() -> None:
+    other = Model(ROBOTS["D10L40"], silicone("Ecoflex 00-50", "ogden"))
+    assert other.kind == MODEL.kind
+    MODEL.check_kind(other)
+    yeoh = silicone("Ecoflex 00-30", "yeoh")
+    law = yeoh.law
+
+    def rubber(**changes: object) -> Model:
+        return replace(MODEL, material=replace(yeoh, law=replace(law, **changes)))
+
+    unlike = [
+        replace(MODEL, robot=replace(MODEL.robot, chamber_sets=4)),
+        replace(MODEL, robot=replace(MODEL.robot, chambers_per_set=1)),
+        replace(MODEL, material=yeoh),
+        replace(MODEL, conventions=AS_PRINTED),
+    ]
+    for model in unlike:
+        with pytest.raises(
+            ValueError, match=r"^a model with other chambers, law or conventions needs a solver of its own$"
+        ):
+            MODEL.check_kind(model)
+    kinds = [
+        model.kind
+        for model in (
+            *unlike,
+            rubber(),
+            rubber(name="a"),
+            rubber(formula=lambda stretch, **c: law.formula(stretch, **c)),
+            rubber(modulus=lambda stretch, **c: stretch),
+        )
+    ]
+    assert kinds[2] == kinds[4]
+    assert len(set(kinds)) == len(kinds) - 1

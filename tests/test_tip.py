@@ -11,8 +11,19 @@ import witness
 from designs import random_design
 from scipy.spatial.transform import Rotation
 
+from softnlp.errors import InputError
 from softnlp.rod import RodSection
-from softnlp.tip import DEAD_LOADS, AtTip, Given, TipConditions, contact_point, gap, length_error, tip_conditions
+from softnlp.tip import (
+    DEAD_LOADS,
+    AtTip,
+    Closure,
+    Given,
+    TipConditions,
+    contact_point,
+    gap,
+    length_error,
+    tip_conditions,
+)
 
 CLOSURES = ("free", "weighted", "compliant", "rigid")
 E3 = np.array([0.0, 0.0, 1.0])
@@ -188,3 +199,32 @@ def test_the_free_closure_with_a_force_is_the_dead_load_of_that_force() -> None:
     dead = at_tip(still._replace(force=case.force + 0.9 * case.normal), section, [])
     conditions: TipConditions = tip_conditions("free", wall=False)
     np.testing.assert_allclose(pushed, column(conditions.residual(dead)), atol=1e-13)
+
+
+@pytest.mark.parametrize("made", [list, tuple, lambda entries: ca.vertcat(*entries)], ids=["list", "tuple", "column"])
+def test_a_closure_of_ones_own_is_taken_as_a_built_in_one(made: Any) -> None:
+    case, section = drawn(2)
+    at = at_tip(case, section, [0.7, 0.4])
+    own = Closure(
+        "alike",
+        lambda at: made([pressed * at.unknowns[-1] for pressed in case.pressed]),
+        lambda at: made([length_error(at)]),
+    )
+    conditions, same = tip_conditions(own), tip_conditions("rigid")
+    np.testing.assert_array_equal(column(conditions.residual(at)), column(same.residual(at)))
+    np.testing.assert_array_equal(column(conditions.reaction(at)), column(same.reaction(at)))
+
+
+def test_a_closure_that_returns_too_many_entries_is_refused() -> None:
+    case, section = drawn(2)
+    at = at_tip(case, section, [0.7, 0.4])
+    N = len(case.PA)
+    reaction = Closure("long", lambda at: [0.0] * (N + 1))
+    equation = Closure("two", lambda at: ca.DM.zeros(N), lambda at: [0.0, 0.0])
+    for closure, text in (
+        (reaction, f"reaction of closure 'long': expected {N} entries, got {N + 1}"),
+        (equation, "equation of closure 'two': expected 1 entries, got 2"),
+    ):
+        with pytest.raises(InputError, match=f"^closure: {text}$") as refused:
+            tip_conditions(closure).residual(at)
+        assert refused.value.key == "closure"
