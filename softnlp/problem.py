@@ -286,6 +286,5 @@ def _refuse_ill_posed(problem: CompiledProblem, has_objective: bool) -> None:
         start += q.size
         if not np.all(entries_in_column[columns] + entries_in_cost[columns]):
             raise IllPosedError(
-                f"'{q.name}' is free but enters no equation{' and no objective' if has_objective else ''}, "
-                "so nothing determines it; fix it"
+                f"'{q.name}' is free but enters no equation and no objective, so nothing determines it; fix it"
             )

@@ -116,6 +116,38 @@ def test_two_load_cases_share_their_pressure() -> None:
     assert names[0] == "case0: stretch balance"
     assert "case1: tip force" in names
     assert names[-1] == "deflection"
+    # the rows of the second case follow those of the first, and those of the constraint both
+    size, count = (len(found) for found in (residual_rows(posed, 0), posed.problem.cases[0].equations))
+    assert residual_rows(posed, 0) == list(range(size))
+    equations = posed.problem.equations
+    for first, second in zip(equations[:count], equations[count:-1], strict=True):
+        np.testing.assert_array_equal(second.rows, first.rows + size)
+    assert equations[-1].rows.tolist() == [2 * size, 2 * size + 1, 2 * size + 2]
+
+
+def residual_rows(posed: Posed, case: int) -> list[int]:
+    """Return the rows of a case's equations, sorted, counted in the case."""
+    return sorted(int(row) for e in posed.problem.cases[case].equations for row in e.rows)
+
+
+def test_rows_of_several_constraints_follow_those_of_the_case() -> None:
+    def three(cases, given) -> list[Constraint]:
+        tip, stretch = cases[0].outputs["tip_position"], cases[0].outputs["stretch"]
+        return [
+            equals("across", tip[:2], 0.0, "m", 0.06),
+            equals("stretch", stretch, 1.1),
+            equals("height", tip[2], 0.06),
+        ]
+
+    problem = pose(MODEL, free=["pressure", "stiffening.bending"], constraints=three).problem
+    assert problem.equations[0].name == "stretch balance"
+    size = problem.cases[0].residuals.numel()
+    assert [(e.name, e.rows.tolist()) for e in problem.equations[-3:]] == [
+        ("across", [size, size + 1]),
+        ("stretch", [size + 2]),
+        ("height", [size + 3]),
+    ]
+    assert sorted(row for e in problem.equations for row in e.rows) == list(range(size + 4))
 
 
 def test_a_compiled_problem_solves_for_many_values_and_robots() -> None:
@@ -230,21 +262,30 @@ def refusal(**changes) -> str:
     return text
 
 
+def two_targets(cases, given) -> list[Constraint]:
+    return [*tip_in_plane(cases, given), equals("angle", cases[0].outputs["bending_angle"], 1.0)]
+
+
 def test_too_few_equations_are_refused() -> None:
-    text = refusal(free=["pressure"], constraints=tip_in_plane, extra=[TIP])
-    assert "too few equations" in text
-    assert "pressure (3)" in text
-    assert "tip target (2)" in text
-    text = refusal(free=["stiffening.bending"])
-    assert "too few" in text
-    assert "stiffening.bending (1)" in text
+    assert refusal(free=["pressure", "material.C01"], constraints=two_targets, extra=[TIP]) == (
+        "too few equations: free are pressure (3), material.C01 (1), and the constraints add 3 equations: "
+        "tip target (2), angle (1); fix a quantity, add a constraint or give an objective"
+    )
+    assert refusal(free=["stiffening.bending"]) == (
+        "too few equations: free are stiffening.bending (1), and the constraints add 0 equations: none; "
+        "fix a quantity, add a constraint or give an objective"
+    )
 
 
 def test_too_many_equations_are_refused() -> None:
-    text = refusal(free=["stiffening.bending"], constraints=tip_target, extra=[TIP])
-    assert "too many equations" in text
-    assert "stiffening.bending (1)" in text
-    assert "tip target (3)" in text
+    advice = "free more quantities, or make a constraint an objective"
+    assert refusal(free=["stiffening.bending"], constraints=tip_target, extra=[TIP]) == (
+        "too many equations: free are stiffening.bending (1), and the constraints add 3 equations: tip target (3); "
+        + advice
+    )
+    assert refusal(constraints=tip_target, extra=[TIP]) == (
+        "too many equations: free are nothing, and the constraints add 3 equations: tip target (3); " + advice
+    )
 
 
 def test_an_unknown_name_is_refused_with_the_nearest_one() -> None:
@@ -262,8 +303,14 @@ def test_a_free_quantity_that_enters_nothing_is_refused() -> None:
         return tip_target(cases, given)[:1]
 
     text = refusal(free=["pressure", "friction"], constraints=two, objective=smallest_pressure, extra=[TIP, idle])
-    assert "'friction'" in text
-    assert "enters no equation" in text
+    assert text == "'friction' is free but enters no equation and no objective, so nothing determines it; fix it"
+    price = quantity("price", "1", 0.3)
+
+    def cost(cases, given) -> ca.MX:
+        return smallest_pressure(cases, given) + given["price"].symbol ** 2
+
+    among = {"constraints": two, "objective": cost, "extra": [TIP, idle, price]}
+    assert refusal(free=["pressure", "price", "friction"], **among) == text
     # where it makes up the count, what it does not determine is named
     text = refusal(free=["friction"], constraints=lambda cases, given: [
         equals("bending angle", cases[0].outputs["bending_angle"], 1.0)], extra=[idle])  # fmt: skip
@@ -282,6 +329,25 @@ def test_a_free_quantity_may_enter_the_objective_alone() -> None:
     solution = posed.solve({"target": tip, **LOADS}, {"pressure": [8e4, 5e4, 2e4]})
     assert solution.holds(1e-8)
     assert posed.problem.free_values(solution.x)["price"][0] == pytest.approx(2.0, abs=1e-6)
+
+
+def test_a_target_may_be_missed_by_a_slack_that_costs() -> None:
+    # each slack enters one equation and the objective, and there it stays at zero
+    slack = quantity("slack", "m", np.full(3, 1e-3), scale=MODEL.robot.length)
+
+    def missed(cases, given) -> list[Constraint]:
+        tip = cases[0].outputs["tip_position"] + given["slack"].symbol
+        return [equals("tip target", tip, given["target"].symbol, "m", MODEL.robot.length)]
+
+    def cost(cases, given) -> ca.MX:
+        return ca.sumsqr(given["slack"].symbol / MODEL.robot.length)
+
+    posed = pose(MODEL, free=["pressure", "slack"], constraints=missed, objective=cost, extra=[TIP, slack])
+    solution = posed.solve({"target": forward_outputs()["tip_position"], **LOADS}, {"pressure": [8e4, 5e4, 2e4]})
+    assert solution.holds(1e-8)
+    found = posed.problem.free_values(solution.x)
+    np.testing.assert_allclose(found["slack"], 0.0, atol=1e-8 * MODEL.robot.length)
+    np.testing.assert_allclose(found["pressure"], PRESSURE, rtol=1e-5)
 
 
 def test_an_objective_with_nothing_to_choose_is_refused() -> None:
@@ -312,10 +378,10 @@ def test_a_structurally_singular_choice_is_refused_where_counting_is_content() -
         stretch, angle = cases[0].outputs["stretch"], cases[0].outputs["bending_angle"]
         return [equals("stretch", stretch, 1.2), equals("square", stretch**2, 1.44), equals("angle", angle, 0.5)]
 
-    text = refusal(free=["pressure"], constraints=twice)
-    assert "cannot all be met" in text
-    assert "pressure (3)" in text
-    assert "square (1)" in text
+    assert refusal(free=["pressure"], constraints=twice) == (
+        "the constraints stretch (1), square (1), angle (1) cannot all be met by freeing pressure (3): they move 1 "
+        "combination(s) of unknowns too few; free a quantity that enters them"
+    )
 
 
 def test_free_values_are_packed_and_found_again() -> None:
