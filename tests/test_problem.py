@@ -53,6 +53,11 @@ def test_three_free_pressures_recover_what_made_the_tip(method: Collocation | No
     solution = posed.solve({"target": expected["tip_position"], **LOADS}, {"pressure": [6e4, 6e4, 3e4]})
     assert solution.holds(1e-9)
     np.testing.assert_allclose(posed.problem.free_values(solution.x)["pressure"], PRESSURE, rtol=1e-7)
+    # what a finer grid leaves of it, is of the same equations; the target is met on any grid
+    left = np.asarray(posed.problem.fine_residual(solution.x, solution.p)).ravel()
+    assert left.size == len(solution.x)
+    assert 0 < np.abs(left).max() < 1e-2
+    np.testing.assert_allclose(left[-3:], 0.0, atol=1e-9)
     found = posed.outputs(solution)
     for name, value in expected.items():
         np.testing.assert_allclose(found[name], value, rtol=1e-7, atol=1e-9, err_msg=name)
