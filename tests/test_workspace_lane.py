@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from softnlp import BAR, Loads, Numerics, material, robot
-from softnlp.batch import contact_newton, newton, shooting, stretches
+from softnlp.batch import newton, shooting, stretches
 from softnlp.batch.compiled import compiler
-from softnlp.batch.contact_newton import BlockedShot, ContactBatch, Stage
+from softnlp.batch.contact_newton import PATH, BlockedShot, ContactBatch, Stage
 from softnlp.batch.grids import MOST_INTERVALS
 from softnlp.batch.newton import Batch, BatchSolver, Shot
 from softnlp.batch.reduced import reduced_rod
@@ -251,31 +251,20 @@ def test_chunks_are_compact_cells() -> None:
 # --- what the batch gives up ------------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
-    for lane in ("pose_lane", "blocked_lane"):
-        monkeypatch.setattr(f"softnlp.workspace.{lane}.WORTH_COMPILING", 10**9)
-
-
-@pytest.mark.usefixtures("interpreted")
-@pytest.mark.parametrize("contact", [None, ContactSettings()])
-def test_poses_whose_passes_run_out_are_left_to_the_problem(
-    contact: ContactSettings | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@needs_compiler
+def test_poses_whose_passes_run_out_are_left_to_the_problem(monkeypatch: pytest.MonkeyPatch) -> None:
     """One pass of Newton solves no bent and loaded pose; the numbers are those of the problem all the same."""
     pressures = np.array([[0.6, 0.2, 0.0], [0.4, 0.0, 0.1]]) * BAR
-    asked = plan(pressures, contact=contact, intervals=15 if contact is None else None)
+    asked = plan(pressures, intervals=15)
     together = ChunkSolver(asked).solve(0).rows
     assert (together["lane"] == Lane.BATCH).all()
-    monkeypatch.setattr(newton if contact is None else contact_newton, "_PASSES", 1)
+    monkeypatch.setattr(newton, "_PASSES", 1)
     alone = ChunkSolver(asked).solve(0).rows
     assert (alone["lane"] == Lane.PROBLEM).all()
     assert alone["tip_position"] == pytest.approx(together["tip_position"], abs=2e-6 * 0.06)
-    if contact is not None:
-        assert alone["blocked_force"] == pytest.approx(together["blocked_force"], rel=1e-4)
 
 
-@pytest.mark.usefixtures("interpreted")
+@needs_compiler
 def test_a_section_that_softens_with_its_stretch_is_left_to_the_problem() -> None:
     """Pressure takes stiffness away where a coefficient is negative: the unpressurised curve then shows no limit."""
     asked = plan(np.array([[0.3, 0.1, 0.0]]) * BAR, coefficients=Coefficients(elongation=-0.05))
@@ -288,11 +277,12 @@ def test_a_section_that_softens_with_its_stretch_is_left_to_the_problem() -> Non
     assert row["stretch"] == pytest.approx(pose.stretch, rel=1e-12)
 
 
-@pytest.mark.usefixtures("interpreted")
-@pytest.mark.parametrize("contact", [None, ContactSettings()])
-def test_a_chunk_beyond_every_equilibrium_is_named_pose_by_pose(contact: ContactSettings | None) -> None:
+@pytest.mark.parametrize("kernels", [pytest.param("compiled", marks=needs_compiler), "interpreted"])
+def test_a_chunk_beyond_every_equilibrium_is_named_pose_by_pose(kernels: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if kernels == "interpreted":
+        monkeypatch.setattr(shooting, "library", lambda source, build: None)
     softening, pressures = Coefficients(elongation=0.0), np.array([[20.0, 0, 0], [30.0, 10.0, 0]]) * BAR
-    asked = plan(pressures, law="yeoh", coefficients=softening, contact=contact)
+    asked = plan(pressures, law="yeoh", coefficients=softening)
     block = ChunkSolver(asked).solve(0)
     ended = (Status.UNSTABLE_MATERIAL, Status.NO_EQUILIBRIUM)
     assert all(STATUSES[k] in ended for k in block.rows["status"])
@@ -300,7 +290,7 @@ def test_a_chunk_beyond_every_equilibrium_is_named_pose_by_pose(contact: Contact
     assert np.isnan(block.rows["tip_position"]).all()
 
 
-@pytest.mark.usefixtures("interpreted")
+@needs_compiler
 def test_a_stretch_that_did_not_settle_is_not_certain(monkeypatch: pytest.MonkeyPatch) -> None:
     pressures = np.vstack([random_pressures(5, 1.0), np.zeros((1, 3))])
     asked = plan(pressures, robot__length=np.full(6, 0.06))
@@ -359,3 +349,29 @@ def test_blocked_poses_that_refinement_does_not_bring_to_the_target_keep_their_e
     assert shot.worst_error == pytest.approx(2e-2 / shot.intervals)
     assert good.tolist() == held.tolist()
     assert (shot.iterations == 4).all()
+
+
+def test_blocked_poses_that_are_lost_are_not_followed_further(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The one that makes contact first is lost at once; the path goes on where the other makes contact."""
+    functions = rod_functions(Model(robot("D25L60"), material("Ecoflex 00-50")), tip_conditions("compliant"))
+    batch = ContactBatch(functions, None, None)  # type: ignore[arg-type]
+    followed: list[tuple[int, list[int]]] = []
+
+    def stage_at(j: int, on: np.ndarray) -> Stage:
+        followed.append((j, on.tolist()))
+        return Stage(np.zeros((20, on.size)), *(np.zeros((3, on.size)) for _ in range(3)), np.ones((2, on.size)))
+
+    def shoot(
+        self: ContactBatch, stage: Stage, guess: np.ndarray, grids: np.ndarray, tolerance: float, *, judge: bool
+    ) -> BlockedShot:
+        n, nothing = grids.size, np.zeros(grids.size)
+        residual = np.where([len(followed) == 1] * n, np.inf, 0.0)
+        fields = [np.zeros((2, n)), residual, np.ones(n), nothing, nothing, grids, np.ones(n, np.int64)]
+        return BlockedShot(guess, np.zeros((21, n)), *fields)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(ContactBatch, "_shoot", shoot)
+    last = len(PATH) - 1
+    shot, held = batch.follow(stage_at, np.array([0, last - 1]), 1e-4)
+    assert followed == [(0, [0]), (last - 1, [1]), (last, [1]), (last, [0, 1])]  # the last one judges
+    assert held.tolist() == [False, True]
+    assert shot.iterations.tolist() == [2, 3]
