@@ -197,12 +197,11 @@ def test_dimensions_are_optimised_at_the_lowest_step_that_meets_everything() -> 
     wanted = {"bending_angle": at_least(60 * DEGREE)}
     by_steps = bending(PressureSteps(0.5 * BAR, 1.0 * BAR), requirements=wanted, starts=1)
     found = the_only(by_steps)
-    at = the_only(replace(by_steps, pressure=BAR))
     lost = the_only(replace(by_steps, pressure=PressureSteps(0.5 * BAR, 0.5 * BAR)))
-    assert (lost.status, at.status) == ("infeasible", "feasible")
+    assert (lost.status, found.status) == ("infeasible", "feasible")
     assert lost.choices["pressure"] == 0.5 * BAR
     assert found.choices["pressure"] == BAR
-    assert found.objective == at.objective
+    assert found.outputs["bending_angle"] >= 60 * DEGREE > lost.outputs["bending_angle"]
 
 
 def test_sets_that_interleave_are_not_optimised() -> None:
@@ -310,14 +309,13 @@ def test_an_optimum_that_is_not_on_the_branch_is_refused_once(monkeypatch: pytes
 
 
 def test_an_optimum_that_a_solve_does_not_confirm_is_refused_with_both_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = the_only(bending(BAR)).objective / DEGREE
     monkeypatch.setattr(Evaluator, "full", moved(0.9))
     found = the_only(bending(BAR))
     assert found.status == "infeasible"
     told = re.search(r"bending_angle_deg is ([\d.]+) there and ([\d.]+) on the branch", found.reasons[0])
     assert told
-    assert float(told.group(1)) == pytest.approx(right, rel=1e-4)
-    assert float(told.group(2)) == pytest.approx(0.9 * right, rel=1e-4)
+    assert float(told.group(2)) == pytest.approx(0.9 * float(told.group(1)), rel=1e-4)
+    assert float(told.group(2)) == pytest.approx(found.objective / DEGREE, rel=1e-4)
 
 
 @pytest.mark.parametrize("fails", [False, True])
@@ -325,7 +323,8 @@ def test_a_small_difference_is_looked_at_on_finer_grids(fails: bool, monkeypatch
     """A solve off by a part between a tenth of what may differ and that is believed, on the finest grid solved."""
     off = 1 + 0.5 * design_optimise.AGREES
     monkeypatch.setattr(Evaluator, "full", moved(off))
-    made, start = optimiser(), optimiser().evaluator.free(MODEL, BAR)
+    made = optimiser()
+    start = made.evaluator.free(MODEL, BAR)
     intervals = made._intervals(start)
     tried: list[int] = []
     optimise, lost = Optimiser.optimise, Optimum(np.zeros(1), {}, np.nan, np.inf, (), 0, "lost")
