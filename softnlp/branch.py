@@ -25,7 +25,8 @@ Array = NDArray[np.float64]
 _LARGEST_STRETCH = 10.0
 _GRID = 1500
 _FIRST_PART = 150  # of the grid, up to a stretch of 1.9
-_SECANTS, _ROUNDING = 80, 1e-15
+_SECANTS, _ROUNDING = 300, 1e-15
+_STUCK, _AT_ROOT = 4, 1e-6  # times that one end moves before the other is halved; excess of what may be a root
 _ZOOMS, _ZOOM_GRID = 10, 42  # an interval of the first grid is cut 41-fold ten times, which is past round-off
 
 
@@ -111,7 +112,7 @@ def stretch_on_branch(function: ca.Function, column: Array, pressures: Array) ->
             return _ended(Status.NO_EQUILIBRIUM, fine[best], float(values[best]), pressures, "turns back")
         high = fine[best]
         low = grid[max(j - 1, 0)]
-    elif t[j] >= 1.0 or ~(k[j] > 0):
+    else:
         high = grid[j]
 
     def at(stretch: float) -> tuple[float, float]:
@@ -127,16 +128,20 @@ def stretch_on_branch(function: ca.Function, column: Array, pressures: Array) ->
 
 
 def _crossing(excess: Callable[[float], float], a: float, b: float) -> float:
-    """Return where a function that is below 0 at a and not at b is 0, to round-off, by the Illinois method."""
-    f_a, f_b, side = excess(a), excess(b), 0
+    """Return where a function that is below 0 at a and not at b is 0, to round-off, by the Illinois method.
+
+    Next to a pole one end is so high that the secant stays at the other; the middle is taken then.
+    """
+    f_a, f_b, side, moved = excess(a), excess(b), 0, 0
     for _ in range(_SECANTS):
         with np.errstate(invalid="ignore", divide="ignore"):
             middle = float(b - np.float64(f_b) * (b - a) / (f_b - f_a))
-        if not a <= middle <= b:  # an end where the function is infinite
-            middle = (a + b) / 2
+        if not a <= middle <= b or moved >= _STUCK:  # an end where the function is infinite, or nearly
+            middle, moved = (a + b) / 2, 0
         f = excess(middle)
-        if min(middle - a, b - middle) <= _ROUNDING or f == 0:
+        if f == 0 or b - a <= _ROUNDING or (min(middle - a, b - middle) <= _ROUNDING and abs(f) <= _AT_ROOT):
             return middle
+        moved = moved + 1 if side == np.sign(f) else 0
         if f > 0:
             b, f_b, f_a, side = middle, f, f_a / 2 if side > 0 else f_a, 1
         else:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 from witness_section import NoRoot, Unstable, balance_pressure, section
 
-from softnlp.branch import BranchPoint, branch_function, stretch_on_branch
+from softnlp.branch import BranchPoint, _crossing, branch_function, stretch_on_branch
 from softnlp.conventions import AS_PRINTED, REPRODUCTION, Coefficients, Conventions
 from softnlp.quantities import Model, quantities
 from softnlp.robot import ROBOTS
@@ -136,3 +136,22 @@ def test_small_pressures_stretch_as_the_linearised_balance() -> None:
     A_0, A_c = (np.pi * x for x in (7.5e-3**2 - 2.7e-3**2 - 6 * 1.25e-3**2, 1.25e-3**2))
     expected = 2 * P.sum() * A_c / (E * A_0)
     assert branch_of(model)(P).stretch - 1 == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("pole", [1.0, 0.75])
+def test_a_crossing_before_a_pole_is_found(pole: float) -> None:
+    """A fraction of the pressure may be infinite at the far end, or beyond a stretch on the way to it."""
+
+    def excess(s: float) -> float:
+        return 1 / (pole - s) - 3.0 if s < pole else float("inf")
+
+    assert _crossing(excess, 0.0, 1.0) == pytest.approx(pole - 1 / 3, abs=1e-14)
+
+
+@pytest.mark.parametrize("height", [1.0, 1e3, 1e17, 1e250])
+@pytest.mark.parametrize("begin", [0.0, 8.0])
+def test_a_jump_across_zero_is_closed_in_on(begin: float, height: float) -> None:
+    """Next to a pole the far end is higher than any secant can make use of: to round-off all the same."""
+    jump = begin + 1 / 3
+    found = _crossing(lambda s: -1.0 if s < jump else height, begin, begin + 1)
+    assert found == pytest.approx(jump, abs=4e-15)

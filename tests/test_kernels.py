@@ -123,6 +123,22 @@ def test_a_cache_that_others_may_write_to_is_not_used(tmp_path: Path) -> None:
     assert cache_folder() is None
 
 
+@pytest.mark.parametrize("reason", ["no folder", "switched off"])
+def test_without_a_cache_or_leave_to_compile_casadi_does_it(
+    reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if reason == "no folder":
+        (tmp_path / "file").write_text("in the way")
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+        assert cache_folder() is None
+    else:
+        monkeypatch.setenv("SOFTNLP_COMPILE", "0")
+        assert compiler() is None
+    monkeypatch.setattr("softnlp.batch.compiled._build", lambda *_: pytest.fail("compiled"))
+    assert library("int x;") is None
+    assert isinstance(shooting(Kernels({"decay": decay()}, {}), build=True), Interpreted)
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.integers(1, 3), st.integers(0, 2**31))
 def test_a_quadratic_is_predicted_exactly(columns: int, seed: int) -> None:

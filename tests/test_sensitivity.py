@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,7 @@ from softnlp.status import Status
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.derivatives import UNITS, LinearPoint, entries_of, rotation_vector
 from softnlp.studies.ellipsoids import compliance_ellipsoid, manipulability, stiffness_ellipsoid
-from softnlp.studies.report import named_tolerances
+from softnlp.studies.report import named_tolerances, sensitivity_report
 from softnlp.studies.sensitivity import TIP, Sensitivities, sensitivities, tip_compliance, tip_jacobian
 from softnlp.studies.tolerances import error_bars, monte_carlo
 
@@ -294,6 +295,48 @@ def test_ellipsoids_are_images_of_unit_balls() -> None:
     assert (stiffness_ellipsoid(C, rotation_held=True).semi_axes >= stiff.semi_axes).all()
 
 
+def test_axes_are_right_handed_whatever_the_derivatives() -> None:
+    """The left singular vectors come in either hand."""
+    found = tip_jacobian(D25, SILICONE, PRESSURE, numerics=COARSE)
+    rows, hands = entries_of(found.outputs, "tip_position"), set()
+    for sizes in permutations([1.0, 2.0, 3.0]):  # each pressure moves the tip along one axis
+        matrix = found.matrix.copy()
+        matrix[rows] = np.diag(sizes)
+        moved = manipulability(replace(found, matrix=matrix)).translation
+        hands.add(float(np.sign(np.linalg.det(np.linalg.svd(matrix[rows])[0]))))
+        assert np.linalg.det(moved.axes) == pytest.approx(1)
+        spanned = moved.axes @ np.diag(moved.semi_axes**2) @ moved.axes.T
+        assert spanned == pytest.approx(matrix[rows] @ matrix[rows].T, rel=1e-9, abs=1e-12)
+    assert hands == {1.0, -1.0}
+
+
+def test_a_blocked_pose_without_equilibrium_has_no_numbers() -> None:
+    ogden = material("Ecoflex 00-50", "ogden")
+    found = sensitivities(
+        D25, ogden, [100 * BAR, 0, 0], outputs=["blocked_force"], contact=ContactSettings(), numerics=COARSE
+    )
+    assert found.step.status is Status.UNSTABLE_MATERIAL
+    assert not found.solved
+    assert np.isnan(found.matrix).all()
+    assert found.step.message in found.warnings
+
+
+def test_a_load_that_compresses_the_rod_to_nothing_is_warned_of() -> None:
+    """v_z = 1 + n_z / EA is 0 under -EA, for which the law's fit says nothing any more."""
+    pressure, told = [0.1 * BAR] * 3, "compresses the rod to nothing"
+
+    def at(F: float) -> tuple[tuple[str, ...], float]:
+        step = forward(D25, SILICONE, pressure, loads=Loads(tip_force=(0.0, 0.0, -F)), numerics=COARSE).steps[0]
+        assert step.pose is not None
+        return step.warnings, float(step.pose.shape.shear_extension[:, 2].min())
+
+    axial_stiffness = 1.0 / (1.0 - at(1.0)[1])
+    for part, warned in ((0.95, False), (1.05, True)):
+        warnings, v_z = at(part * axial_stiffness)
+        assert v_z == pytest.approx(1 - part, abs=1e-6)
+        assert any(told in warning for warning in warnings) == warned
+
+
 def test_two_sets_span_a_flat_ellipsoid() -> None:
     two = replace(D25, chamber_sets=2, chambers_per_set=2)
     moved = manipulability(tip_jacobian(two, SILICONE, [0.4 * BAR, 0.6 * BAR], numerics=COARSE))
@@ -329,6 +372,30 @@ def test_error_bars_are_those_of_monte_carlo() -> None:
     # Pressures alone, half as large: the same draws, half the deviation.
     small = monte_carlo(found, {"pressure": 3.0}, 40)
     assert monte_carlo(found, {"pressure": 6.0}, 40).deviation == pytest.approx(2 * small.deviation, rel=1e-3)
+
+
+def test_draws_without_a_solution_are_counted_and_left_out() -> None:
+    """A constant that scatters by ten times its size takes the stiffness away in one of two mirrored draws."""
+    found = loaded()
+    size = {"material.C01": 10 * abs(float(found.nominal[found.quantities.index("material.C01")]))}
+    some = monte_carlo(found, size, 8)
+    assert 2 <= some.solved < some.asked == 8
+    assert np.isfinite(some.deviation[found.outputs.index("tip_position.x")])
+    few = monte_carlo(found, size, 2)
+    assert few.solved < 2
+    assert np.isnan([few.deviation, few.mean_shift, few.standard_error]).all()
+
+
+def test_a_report_has_error_bars_where_they_are_asked_for() -> None:
+    plain, first_order = (
+        sensitivity_report(D25, SILICONE, PRESSURE, tolerances, numerics=COARSE, samples=0)
+        for tolerances in (None, {"pressure": 1e3})
+    )
+    assert plain.bars is plain.sampled is first_order.sampled is None
+    assert first_order.bars is not None
+    by_pressure = plain.sensitivities.of("bending_angle", "pressure")
+    total = first_order.bars.total[first_order.bars.outputs.index("bending_angle")]
+    assert total == pytest.approx(1e3 * np.linalg.norm(by_pressure), rel=1e-9)
 
 
 def test_rotations_are_in_the_world_frame() -> None:

@@ -17,6 +17,7 @@ from slow import some_slow
 from witness import Witnessed, shoot
 from witness_section import section
 
+from softnlp import solver
 from softnlp.branch import stretch_on_branch
 from softnlp.condensed import CondensedSolver
 from softnlp.continuation import follow, straight_path
@@ -26,7 +27,7 @@ from softnlp.numerics import Numerics
 from softnlp.quantities import Model, quantity
 from softnlp.robot import ROBOTS
 from softnlp.rod import Loads
-from softnlp.solver import Engine, Solution, certificate, discretisation_correction, violation
+from softnlp.solver import Engine, Solution, SparseSolver, certificate, discretisation_correction, violation
 from softnlp.status import Status
 from softnlp.studies import statics
 from softnlp.studies.attempts import Attempt
@@ -263,6 +264,40 @@ def test_newton_and_ipopt_reach_the_same_point() -> None:
     assert two.holds(1e-10)
     assert one.engine_status != two.engine_status
     np.testing.assert_allclose(two.x, one.x, atol=1e-8)
+
+
+@pytest.mark.parametrize("size", ["small", "too large"])
+def test_what_newton_does_not_solve_is_left_to_ipopt_unless_it_is_too_large(
+    size: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    posed = pose(MODEL)
+    p, start = posed.problem.pack(VALUES), posed.start(VALUES)
+    linear = CondensedSolver(posed.functions, MultipleShooting(24))
+    monkeypatch.setattr(solver, "_NEWTON_STEPS", 1)
+    if size == "too large":
+        monkeypatch.setattr(solver, "_LARGEST_FALLBACK", start.size - 1)
+    found, quick = (Engine(posed.problem, linear=linear, newton_only=only).solve(p, start) for only in (False, True))
+    assert quick.engine_status == "Newton reached its iteration limit"
+    assert not quick.holds(1e-8)
+    if size == "too large":
+        assert found.engine_status == quick.engine_status
+        np.testing.assert_array_equal(found.x, quick.x)
+    else:
+        assert found.engine_status == "Solve_Succeeded"
+        assert found.holds(1e-10)
+        assert found.iterations > quick.iterations
+        alone = Engine(posed.problem).solve(p, start)
+        assert found.iterations == alone.iterations + quick.iterations
+
+
+def test_a_jacobian_that_is_not_finite_is_singular() -> None:
+    posed = pose(MODEL)
+    p, x = posed.problem.pack(VALUES), posed.start(VALUES)
+    g = np.asarray(posed.problem.residual(x, p)).ravel()
+    sparse = SparseSolver(posed.problem)
+    assert np.isfinite(sparse.solve(x, p, g)).all()
+    with pytest.raises(np.linalg.LinAlgError, match="not finite"):
+        sparse.solve(np.full_like(x, np.nan), p, g)
 
 
 def test_following_a_path_arrives_or_says_how_far_it_came() -> None:

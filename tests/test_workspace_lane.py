@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from softnlp import BAR, Loads, Numerics, material, robot
-from softnlp.batch import shooting
+from softnlp.batch import newton, shooting, stretches
 from softnlp.batch.compiled import compiler
+from softnlp.batch.contact_newton import PATH, BlockedShot, ContactBatch, Stage
+from softnlp.batch.grids import MOST_INTERVALS
+from softnlp.batch.newton import Batch, BatchSolver, Shot
 from softnlp.batch.reduced import reduced_rod
 from softnlp.branch import branch_function, stretch_on_branch
 from softnlp.contact_settings import ContactSettings
@@ -17,6 +20,7 @@ from softnlp.quantities import Model
 from softnlp.status import Status
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.statics import PoseSolver
+from softnlp.tip import tip_conditions
 from softnlp.workspace import pose_lane
 from softnlp.workspace.chunk import ChunkSolver
 from softnlp.workspace.plan import Plan, cells
@@ -242,3 +246,132 @@ def test_chunks_are_compact_cells() -> None:
     assert sorted(order) == list(range(len(values)))
     widest = [np.ptp(values[order[k : k + 108]], axis=0).max() for k in range(0, len(values), 108)]
     assert max(widest) < 0.7
+
+
+# --- what the batch gives up ------------------------------------------------------------------------------------------
+
+
+@needs_compiler
+def test_poses_whose_passes_run_out_are_left_to_the_problem(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One pass of Newton solves no bent and loaded pose; the numbers are those of the problem all the same."""
+    pressures = np.array([[0.6, 0.2, 0.0], [0.4, 0.0, 0.1]]) * BAR
+    asked = plan(pressures, intervals=15)
+    together = ChunkSolver(asked).solve(0).rows
+    assert (together["lane"] == Lane.BATCH).all()
+    monkeypatch.setattr(newton, "_PASSES", 1)
+    alone = ChunkSolver(asked).solve(0).rows
+    assert (alone["lane"] == Lane.PROBLEM).all()
+    assert alone["tip_position"] == pytest.approx(together["tip_position"], abs=2e-6 * 0.06)
+
+
+@needs_compiler
+def test_a_section_that_softens_with_its_stretch_is_left_to_the_problem() -> None:
+    """Pressure takes stiffness away where a coefficient is negative: the unpressurised curve then shows no limit."""
+    asked = plan(np.array([[0.3, 0.1, 0.0]]) * BAR, coefficients=Coefficients(elongation=-0.05))
+    columns = asked.full_values(np.arange(1))
+    assert PoseLane(asked).sections(columns)[1].size == 0
+    (row,) = ChunkSolver(asked).solve(0).rows
+    assert row["lane"] == Lane.PROBLEM
+    pose = PoseSolver(asked.model, Numerics()).solve(asked.pressures()[0], LOADED)[0].pose
+    assert pose is not None
+    assert row["stretch"] == pytest.approx(pose.stretch, rel=1e-12)
+
+
+@pytest.mark.parametrize("kernels", [pytest.param("compiled", marks=needs_compiler), "interpreted"])
+def test_a_chunk_beyond_every_equilibrium_is_named_pose_by_pose(kernels: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if kernels == "interpreted":
+        monkeypatch.setattr(shooting, "library", lambda source, build: None)
+    softening, pressures = Coefficients(elongation=0.0), np.array([[20.0, 0, 0], [30.0, 10.0, 0]]) * BAR
+    asked = plan(pressures, law="yeoh", coefficients=softening)
+    block = ChunkSolver(asked).solve(0)
+    ended = (Status.UNSTABLE_MATERIAL, Status.NO_EQUILIBRIUM)
+    assert all(STATUSES[k] in ended for k in block.rows["status"])
+    assert [number for number, _ in block.messages] == [0, 1]
+    assert np.isnan(block.rows["tip_position"]).all()
+
+
+@needs_compiler
+def test_a_stretch_that_did_not_settle_is_not_certain(monkeypatch: pytest.MonkeyPatch) -> None:
+    pressures = np.vstack([random_pressures(5, 1.0), np.zeros((1, 3))])
+    asked = plan(pressures, robot__length=np.full(6, 0.06))
+    lane, columns = PoseLane(asked), asked.full_values(np.arange(6))
+    assert lane.sections(columns)[1].tolist() == [0, 1, 2, 3, 4, 5]
+    monkeypatch.setattr(stretches, "_NEWTON_STEPS", 1)
+    sections, numbers = lane.sections(columns)
+    assert numbers.tolist() == [5]  # without pressure nothing has to settle
+    assert sections.stretch == pytest.approx([1.0])
+
+
+def test_poses_that_refinement_does_not_bring_to_the_target_keep_their_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An error that falls by the first order only is asked for four times, on ever finer grids, and reported."""
+    solver = BatchSolver(rod_functions(Model(robot("D25L60"), material("Ecoflex 00-50"))), None, 1e-4, None)  # type: ignore[arg-type]
+    asked: list[int] = []
+
+    def shoot(self: BatchSolver, batch: Batch, poses: np.ndarray, guess: np.ndarray, grids: np.ndarray) -> Shot:
+        n, error = poses.size, 2e-2 / grids
+        if n == 3:
+            asked.append(int(grids.max()))
+        known = np.zeros(n, np.int64)
+        return Shot(guess, np.zeros((18, n)), np.zeros((8, n)), np.zeros(n), error, error, known > 0, grids, known)
+
+    monkeypatch.setattr(BatchSolver, "_shoot", shoot)
+    shot = solver.solve(Batch(np.zeros((20, 3)), np.full(3, 0.1)), np.arange(3.0)[:, None])
+    assert len(asked) == 5  # the first grid and four finer ones
+    assert asked == sorted(set(asked))
+    assert (shot.intervals == asked[-1]).all()
+    assert asked[-1] < MOST_INTERVALS
+    assert shot.refinement_error == pytest.approx(np.full(3, 2e-2 / asked[-1]))
+    assert (shot.refinement_error > 1e-4).all()
+
+
+def test_blocked_poses_that_refinement_does_not_bring_to_the_target_keep_their_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    functions = rod_functions(Model(robot("D25L60"), material("Ecoflex 00-50")), tip_conditions("compliant"))
+    batch = ContactBatch(functions, None, None)  # type: ignore[arg-type]
+    asked: list[int] = []
+
+    def shoot(
+        self: ContactBatch, stage: Stage, guess: np.ndarray, grids: np.ndarray, tolerance: float, *, judge: bool
+    ) -> BlockedShot:
+        n, error = grids.size, 2e-2 / grids
+        asked.append(int(grids[0]))
+        fields = [np.zeros((2, n)), np.zeros(n), np.ones(n), error, error, grids, np.zeros(n, np.int64)]
+        return BlockedShot(guess, np.zeros((21, n)), *fields)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(ContactBatch, "_shoot", shoot)
+    n, held = 3, np.array([True, True, False])
+    stage = Stage(*(np.zeros((2, n)) for _ in range(5)))
+    shot, good = batch._refined(stage, np.zeros((7, n)), held, np.ones(n), np.full(n, 4), 1e-4, 21)
+    assert len(asked) == 6  # the first grid and five finer ones
+    assert asked == sorted(set(asked))
+    assert shot.intervals.tolist() == [asked[-1], asked[-1], asked[0]]  # what was lost is not refined
+    assert shot.worst_error == pytest.approx(2e-2 / shot.intervals)
+    assert good.tolist() == held.tolist()
+    assert (shot.iterations == 4).all()
+
+
+def test_blocked_poses_that_are_lost_are_not_followed_further(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The one that makes contact first is lost at once; the path goes on where the other makes contact."""
+    functions = rod_functions(Model(robot("D25L60"), material("Ecoflex 00-50")), tip_conditions("compliant"))
+    batch = ContactBatch(functions, None, None)  # type: ignore[arg-type]
+    followed: list[tuple[int, list[int]]] = []
+
+    def stage_at(j: int, on: np.ndarray) -> Stage:
+        followed.append((j, on.tolist()))
+        return Stage(np.zeros((20, on.size)), *(np.zeros((3, on.size)) for _ in range(3)), np.ones((2, on.size)))
+
+    def shoot(
+        self: ContactBatch, stage: Stage, guess: np.ndarray, grids: np.ndarray, tolerance: float, *, judge: bool
+    ) -> BlockedShot:
+        n, nothing = grids.size, np.zeros(grids.size)
+        residual = np.where([len(followed) == 1] * n, np.inf, 0.0)
+        fields = [np.zeros((2, n)), residual, np.ones(n), nothing, nothing, grids, np.ones(n, np.int64)]
+        return BlockedShot(guess, np.zeros((21, n)), *fields)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(ContactBatch, "_shoot", shoot)
+    last = len(PATH) - 1
+    shot, held = batch.follow(stage_at, np.array([0, last - 1]), 1e-4)
+    assert followed == [(0, [0]), (last - 1, [1]), (last, [1]), (last, [0, 1])]  # the last one judges
+    assert held.tolist() == [False, True]
+    assert shot.iterations.tolist() == [2, 3]

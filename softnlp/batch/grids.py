@@ -21,7 +21,7 @@ def grid_level(wanted: Array) -> NDArray[np.int64]:
 
 def whole_groups(intervals: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.int64]]:
     """Return which pose stands in each slot of groups of equal grids, and the grid of each group."""
-    slots, counts = [], []
+    slots, counts = [np.zeros(0, np.intp)], [np.zeros(0, np.int64)]
     for K in np.unique(intervals):
         poses = np.flatnonzero(intervals == K)
         groups = -(-poses.size // WIDTH)

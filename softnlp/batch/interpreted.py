@@ -116,7 +116,8 @@ class Interpreted:
         poses = given.shape[1]
         whole = padded(given, -poses % _COLUMNS)
         blocks = [self._maps[name](whole[:, first : first + _COLUMNS]) for first in range(0, whole.shape[1], _COLUMNS)]
-        return np.hstack([np.asarray(block) for block in blocks])[:, :poses]
+        none = np.zeros((self._maps[name].size1_out(0), 0))
+        return np.hstack([none, *(np.asarray(block) for block in blocks)])[:, :poses]
 
 
 def padded(columns: Array, more: int) -> Array:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.errors import InputError
 from softnlp.studies.sensitivity import Sensitivities
 
 Array = NDArray[np.float64]
@@ -115,8 +114,6 @@ def stiffness_ellipsoid(compliance: Sensitivities, *, rotation_held: bool = Fals
 
 def _image(matrix: Array, unit: str) -> Ellipsoid:
     """Return the image of the unit ball under a matrix (3, n)."""
-    if matrix.shape[0] != 3:
-        raise InputError(f"expected three rows, got {matrix.shape}", key="matrix")
     if not np.isfinite(matrix).all():
         return Ellipsoid(np.full((3, 3), np.nan), np.full(3, np.nan), unit)
     U, sizes, _ = np.linalg.svd(matrix)
