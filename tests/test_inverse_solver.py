@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from softnlp import BAR, Loads, Numerics, Status, inverse, material, robot
+from softnlp import BAR, Coefficients, Loads, Numerics, Status, inverse, material, robot
+from softnlp.branch import stretch_on_branch
 from softnlp.quantities import Model
 from softnlp.robot import Robot
 from softnlp.solver import Solution
+from softnlp.studies import inverse_solver
 from softnlp.studies.aiming import Aim, aim_of
 from softnlp.studies.bounded import Limits, Measured, least_norm, nearest
 from softnlp.studies.derivatives import PoseDerivatives
@@ -21,7 +24,7 @@ from softnlp.studies.inverse_solver import InverseSolver, Reached
 from softnlp.studies.inverse_task import InverseTask, Target
 from softnlp.studies.pose_grid import Solved
 from softnlp.studies.statics import PoseSolver
-from softnlp.studies.step import Aimed, Step
+from softnlp.studies.step import Step
 from softnlp.studies.tip_map import ArcMap, GridMap, TipPoint
 
 Array = NDArray[np.float64]
@@ -40,9 +43,9 @@ def poses_of(body: Robot) -> PoseSolver:
     return PoseSolver(Model(body, SILICONE), GRID)
 
 
-def solver_of(loads: Loads = Loads(), method: str = "newton", highest: float = HIGHEST) -> InverseSolver:
-    task = InverseTask((), np.zeros(3), np.full(3, highest), float(LENGTH))
-    return InverseSolver(Model(D25, SILICONE), GRID, loads, task, method)  # type: ignore[arg-type]
+def solver_of(method: str = "newton", loads: Loads | None = None, highest: Any = HIGHEST) -> InverseSolver:
+    task = InverseTask((), np.zeros(3), np.broadcast_to(highest, 3).astype(float), float(LENGTH))
+    return InverseSolver(Model(D25, SILICONE), GRID, loads or Loads(), task, method)  # type: ignore[arg-type]
 
 
 @cache
@@ -106,7 +109,7 @@ def test_the_program_and_the_search_find_the_same_pressures(
 def test_a_run_by_the_program_is_that_of_the_search() -> None:
     asked = at(0.012, -0.004, 0.072)
     by_search, _ = unloaded().solve(asked, None)
-    by_program, _ = solver_of(method="nlp").solve(asked, None)
+    by_program, _ = solver_of("nlp").solve(asked, None)
     assert by_search.status is by_program.status is Status.SOLVED
     assert by_program.pressure == pytest.approx(by_search.pressure, abs=1)  # of 1e5 Pa
     assert by_program.aimed is not None
@@ -114,14 +117,20 @@ def test_a_run_by_the_program_is_that_of_the_search() -> None:
     assert by_program.aimed.distance < 1e-6 * LENGTH
 
 
-def test_a_program_that_fails_leaves_the_answer_of_the_coarse_search(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("lost", ["program", "pose"])
+def test_where_the_grid_has_no_better_one_the_answer_of_the_arcs_stands(
+    lost: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What is said of it is its own misfit on the grid, not that of the search on arcs."""
 
     def fails(self: InverseProblem, poses: PoseSolver, loads: Loads, aim: Aim, pressure: Array, x: Array) -> Solution:
         return Solution(x, np.zeros(0), float("inf"), 300, "Maximum_Iterations_Exceeded")
 
-    monkeypatch.setattr(InverseProblem, "solve", fails)
-    solver = solver_of(method="nlp")
+    if lost == "program":
+        monkeypatch.setattr(InverseProblem, "solve", fails)
+    else:
+        monkeypatch.setattr(GridMap, "of", lambda *_: None)
+    solver = solver_of("nlp" if lost == "program" else "newton")
     asked = np.array([0.012, -0.004, 0.072])
     step, reached = solver.solve(Target(asked, None), None)
     assert reached is not None
@@ -210,7 +219,7 @@ class Fenced:
         self.asked.append(z)
         if z.sum() < self._stable_from:
             return Step(pressure, Status.OUT_OF_REACH, "not stable")
-        return replace(self._like, pressure=pressure, cost=float(np.linalg.norm(z + [0.0, 0.1, 0.2])))
+        return replace(self._like, pressure=pressure, cost=float(np.linalg.norm(z + np.array([0.0, 0.1, 0.2]))))
 
 
 def reached_at(solver: InverseSolver, z: Array) -> tuple[Aim, Reached]:
@@ -324,3 +333,66 @@ def test_of_two_answers_the_nearer_one_is_taken() -> None:
     assert step.status is Status.OUT_OF_REACH
     assert reached is not None
     assert reached.cost == pytest.approx(min(costs), rel=1e-3)
+
+
+def test_a_lost_start_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The arc nearest to the target leads to no pose on the grid; the tips tabulated on the grid do."""
+    poses = poses_of(D25)
+    wanted = np.array([0.7, 0.0, 0.0]) * BAR
+    pose = poses.solve(wanted, LOADED)[0].pose
+    assert pose is not None
+    solver = solver_of(loads=LOADED, highest=[HIGHEST, 0.0, 0.0])
+    place, lost = GridMap.at, []
+
+    def at_first_lost(self: GridMap, pressure: Array, near: TipPoint | None) -> TipPoint | None:
+        if near is None and not lost:
+            lost.append(pressure)
+            return None
+        return place(self, pressure, near)
+
+    monkeypatch.setattr(GridMap, "at", at_first_lost)
+    step, _ = solver.solve(Target(pose.tip_position, None), None)
+    assert abs(lost[0][0] - wanted[0]) < 0.2 * BAR
+    assert step.status is Status.SOLVED
+    assert step.pressure == pytest.approx(wanted, abs=10)
+
+
+def test_smaller_pressures_that_leave_the_target_are_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A search for the least pressures that gives way on the target is put aside: the target comes first."""
+
+    def gives_way(measure: Any, start: Measured, limits: Limits, *_: Any) -> tuple[Measured, None, int]:
+        return replace(start, z=np.zeros(3), r=start.r + 1e-3), None, 1
+
+    solver = solver_of()
+    aim = Aim(Target(None, TOWARDS), float(LENGTH), 1.0)
+    start = solver._coarse.at(np.array([0.9, 0.1, 0.3]) * BAR, None)
+    assert start is not None
+    monkeypatch.setattr(inverse_solver, "least_norm", gives_way)
+    found = solver._search(aim, start, continues=False)
+    assert found.met
+    met = solver._coarse.at(found.point.z * BAR, None)
+    assert met is not None
+    assert met.state[9:12] == pytest.approx(TOWARDS, abs=1e-6)
+    assert np.linalg.norm(found.point.z) > 0.1
+
+
+WEAK = Model(D25, material("Ecoflex 00-20", "yeoh"), Coefficients(elongation=0.0))
+
+
+def test_beyond_the_last_equilibrium_there_is_no_tip() -> None:
+    """The branch from zero pressure ends: no map finds a tip there, from nothing or from the last one before."""
+    poses = PoseSolver(WEAK, GRID)
+    beyond = np.full(3, 9.0) * BAR
+    branch = stretch_on_branch(poses.branch, poses.column({"pressure": beyond}), beyond)
+    assert branch.status in (Status.NO_EQUILIBRIUM, Status.UNSTABLE_MATERIAL)
+    last = 0.99 * branch.fraction * beyond
+    arcs, grid = ArcMap(poses), GridMap(PoseDerivatives(poses), 2, STANDING)
+    near = arcs.at(last, None)
+    assert near is not None
+    assert arcs.at(beyond, None) is None
+    assert arcs.at(beyond, near) is None
+    assert grid.at(last, None) is not None
+    assert grid.at(beyond, None) is None
+    task = InverseTask((), np.zeros(3), np.full(3, 9.0) * BAR, 0.06)
+    solver = InverseSolver(WEAK, GRID, Loads(), task, "newton")
+    assert solver.limits.largest_sum == pytest.approx(branch.fraction * 27.0, rel=1e-5)
