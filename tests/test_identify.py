@@ -36,7 +36,7 @@ from softnlp.materials import Material
 from softnlp.quantities import Model
 from softnlp.robot import Robot
 from softnlp.scenario import load_scenario, scenario_from_text
-from softnlp.studies import predicted_pose
+from softnlp.studies import predicted_force, predicted_pose
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.blocked_grid import BlockedGrid
 from softnlp.studies.fit_statistics import uncertainty
