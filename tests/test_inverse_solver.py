@@ -205,6 +205,21 @@ def test_a_jump_is_said_also_where_the_last_pressure_is_lost(monkeypatch: pytest
     assert said.startswith("the pressures jump from (0.516, 0.767, 0.686) to (")
 
 
+def test_a_stable_pose_far_off_does_not_hide_a_nearer_one() -> None:
+    """Up is met by the column that stands unstably alone. The search that ends curled up at full pressure is no end."""
+    bounds, grid = (0.0, [0.5 * BAR, 0.0, 0.0]), Numerics(intervals=3)
+    step = inverse(TALL, SOFT, directions=[0.0, 0.0, 1.0], bounds=bounds, loads=STANDING, numerics=grid).steps[0]
+    assert step.status is Status.OUT_OF_REACH
+    assert step.aimed is not None
+    assert step.aimed.angle is not None
+    poses = PoseSolver(Model(TALL, SOFT), grid)
+    tried = [poses.solve(np.array([bar, 0.0, 0.0]) * BAR, STANDING)[0].pose for bar in (0.01, 0.1, 0.25, 0.5)]
+    tilts = [pose.tilt for pose in tried if pose is not None and pose.stable]
+    assert len(tilts) == 4
+    assert step.aimed.angle <= min(tilts)
+    assert max(tilts) > 2.0
+
+
 class Fenced:
     """Stands in for the judge of poses: the misfit grows from a corner that is not stable; z [bar] by its pressures."""
 

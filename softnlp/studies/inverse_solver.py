@@ -162,12 +162,18 @@ class InverseSolver:
             for k in self._arcs.starts(aim, self.limits, 1):
                 if (point := self._coarse.at(self._arcs.pressures[k], None)) is not None:
                     yield point, False
-        if self._table is None:
-            self._table = tabulated(self._coarse, spread(self.limits, _POSES if loaded else _ARCS) * BAR)
-        for k in self._table.starts(aim, self.limits, _STARTS):
-            point = self._table.points[k]
+        table = self._tips()
+        for k in table.starts(aim, self.limits, _STARTS):
+            point = table.points[k]
             assert point is not None
             yield point, False
+
+    def _tips(self) -> Table:
+        """Return the tips of the coarse map over the bounds."""
+        if self._table is None:
+            most = _POSES if isinstance(self._coarse, GridMap) else _ARCS
+            self._table = tabulated(self._coarse, spread(self.limits, most) * BAR)
+        return self._table
 
     def _search(self, aim: Aim, start: TipPoint, *, continues: bool) -> Found:
         """Search on the coarse map from a tip."""
@@ -273,16 +279,21 @@ class InverseSolver:
         return (distance is None or distance <= accuracy * aim.length) and (angle is None or angle <= accuracy)
 
     def _searched(self, aim: Aim, best: Reached | None) -> Reached | None:
-        """Search among stable poses without derivatives: where they end there is no slope to follow."""
+        """Search among stable poses without derivatives: where they end there is no slope to follow.
+
+        It begins at the first stable pose of the table that is nearer than the best one known, or else at that one.
+        """
         span = (self.limits.upper - self.limits.lower) * BAR
         here = best
-        if here is None:
-            assert self._table is not None
-            for k in self._table.starts(aim, self.limits, len(self._table.pressures)):
-                judged = self._at(aim, self._table.pressures[k])
-                if isinstance(judged, Reached):
-                    here = judged
-                    break
+        table = self._tips()
+        misfit = np.linalg.norm(aim.misfit(table.states), axis=0)
+        for k in table.starts(aim, self.limits, len(table.pressures)):
+            if best is not None and misfit[k] >= best.cost:
+                break
+            judged = self._at(aim, table.pressures[k])
+            if isinstance(judged, Reached) and (best is None or judged.cost < best.cost):
+                here = judged
+                break
         if here is None:
             return None
         size, last = _COMPASS
