@@ -31,6 +31,7 @@ from softnlp.numerics import Numerics
 from softnlp.robot import ROBOTS, Robot
 from softnlp.rod import Loads
 from softnlp.status import Status
+from softnlp.studies import statics
 from softnlp.studies.forward import forward
 from softnlp.studies.step import Pose, Step
 
@@ -376,6 +377,30 @@ def test_a_given_number_of_intervals_is_used_and_what_it_cannot_reach_is_said() 
     assert fine.discretisation_error is not None
     assert fine.discretisation_error < 1e-6
     assert fine.warnings == ()
+
+
+@pytest.mark.parametrize("enough", [True, False])
+def test_the_finest_grid_either_meets_the_accuracy_or_gives_no_pose(
+    enough: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Refinement aims at a third of the accuracy; where no finer grid is left, the accuracy itself decides."""
+    robot, pressure, loads = ROBOTS["D25L60"], [0.9e5, 0.2e5, 0.0], Loads(tip_force=(0.02, 0.05, 0.0))
+    error = solve(robot, ECOFLEX_50, pressure, loads=loads, numerics=Numerics(intervals=10)).discretisation_error
+    assert error is not None
+    monkeypatch.setattr(statics, "MOST_INTERVALS", 10)
+    accuracy = error * (1.5 if enough else 0.1)
+    step = forward(robot, ECOFLEX_50, pressure, loads=loads, numerics=Numerics(accuracy=accuracy)).steps[0]
+    if enough:
+        assert step.status is Status.SOLVED
+        assert step.intervals == 10
+        assert step.discretisation_error == pytest.approx(error, rel=1e-6)
+        assert step.warnings == ()
+    else:
+        assert step.status is Status.INACCURATE
+        assert f"; with 10 intervals it is {error:.2g} L_0" in step.message
+        assert step.pose is None
+        assert step.residual is not None
+        assert step.residual < 1e-10  # the equations of the grid are solved; the grid is what is too coarse
 
 
 def test_what_a_designer_should_know_is_a_warning() -> None:

@@ -36,14 +36,17 @@ from softnlp.materials import Material
 from softnlp.quantities import Model
 from softnlp.robot import Robot
 from softnlp.scenario import load_scenario, scenario_from_text
+from softnlp.studies import predicted_force, predicted_pose
 from softnlp.studies.blocked_force import blocked_force
+from softnlp.studies.blocked_grid import BlockedGrid
 from softnlp.studies.fit_statistics import uncertainty
 from softnlp.studies.identified import Identified
+from softnlp.studies.identify import _Fit
 from softnlp.studies.identify_nlp import identify_at_once
 from softnlp.studies.identify_task import RobotTask
 from softnlp.studies.measurements import checked_measurements
 from softnlp.studies.predicted_force import BlockedForces
-from softnlp.studies.predicted_pose import ArcPoses, FreePoses, LoadedPoses
+from softnlp.studies.predicted_pose import ArcPoses, FreePoses, LoadedPoses, Prediction
 from softnlp.studies.trial import TrialBlocked, TrialPoses
 
 ROOT = Path(__file__).parents[1]
@@ -177,6 +180,111 @@ def test_derivatives_of_forces_are_those_of_differences() -> None:
         assert slopes[k] == pytest.approx(slope, rel=1e-5)
 
 
+FAR = {"stiffening.bending": 0.2}, {"stiffening.bending": 6.0}
+
+
+def test_poses_that_jump_with_the_constants_are_followed_anew() -> None:
+    """Newton from the pose at other constants is trusted nearby alone; where it jumps, all starts anew."""
+    solver = TrialPoses(Model(robot("D15L60"), SILICONE, TRUE), Numerics(intervals=10))
+    P = POSES[[2, 1]]
+    poses, fresh = (LoadedPoses(solver, P, LOADED, ("stiffening.bending",)) for _ in range(2))
+    first = poses.evaluate(FAR[0])
+    then, anew = poses.evaluate(FAR[1]), fresh.evaluate(FAR[1])
+    assert not then.failures
+    assert np.abs(then.values[0, :3] - first.values[0, :3]).max() > 0.3 * 0.06
+    assert then.values == pytest.approx(anew.values, rel=1e-9, abs=1e-12)
+    assert then.slopes == pytest.approx(anew.slopes, rel=1e-9, abs=1e-12)
+
+
+def test_a_loaded_pose_that_is_lost_is_named_and_the_others_stand() -> None:
+    soft = Model(robot("D25L60"), material("Ecoflex 00-20", "yeoh"), Coefficients(elongation=0.0))
+    P = BAR * np.array([[0.1, 0, 0], [9.0, 9.0, 9.0], [0.2, 0, 0]])
+    found = LoadedPoses(TrialPoses(soft, Numerics(intervals=4)), P, LOADED, ("stiffening.bending",)).evaluate({})
+    (failure,) = found.failures
+    assert failure.row == 1
+    assert failure.status in (Status.NO_EQUILIBRIUM, Status.UNSTABLE_MATERIAL)
+    assert np.isnan(found.values[1]).all()
+    assert np.isnan(found.slopes[1]).all()
+    assert np.isfinite(found.values[[0, 2]]).all()
+
+
+def test_a_straight_loaded_pose_gives_its_bending_angle_no_slope() -> None:
+    """The angle has a kink there; it is 0 to both sides of every constant, and the elongation is not."""
+    solver = TrialPoses(Model(robot("D25L60"), SILICONE, TRUE), Numerics(intervals=4))
+    hung = Loads(tip_force=(0.0, 0.0, 0.05))
+    found = LoadedPoses(solver, POSES[-1:], hung, ("stiffening.elongation", "stiffening.bending")).evaluate({})
+    assert found.values[0, 3] < 1e-8
+    assert found.slopes[0, 3].tolist() == [0.0, 0.0]
+    assert found.slopes[0, 4, 0] < 0
+
+
+def test_roots_nearby_take_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Newton's steps are bounded in number; from constants nearby a few are as good as following the branch."""
+    solver = TrialPoses(Model(robot("D25L60"), SILICONE, TRUE), Numerics())
+    poses = ArcPoses(solver, POSES, ("stiffening.elongation",))
+    poses.evaluate({"stiffening.elongation": 0.6})
+    expected = ArcPoses(solver, POSES, ("stiffening.elongation",)).evaluate({"stiffening.elongation": 0.62}).values
+    monkeypatch.setattr(predicted_pose, "_NEWTON_STEPS", 3)
+    near = poses.evaluate({"stiffening.elongation": 0.62}).values
+    assert near == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("why", ["far", "beyond a fold"])
+def test_forces_that_go_elsewhere_are_followed_anew(why: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Far from the known shape, or where the determinant that counts folds has changed its sign on the way."""
+    solver = TrialBlocked(TrialPoses(Model(robot("D25L60"), SILICONE, TRUE), Numerics(intervals=6)), ContactSettings())
+    P, names = BAR * np.array([[1.2, 0, 0]]), ("stiffening.bending",)
+    poses = ArcPoses(solver.poses, P, names)
+    forces, fresh = (BlockedForces(solver, P, Loads(), names) for _ in range(2))
+
+    def force(of: BlockedForces, bending: float) -> Prediction:
+        free = poses.evaluate({"stiffening.bending": bending})
+        return of.evaluate({"stiffening.bending": bending}, free.values[:, 5:], free.slopes[:, 5:])
+
+    force(forces, 0.2)
+    wanted = 6.0 if why == "far" else 0.25
+    expected = force(fresh, wanted)
+    followed: list[BlockedForces] = []
+    follow, determinants = BlockedForces._follow, BlockedGrid.determinants
+
+    def spied(self: BlockedForces, *arguments: Any) -> Any:
+        followed.append(self)
+        return follow(self, *arguments)
+
+    def turned(self: BlockedGrid, solution: Any, plane: Any) -> Any:
+        first, *others = determinants(self, solution, plane)
+        moved = not followed and not np.allclose(solution.p, known.solution.p)
+        return (-first if moved else first, *others)
+
+    known = forces._known[0]
+    monkeypatch.setattr(BlockedForces, "_follow", spied)
+    if why == "beyond a fold":
+        monkeypatch.setattr(BlockedGrid, "determinants", turned)
+    else:  # a blocked shape moves little with the constants
+        monkeypatch.setattr(predicted_force, "_LARGEST_JUMP", 1e-3)
+    found = force(forces, wanted)
+    assert followed == [forces]
+    assert not found.failures
+    assert found.values == pytest.approx(expected.values, rel=1e-6)
+    assert found.slopes == pytest.approx(expected.slopes, rel=1e-5)
+
+
+def test_a_force_beyond_a_fold_is_lost_and_the_one_before_it_stands() -> None:
+    rigid = ContactSettings(closure="rigid")
+    solver = TrialBlocked(TrialPoses(Model(robot("D20L60"), SILICONE), Numerics(intervals=6)), rigid)
+    P = BAR * np.array([[1.5, 0, 0], [0.6, 0, 0]])
+    poses = ArcPoses(solver.poses, P, ("stiffening.bending",)).evaluate({})
+    forces = BlockedForces(solver, P, Loads(), ("stiffening.bending",))
+    found = forces.evaluate({}, poses.values[:, 5:], poses.slopes[:, 5:])
+    (failure,) = found.failures
+    assert (failure.row, failure.status) == (0, Status.FOLD)
+    assert np.isnan(found.values[0]).all()
+    assert np.isnan(found.slopes[0]).all()
+    alone = blocked_force(robot("D20L60"), SILICONE, P[1:], rigid, numerics=Numerics(intervals=6)).steps[0].contact
+    assert alone is not None
+    assert found.values[1, 0] == pytest.approx(alone.force, rel=1e-6)
+
+
 def test_one_nlp_of_all_poses_gives_the_same_constants() -> None:
     """On the same grid of a loaded robot both solve the same equations; the data have errors of some percent."""
     P = BAR * np.array([[1.0, 0, 0]])
@@ -240,6 +348,74 @@ def test_a_constant_at_its_bound_is_named_and_the_others_are_at_their_best() -> 
     alone = identify(off, SILICONE, ["k_e"], coefficients=replace(TRUE, bending=0.0, elongation=0.41))
     assert found.constants[1] == pytest.approx(alone.constants[0], rel=1e-6)
     assert found.uncertainty.standard_errors[1] == pytest.approx(alone.uncertainty.standard_errors[0], rel=1e-4)
+
+
+@pytest.mark.parametrize("lost", [False, True], ids=["pushed away from it", "no pose at it"])
+def test_a_constant_next_to_its_bound_is_not_taken_for_one_at_it(lost: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rough search ends so near to 0 that 0 is tried; the sum of squares, or the model there, says otherwise."""
+    data = seen(robot("D25L60"), POSES, bending=0.005)
+    if lost:
+        named = _Fit._lost
+
+        def none_at_zero(self: _Fit, found: Sequence[Prediction]) -> tuple[Status, str] | None:
+            at_zero = self._last is not None and self._last[0][0] == 0.0
+            return (Status.DIVERGED, "lost") if at_zero else named(self, found)
+
+        monkeypatch.setattr(_Fit, "_lost", none_at_zero)
+    found = identify(data, SILICONE, ["k_b", "k_e"], coefficients=started(["k_b", "k_e"]))
+    assert found.status is Status.SOLVED
+    assert found.at_bound == ()
+    assert found.constants == pytest.approx([0.005, 0.6], rel=1e-6)
+
+
+def test_poses_that_are_lost_at_the_end_leave_no_constants(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second search may leave the first one's answer for where a measured pressure has no equilibrium."""
+    soft = material("Ecoflex 00-20", "yeoh")
+    data = Measurements(robot("D25L60"), [[0.1 * BAR, 0, 0], [1.2 * BAR] * 3], bending_angle=[0.1, 0.0])
+    ends = iter([[1.0], [0.0]])
+    monkeypatch.setattr(_Fit, "_minimise", lambda self, start: np.array(next(ends)))
+    found = identify(data, soft, ["k_e"])
+    assert found.status in (Status.NO_EQUILIBRIUM, Status.UNSTABLE_MATERIAL)
+    assert "D25L60, measurement 2: " in found.message
+    assert np.isnan(found.constants).all()
+    assert np.isnan(found.after[0]).all()
+    assert not np.isnan(found.before[0][:, 3]).any()
+
+
+def test_a_weighted_force_is_not_definite() -> None:
+    data = Measurements(robot("D25L60"), [[BAR, 0, 0]], blocked_force=[0.5])
+    with pytest.raises(InputError, match="expected a closure that has a definite force"):
+        identify(data, SILICONE, ["k_b"], contact=ContactSettings(closure="weighted"))
+
+
+def test_one_nlp_leaves_out_what_was_not_measured() -> None:
+    """A row without a number has no pose in it, and one without a force no blocked shape."""
+    P, numerics = BAR * np.array([[0.3, 0, 0], [0.8, 0, 0]]), Numerics(intervals=2)
+    options: dict[str, Any] = {"coefficients": started(["k_b"]), "loads": LOADED}
+    data = Measurements(robot("D25L60"), P, bending_angle=[np.nan, 0.8], elongation=[np.nan, 0.003])
+    at_once = identify_at_once(data, SILICONE, ["k_b"], intervals=2, **options)
+    assert at_once.status is Status.SOLVED
+    reduced = identify(data, SILICONE, ["k_b"], numerics=numerics, **options)
+    assert at_once.constants["k_b"] == pytest.approx(reduced.constants[0], rel=1e-6)
+    left = ((reduced.after[0] - reduced.data[0].values) / reduced.data[0].sigma)[1, 3:5]
+    assert at_once.cost == pytest.approx(left @ left / 2, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("measured", "free", "options", "said"),
+    [
+        ({"bending_angle": [0.5, 0.5]}, ["k_e"], {"coefficients": Coefficients(elongation=0.0)}, "2: no pose to start"),
+        ({"blocked_force": [0.1, np.nan]}, ["k_b"], {"contact": ContactSettings(offset=-0.2)}, "1: no blocked shape"),
+        ({"bending_angle": [0.5, np.nan]}, ["k_c"], {}, "no measurement depends on 'k_c'"),
+    ],
+    ids=["no pose", "no contact", "no dependence"],
+)
+def test_one_nlp_refuses_what_it_cannot_start_from(
+    measured: dict[str, Any], free: list[str], options: dict[str, Any], said: str
+) -> None:
+    data = Measurements(robot("D25L60"), [[0.1 * BAR, 0, 0], [9 * BAR] * 3], **measured)
+    with pytest.raises(InputError, match=said):
+        identify_at_once(data, material("Ecoflex 00-20", "yeoh"), free, intervals=4, **options)
 
 
 def test_where_the_model_has_no_pose_nothing_is_identified() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -302,6 +303,44 @@ def test_the_least_norm_on_a_circle_is_towards_the_origin() -> None:
     held, _, _ = least_norm(_ring, _ring(np.array([1.0, 1.3])), Limits(np.array([0.5, -2]), np.full(2, 3.0), 10.0))
     assert held.z[0] == 0.5
     assert held.r == pytest.approx([0], abs=1e-8)
+
+
+def test_the_least_norm_stops_where_the_map_ends() -> None:
+    """Nothing can be measured beside the start, so it stands, after ever shorter steps."""
+    tried: list[Array] = []
+
+    def ends_here(z: Array, near: Measured) -> None:
+        tried.append(z)
+
+    start = _ring(np.array([1.0, 1.3]))
+    limits = Limits(np.full(2, -2.0), np.full(2, 3.0), 10.0)
+    end, _, spent = least_norm(ends_here, start, limits, measured_curvature=False)
+    assert end is start
+    lengths = [np.abs(z - start.z).max() for z in tried]
+    assert all(b < a / 2 for a, b in pairwise(lengths))
+    assert lengths[-1] < 1e-7
+    assert spent == len(tried)
+
+
+def test_the_least_norm_without_curvature_has_it_nearly_when_its_steps_are_used_up() -> None:
+    """Where the ring is as curved as this the steps only creep; what they leave is on the ring, and all but least."""
+    centre, radius = np.array([1.0, 0.3]), 0.28
+    measured = 0
+
+    def ring(z: Array, near: Measured | None = None) -> Measured:
+        nonlocal measured
+        measured += 1
+        off = z - centre
+        size = float(np.linalg.norm(off))
+        return Measured(z, np.array([size - radius]), (off / size)[None, :], None)
+
+    limits = Limits(np.full(2, -2.0), np.full(2, 3.0), 10.0)
+    start = ring(centre + np.array([0.0, radius]))
+    end, second, spent = least_norm(ring, start, limits, measured_curvature=False)
+    assert second is None
+    assert spent == 60 == measured - 1
+    assert end.r == pytest.approx([0], abs=1e-9)
+    assert end.z == pytest.approx(centre * (1 - radius / np.linalg.norm(centre)), abs=1e-6)
 
 
 def test_limits_are_kept_to_the_last_bit() -> None:

@@ -25,12 +25,23 @@ from softnlp.problem import compile_problem
 from softnlp.quantities import Model, quantities
 from softnlp.section import deform
 from softnlp.status import Status
+from softnlp.studies.blocked import BlockedSolver
 from softnlp.studies.blocked_force import blocked_force
-from softnlp.studies.derivatives import UNITS, LinearPoint, entries_of, rotation_vector
+from softnlp.studies.derivatives import (
+    UNITS,
+    LinearPoint,
+    PoseDerivatives,
+    blocked_point,
+    checked_names,
+    entries_of,
+    rotation_vector,
+)
 from softnlp.studies.ellipsoids import compliance_ellipsoid, manipulability, stiffness_ellipsoid
 from softnlp.studies.report import named_tolerances, sensitivity_report
 from softnlp.studies.sensitivity import TIP, Sensitivities, sensitivities, tip_compliance, tip_jacobian
+from softnlp.studies.statics import PoseSolver
 from softnlp.studies.tolerances import error_bars, monte_carlo
+from softnlp.studies.wall import standing_wall
 
 Array = NDArray[np.float64]
 
@@ -256,6 +267,38 @@ def test_touching_the_wall_has_no_derivative() -> None:
     )
     assert not found.solved
     assert "touches" in found.warnings[0]
+
+
+def test_a_blocked_pose_that_is_another_when_solved_again_has_no_derivative() -> None:
+    """Free and blocked shape are solved together from what was found; what that leads to must be what was found."""
+    solver = BlockedSolver(Model(D25, SILICONE), COARSE, ContactSettings())
+    P = np.array([[0.4, 0, 0], [0.8, 0, 0]]) * BAR
+    wall = standing_wall(solver.poses, solver.contact, P, Loads())
+    (step, low), (_, high) = (solver.solve(pressure, Loads(), wall) for pressure in P)
+    assert low is not None
+    assert high is not None
+    assert step.contact is not None
+    point = blocked_point(solver, low, ["pressure"])
+    assert point is not None
+    assert point.value("blocked_force")[0] == pytest.approx(step.contact.force, rel=1e-3)
+    assert blocked_point(solver, replace(low, solution=replace(low.solution, x=high.solution.x)), ["pressure"]) is None
+
+
+def test_what_is_compiled_for_derivatives_is_kept() -> None:
+    derivatives = PoseDerivatives(PoseSolver(Model(D25, SILICONE), COARSE))
+    solved = [derivatives.poses.solve(np.array([bar, 0, 0]) * BAR, Loads())[1] for bar in (0.4, 0.5)]
+    assert all(solved)
+    first, second = (derivatives.at(s, ["pressure", "pressure"]) for s in solved if s)
+    assert second.derivatives is first.derivatives
+    ahead = first.value("tip_position") + first.derivative("tip_position")[:, 0] * 0.1 * BAR
+    assert second.value("tip_position") == pytest.approx(ahead, abs=1e-3)  # of a move of 5 mm
+    assert np.linalg.norm(second.value("tip_position") - first.value("tip_position")) > 3e-3
+
+
+def test_one_name_is_a_list_of_one() -> None:
+    assert checked_names("stretch", list(UNITS), "outputs") == ("stretch",)
+    with pytest.raises(InputError, match="unknown name 'strech'; did you mean 'stretch'"):
+        checked_names("strech", list(UNITS), "outputs")
 
 
 def test_a_straight_robot_has_no_derivative_of_its_bending_angle() -> None:

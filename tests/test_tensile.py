@@ -14,7 +14,7 @@ from softnlp.cli import main
 from softnlp.laws import LAWS
 from softnlp.scenario import load_scenario, scenario_from_text
 from softnlp.studies.identify_task import TensileTask
-from softnlp.studies.tensile import LawFit
+from softnlp.studies.tensile import LawFit, _Curve
 
 ROOT = Path(__file__).parents[1]
 SCENARIOS = ROOT / "scenarios" / "identify"
@@ -78,6 +78,34 @@ def test_a_law_of_ones_own_is_fitted_from_a_start() -> None:
     stress = np.asarray(LAWS["linear"].formula(STRETCH, 0.0)) + 1e6 * 0.05 * (np.exp(0.6 * (STRETCH - 1)) - 1) / STRETCH
     fit = fit_tensile(STRETCH, stress, law, start={"a": 0.2, "b": 2.0}).fits["exponential"]
     assert fit.constants == pytest.approx({"a": 0.05, "b": 0.6}, rel=1e-6)
+
+
+def test_a_law_without_any_linear_constant_is_fitted() -> None:
+    law = formula_law(
+        "curved", "a * b * (stretch - 1 / stretch) + a**3 * (stretch - 1)**2 + b**2 * (stretch - 1)", ("a", "b")
+    )
+    assert not _Curve(law).linear.any()
+    a, b, x = 0.4, 0.15, STRETCH
+    stress = 1e6 * (a * b * (x - 1 / x) + a**3 * (x - 1) ** 2 + b**2 * (x - 1))
+    fit = fit_tensile(x, stress, law, start={"a": 0.3, "b": 0.2}).fits["curved"]
+    assert fit.constants == pytest.approx({"a": a, "b": b}, rel=1e-6)
+
+
+def test_starts_without_a_finite_stress_are_passed_over_and_none_at_all_is_refused() -> None:
+    """An exponent too large for a number leaves no stress; smaller ones among the starts do, and one of them fits."""
+    law = formula_law("steep", "a * (exp(b * (stretch - 1)) - 1)", ("a", "b"))
+    stress = 1e4 * (np.exp(3.0 * (STRETCH - 1)) - 1)
+    fit = fit_tensile(STRETCH, stress, law, start={"a": 0.01, "b": 900.0}).fits["steep"]
+    assert fit.constants == pytest.approx({"a": 0.01, "b": 3.0}, rel=1e-5)
+    nowhere = formula_law("nowhere", "a * log(-1 - b**2) * stretch", ("a", "b"))
+    with pytest.raises(InputError, match="'nowhere' gives no finite stress at any start; give others"):
+        fit_tensile(STRETCH, stress, nowhere)
+
+
+def test_a_law_without_constants_has_nothing_to_fit() -> None:
+    law = formula_law("given", "0.02 * (stretch - 1 / stretch**2)", ())
+    with pytest.raises(InputError, match="law 'given' has no constant to fit"):
+        fit_tensile(STRETCH, STRETCH - 1, law)
 
 
 def test_true_stress_and_repeats_give_the_same_constants() -> None:

@@ -170,8 +170,8 @@ def _snapped(grid: Grid, path: Path, start: Solution, fraction: float, work: Wor
     for x, iterations in around_folds(
         grid.stepper, linear, path, start, fraction, weight=pose_weight(start.x), most_solves=most
     ):
-        if x is None:
+        if x is None:  # the last: the curve leads to no other end
             yield Attempt(replace(start, iterations=iterations), fraction)
-            return
-        final = grid.engine.solve(path(1.0), x)
-        yield Attempt(replace(final, iterations=final.iterations + iterations), on_path=True)
+        else:
+            final = grid.engine.solve(path(1.0), x)
+            yield Attempt(replace(final, iterations=final.iterations + iterations), on_path=True)

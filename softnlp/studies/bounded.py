@@ -197,6 +197,4 @@ def least_norm(
             radius = min(1.5 * radius, _LARGEST_RADIUS) if length > 0.9 * radius else radius
         else:
             radius = length / 4
-        if radius < _LEAST_RADIUS:
-            break
     return here, second, spent

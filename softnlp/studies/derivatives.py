@@ -164,11 +164,8 @@ class LinearPoint:
             return raw["tip_forces"][:1]
         if output != "elongation":
             return raw[output]
-        start = 0
-        for q in self.problem.fixed:
-            if q.name == "robot.length":
-                break
-            start += q.size
+        names = [q.name for q in self.problem.fixed]
+        start = sum(q.size for q in self.problem.fixed[: names.index("robot.length")])
         length: Array = raw["backbone_length"] - solution.p[start]
         return length
 

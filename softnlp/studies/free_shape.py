@@ -152,9 +152,8 @@ def from_zero(end: Situation, shapes: FreeShapes, touch: float) -> tuple[Situati
         tip = shapes.tip(Situation(nothing, Loads(), None))[1]
         shift = end.wall.gap(tip)
         shapes.begin(1.0, None)
-        if shift < 0 or end.is_loaded:
-            wall = Wall(end.wall.point + min(shift, 0.0) * end.wall.normal, end.wall.normal)
-            rest = Situation(nothing, Loads(), wall)
+        wall = Wall(end.wall.point + min(shift, 0.0) * end.wall.normal, end.wall.normal)
+        rest = Situation(nothing, Loads(), wall)
 
     def gap_at(t: float) -> float:
         situation = rest.towards(end, t)

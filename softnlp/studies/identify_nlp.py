@@ -136,16 +136,17 @@ class _Nlp:
     def compiled(self) -> CompiledProblem:
         """Return the problem with the constants free."""
         declared = dict(self.declared)
-        for name, lower, upper, scale in zip(
-            self.free.quantities, self.free.lower, self.free.upper, self.free.scale, strict=True
+        free = self.free
+        for asked, name, lower, upper, scale in zip(
+            free.names, free.quantities, free.lower, free.upper, free.scale, strict=True
         ):
             if name not in declared:
-                raise InputError(f"no measurement depends on {name!r}; fix it", key="free")
+                raise InputError(f"no measurement depends on {asked!r}; fix it", key="free")
             declared[name] = replace(declared[name], lower=float(lower), upper=float(upper), scale=float(scale))
         return compile_problem(
             list(declared.values()),
             self.cases,
-            free=self.free.quantities,
+            free=free.quantities,
             objective=_OBJECTIVE * sum(self.squares[1:], self.squares[0]) / 2,
         )
 

@@ -48,12 +48,15 @@ _MOST_POSES = 150  # that it solves
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Where a coarse search ended: the point, the curvature of its residuals, whether the target is met there."""
+    """Where a coarse search ended: the point, the curvature of its residuals, whether the target is met there.
+
+    continues : whether it began at the last target's pressure.
+    """
 
     point: Measured
     second: Array | None
     met: bool
-    start: int
+    continues: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +136,8 @@ class InverseSolver:
         """
         redundant = self._redundant(aim)
         ends: list[Found] = []
-        for k, start in enumerate(self._starts(aim, near)):
-            found = self._search(aim, start, k)
+        for start, continues in self._starts(aim, near):
+            found = self._search(aim, start, continues=continues)
             if found.met and not redundant:
                 yield found
             ends.append(found)
@@ -145,28 +148,34 @@ class InverseSolver:
         apart.sort(key=lambda f: (not f.met, float(f.point.z @ f.point.z) if f.met else aim_cost(f)))
         yield from (found for found in apart if redundant or not found.met)
 
-    def _starts(self, aim: Aim, near: Reached | None) -> Iterator[TipPoint]:
-        """Yield tips of the coarse map: at the last pressure, then of the table."""
+    def _starts(self, aim: Aim, near: Reached | None) -> Iterator[tuple[TipPoint, bool]]:
+        """Yield tips of the coarse map: at the last pressure, which is told by True, then of the table."""
         if near is not None:
             point = self._coarse.of(near.solved) if isinstance(self._coarse, GridMap) else None
             point = point or self._coarse.at(near.pressure, None)
             if point is not None:
-                yield point
+                yield point, True
         loaded = isinstance(self._coarse, GridMap)
         if loaded:  # an arc is near enough to begin with, and costs nothing; most targets need no other start
             if self._arcs is None:
                 self._arcs = tabulated(ArcMap(self.poses), spread(self.limits, _ARCS) * BAR)
             for k in self._arcs.starts(aim, self.limits, 1):
                 if (point := self._coarse.at(self._arcs.pressures[k], None)) is not None:
-                    yield point
-        if self._table is None:
-            self._table = tabulated(self._coarse, spread(self.limits, _POSES if loaded else _ARCS) * BAR)
-        for k in self._table.starts(aim, self.limits, _STARTS):
-            point = self._table.points[k]
+                    yield point, False
+        table = self._tips()
+        for k in table.starts(aim, self.limits, _STARTS):
+            point = table.points[k]
             assert point is not None
-            yield point
+            yield point, False
 
-    def _search(self, aim: Aim, start: TipPoint, k: int) -> Found:
+    def _tips(self) -> Table:
+        """Return the tips of the coarse map over the bounds."""
+        if self._table is None:
+            most = _POSES if isinstance(self._coarse, GridMap) else _ARCS
+            self._table = tabulated(self._coarse, spread(self.limits, most) * BAR)
+        return self._table
+
+    def _search(self, aim: Aim, start: TipPoint, *, continues: bool) -> Found:
         """Search on the coarse map from a tip."""
         point, second, _ = nearest(self._measure(aim, self._coarse), aim.measured(start), self.limits)
         met = float(np.linalg.norm(point.r)) <= _COARSE_MET
@@ -175,7 +184,7 @@ class InverseSolver:
             least, second, _ = least_norm(self._measure(aim, self._coarse, met=True), begin, self.limits)
             if float(np.linalg.norm(least.r)) <= _COARSE_MET:
                 point = aim.measured(least.memo)
-        return Found(point, second, met, k)
+        return Found(point, second, met, continues)
 
     def _redundant(self, aim: Aim) -> bool:
         """Whether there are more pressures to choose than the target has conditions."""
@@ -270,16 +279,21 @@ class InverseSolver:
         return (distance is None or distance <= accuracy * aim.length) and (angle is None or angle <= accuracy)
 
     def _searched(self, aim: Aim, best: Reached | None) -> Reached | None:
-        """Search among stable poses without derivatives: where they end there is no slope to follow."""
+        """Search among stable poses without derivatives: where they end there is no slope to follow.
+
+        It begins at the first stable pose of the table that is nearer than the best one known, or else at that one.
+        """
         span = (self.limits.upper - self.limits.lower) * BAR
         here = best
-        if here is None:
-            assert self._table is not None
-            for k in self._table.starts(aim, self.limits, len(self._table.pressures)):
-                judged = self._at(aim, self._table.pressures[k])
-                if isinstance(judged, Reached):
-                    here = judged
-                    break
+        table = self._tips()
+        misfit = np.linalg.norm(aim.misfit(table.states), axis=0)
+        for k in table.starts(aim, self.limits, len(table.pressures)):
+            if best is not None and misfit[k] >= best.cost:
+                break
+            judged = self._at(aim, table.pressures[k])
+            if isinstance(judged, Reached) and (best is None or judged.cost < best.cost):
+                here = judged
+                break
         if here is None:
             return None
         size, last = _COMPASS
@@ -305,7 +319,7 @@ class InverseSolver:
 
     def _jumped(self, best: Reached, chosen: Found | None, near: Reached | None) -> list[str]:
         """Return a warning where the answer does not continue the one before."""
-        if near is None or (chosen is not None and chosen.start == 0):
+        if near is None or (chosen is not None and chosen.continues):
             return []
         span = np.maximum(self.task.upper - self.task.lower, 1e-9)
         if float(np.max(np.abs(best.pressure - near.pressure) / span)) <= _JUMP:

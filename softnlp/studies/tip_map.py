@@ -60,14 +60,6 @@ class ArcMap:
         slope = ca.jacobian(tip, P) + ca.jacobian(tip, stretch) @ by_pressure
         self._tip = ca.Function("tip", [column, stretch], [tip, ca.densify(slope)], {"cse": True})
 
-    def stretches(self, pressures: Array) -> Array:
-        """Return the stretch (k,) on the branch from zero pressure at pressures (k, sets); NaN where there is none."""
-        found = []
-        for pressure in pressures:
-            branch = stretch_on_branch(self._poses.branch, self._column(pressure), pressure)
-            found.append(branch.stretch if branch.status.has_solution else np.nan)
-        return np.array(found)
-
     def _column(self, pressure: Array) -> Array:
         return self._poses.column({"pressure": pressure})
 
