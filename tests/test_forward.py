@@ -170,7 +170,7 @@ def agrees(pose: Pose, w: Witnessed, L: float) -> float:
     return error
 
 
-@pytest.mark.parametrize("seed", some_slow(30, quick=12))
+@pytest.mark.parametrize("seed", some_slow(30, quick=6))
 def test_a_loaded_pose_is_the_witness_s(seed: int) -> None:
     robot, material, pressure, loads, w = witnessed(seed)
     step = solve(robot, material, pressure, loads=loads)

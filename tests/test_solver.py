@@ -446,7 +446,7 @@ def test_absurd_loads_end_in_a_named_status(exponent: float) -> None:
 # --- hard cases ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", some_slow(40, quick=14))
+@pytest.mark.parametrize("seed", some_slow(40, quick=7))
 def test_a_hard_case_is_solved_or_honestly_not(seed: int) -> None:
     outcome = outcome_of(seed, hardest=0.45 if seed >= 10 else 1.0)
     assert not outcome.error
