@@ -557,7 +557,7 @@ def test_constants_are_identified_from_a_dropped_file(tab: Watched) -> None:
     assert tab.input_value("input[data-testid=stiffening-bending]") != "1.23"
 
 
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize("dark", [pytest.param(False, marks=pytest.mark.slow), True], ids=["light", "dark"])
 def test_nothing_is_cut_off_and_texts_can_be_read(tab: Watched, dark: bool, pictures: Path) -> None:
     """Contrast of every text against its background, and no part wider than its column."""
     tab.page.set_viewport_size(WINDOW)

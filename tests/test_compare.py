@@ -173,6 +173,7 @@ def test_all_rows_at_once_are_the_rows_one_by_one() -> None:
     assert other.simulated[0][0].status == (Status.SOLVED,) * 4
 
 
+@pytest.mark.slow
 def test_a_workspace_takes_its_wall_and_its_lane(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The numbers are those of docs/blocked-force.md and docs/model.md."""
     file = measured(tmp_path, f"{HEADER},blocked_force_N,bending_angle_deg", "1.5,0,0,1.18,107.67", "0.5,0,0,,")

@@ -76,7 +76,9 @@ def evaluator_of(task: DesignTask, model: Model) -> Evaluator:
     return Evaluator(Setting(model.robot, model.material), task, model)
 
 
-@pytest.mark.parametrize("names", [("chamber_diameter",), ("chamber_diameter", "lumen_diameter")])
+@pytest.mark.parametrize(
+    "names", [("chamber_diameter",), pytest.param(("chamber_diameter", "lumen_diameter"), marks=pytest.mark.slow)]
+)
 def test_the_optimum_agrees_with_dense_enumeration(names: tuple[str, ...]) -> None:
     """Every design of a fine grid is judged in closed form; the best of them is next to the optimum, and below it."""
     task = angle_task(names)
@@ -102,6 +104,7 @@ def test_the_optimum_agrees_with_dense_enumeration(names: tuple[str, ...]) -> No
     assert best.agreeing == best.starts
 
 
+@pytest.mark.slow
 def test_a_multiplier_is_what_loosening_its_limit_gains() -> None:
     best = design(D25, SOFT, angle_task(("chamber_diameter", "lumen_diameter"))).best
     assert best is not None

@@ -64,6 +64,7 @@ def test_measured_angles_are_compared_with_poses_of_the_interface() -> None:
     assert numbers(measured_angles.text(), "mean error") == pytest.approx([44.5, 30.2], abs=0.06)
 
 
+@pytest.mark.slow
 def test_the_printed_sign_is_what_the_table_says() -> None:
     table = printed_sign.text()
     low, high = (1 + mm / 60 for mm in MEASURED_ELONGATION["L60"])

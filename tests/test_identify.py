@@ -285,6 +285,7 @@ def test_a_force_beyond_a_fold_is_lost_and_the_one_before_it_stands() -> None:
     assert found.values[1, 0] == pytest.approx(alone.force, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_one_nlp_of_all_poses_gives_the_same_constants() -> None:
     """On the same grid of a loaded robot both solve the same equations; the data have errors of some percent."""
     P = BAR * np.array([[1.0, 0, 0]])

@@ -141,7 +141,7 @@ def test_stations_between_lie_on_the_arc(stations: int, first: float, second: fl
     arm = robot("D25L60")
     coarse = resampled(arc_body(arm, (first, second, 0.0), 12), stations)
     exact = arc_body(arm, (first, second, 0.0), stations)
-    assert coarse.position == pytest.approx(exact.position, abs=1e-10)
+    assert coarse.position == pytest.approx(exact.position, abs=1e-9)
     assert coarse.rotation == pytest.approx(exact.rotation, abs=1e-9)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from cases import pose
 from designs import GRAVITY, body_of, random_loads, random_material, random_pressures, random_robot, rubber_of, silicone
+from slow import some_slow
 from witness import NoConvergence, shoot
 from witness_section import Section, section
 
@@ -132,7 +133,7 @@ def test_the_index_counts_every_mode_of_a_straight_column(intervals: int) -> Non
         assert conjugate_points(transition.map(intervals), tip_variation, nodes, constants) == expected, factor
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", some_slow(8, quick=3))
 def test_stability_is_the_witness_s_count_of_conjugate_points(seed: int) -> None:
     # loads that push the rod onto its base, straight or nearly so, at up to twice what it bears
     rng = np.random.default_rng([seed, 4])

@@ -68,9 +68,11 @@ def random_pressures(count: int, highest: float, seed: int = 1) -> np.ndarray:
     ("name", "silicone", "law", "highest", "loads"),
     [
         ("D25L60", "Ecoflex 00-50", "mooney-rivlin", 1.2, LOADED),
-        ("D15L60", "Dragon Skin 10", "ogden", 0.8, Loads(gravity=(3.0, -4.0, 8.0))),
         ("laparoscope-9", "Ecoflex 00-30", "yeoh", 0.6, Loads(tip_force=(0.0, 0.02, 0.0))),
-        ("D20L40", "Ecoflex 00-50", "linear", 1.0, Loads()),
+        pytest.param(
+            *("D15L60", "Dragon Skin 10", "ogden", 0.8, Loads(gravity=(3.0, -4.0, 8.0))), marks=pytest.mark.slow
+        ),
+        pytest.param("D20L40", "Ecoflex 00-50", "linear", 1.0, Loads(), marks=pytest.mark.slow),
     ],
 )
 def test_poses_are_those_of_the_problem(name: str, silicone: str, law: str, highest: float, loads: Loads) -> None:
@@ -198,9 +200,9 @@ def blocked_rows(closure: str, pressures: np.ndarray, loads: Loads, offset: floa
     ("closure", "loads", "offset"),
     [
         ("free", Loads(), 0.0),
-        ("compliant", Loads(), -0.008),
         ("compliant", Loads(gravity=(0.0, 0.0, -9.80665), tip_force=(0.0, 0.0, -0.02)), 0.0),
-        ("rigid", Loads(), 0.0),
+        pytest.param("compliant", Loads(), -0.008, marks=pytest.mark.slow),
+        pytest.param("rigid", Loads(), 0.0, marks=pytest.mark.slow),
     ],
 )
 def test_blocked_poses_are_those_of_the_study(closure: str, loads: Loads, offset: float) -> None:
