@@ -136,7 +136,7 @@ def main() -> None:
                 page.click("[data-testid=panel-loads] .q-item")
                 page.wait_for_timeout(500)
             for field, value in fields.items():
-                page.fill(f"input[data-testid={field}]", value)
+                page.fill(f"input[data-testid='{field}']", value)
             page.wait_for_timeout(2500)
             times = presses(page, chosen.presses)
             frame = median(drawn_only(page, 20))
