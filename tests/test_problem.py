@@ -225,6 +225,22 @@ def test_bounds_hold_and_what_they_forbid_is_not_called_a_solution() -> None:
     assert solution.residual > 1e-3
 
 
+def test_bounds_are_those_of_the_quantity_in_its_scale() -> None:
+    within = quantity("pressure", "Pa", np.full(3, 5e4), scale=2e5, lower=2e4, upper=9e4)
+    problem = pose(MODEL, free=["pressure"], constraints=tip_target, own=[{"pressure": within}], extra=[TIP]).problem
+    np.testing.assert_allclose(problem.lower_x[:3], 0.1)
+    np.testing.assert_allclose(problem.upper_x[:3], 0.45)
+    assert np.all(np.isinf(problem.lower_x[3:]))
+
+
+def test_a_problem_with_an_inequality_is_not_square() -> None:
+    def enough(cases, given) -> list[Constraint]:
+        return [Constraint("bends enough", cases[0].outputs["bending_angle"], 0.1, np.inf, "rad")]
+
+    assert pose(MODEL).problem.is_square
+    assert not pose(MODEL, constraints=enough).problem.is_square
+
+
 def test_an_inequality_is_held_and_certified() -> None:
     # the lowest pressure in set 1 that bends the robot to at least 60 degrees
     def enough(cases, given) -> list[Constraint]:
