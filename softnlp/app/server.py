@@ -96,22 +96,20 @@ def free_port(port: int | None) -> int:
 
 def _keep(session: Session) -> None:
     """Let the browser tab keep its scenario and files, so that a reload or a lost connection loses nothing."""
-    changed = [True]
+    parts = {_KEPT: session.kept, _FILES: session.kept_files}
+    changed = set(parts)
     written: dict[str, str] = {}
 
-    def note() -> None:
-        changed[0] = True
-
     def write() -> None:
-        if changed[0]:
-            changed[0] = False
-            for key, text in ((_KEPT, session.kept()), (_FILES, session.kept_files())):
-                if written.get(key) != text:
-                    written[key] = text
-                    ui.run_javascript(f"sessionStorage.setItem({json.dumps(key)}, {json.dumps(text)})")
+        for key in tuple(changed):
+            text = parts[key]()
+            if written.get(key) != text:
+                written[key] = text
+                ui.run_javascript(f"sessionStorage.setItem({json.dumps(key)}, {json.dumps(text)})")
+        changed.clear()
 
-    session.on_scenario(note)
-    session.on_pressure(note)
+    session.on_scenario(lambda: changed.update(parts))
+    session.on_pressure(lambda: changed.add(_KEPT))  # files need not be read again for a slider
     ui.timer(1.0, write)
 
 

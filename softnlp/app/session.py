@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
 
@@ -84,20 +85,20 @@ class Session:
         try:
             document = Document(text)
             given = {plain_name(key): checked_size(key, content) for key, content in (files or {}).items()}
-            self._try(document, name, given)
+            scenario = self._try(document, name, given)
         except InputError as error:
             raise placed(error, name) from None  # and not where it was tried
         for file, content in given.items():
             (self.folder / file).write_bytes(content)
         self.document, self.problem = document, None
-        self.scenario = scenario_from_text(document.text(), self.folder / name)
+        self.scenario = replace(scenario, path=self.folder / name)
         self.name, self.follows_file = name, True
         self.pressure = self._last_pressure()
         self._tell(self._scenario_listeners)
         self._tell(self._pressure_listeners)
 
-    def _try(self, document: Document, name: str, given: Mapping[str, bytes]) -> None:
-        """Read a scenario with its files away from those of the screen, which stay as they are until all is well."""
+    def _try(self, document: Document, name: str, given: Mapping[str, bytes]) -> Scenario:
+        """Return what a document says with files read away from those of the screen, which stay as they were."""
         with TemporaryDirectory(prefix="softnlp-") as folder:
             for file in document.files():
                 if PurePath(file).name != file:
@@ -106,7 +107,7 @@ class Session:
                     raise InputError(f"names the file {shown(file)}; open both together", key="file")
                 content = given[file] if file in given else (self.folder / file).read_bytes()
                 (Path(folder) / file).write_bytes(content)
-            scenario_from_text(document.text(), Path(folder) / name)
+            return scenario_from_text(document.text(), Path(folder) / name)
 
     def open_path(self, path: Path) -> None:
         """Show the scenario of a file, with the files that it names; raises `InputError` where one cannot be read."""
