@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from softnlp.errors import IllPosedError, nearest
 from softnlp.loadcase import Equation, LoadCase
+from softnlp.optimality import Bounds, slopes
 from softnlp.quantities import Quantity
 
 Array = NDArray[np.float64]
@@ -20,19 +21,51 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Constraint:
-    """A condition lower <= expression <= upper, entry by entry; equality where they agree. `scale` is in `unit`."""
+    """A condition lower <= expression <= upper, entry by entry; equality where they agree.
+
+    Expression, bounds (one number, or one an entry) and scale are in `unit`. The scale, a number above 0 or a symbol,
+    only says what counts as large: it changes no bound.
+    """
 
     name: str
     expression: ca.MX
-    lower: float = 0.0
-    upper: float = 0.0
+    lower: Any = 0.0
+    upper: Any = 0.0
     unit: str = "1"
     scale: Any = 1.0
 
     @property
     def is_equality(self) -> bool:
         """Whether every entry is an equation."""
-        return self.lower == self.upper
+        return bool(np.all(np.equal(self.lower, self.upper)))
+
+    def scaled(self) -> tuple[ca.MX, Array, Array]:
+        """Return the rows, a column of as many entries, and their bounds, all over the scale.
+
+        Raises `IllPosedError` for bounds or a scale that cannot be meant. A bound under a scale that is a symbol is
+        taken into the row.
+        """
+        rows = ca.vec(self.expression)
+        try:
+            lower, upper = (
+                np.broadcast_to(np.asarray(b, float).ravel(), rows.shape[:1]) for b in (self.lower, self.upper)
+            )
+        except ValueError:
+            raise IllPosedError(f"constraint '{self.name}': expected one bound, or {rows.numel()}") from None
+        if not np.all(lower <= upper):
+            raise IllPosedError(f"constraint '{self.name}': expected lower <= upper")
+        scale = ca.MX(self.scale)
+        if not scale.is_scalar():
+            raise IllPosedError(f"constraint '{self.name}': expected one scale for all entries, got {scale.numel()}")
+        if scale.is_constant():
+            size = float(scale)
+            if not 0 < size < np.inf:
+                raise IllPosedError(f"constraint '{self.name}': expected a scale above 0, got {size:g}")
+            return rows / size, lower / size, upper / size
+        if np.any(np.isfinite(lower) & np.isfinite(upper) & (lower < upper)):
+            raise IllPosedError(f"constraint '{self.name}': two different bounds need a scale that is a number")
+        bound = np.where(np.isfinite(lower), lower, np.where(np.isfinite(upper), upper, 0.0))
+        return (rows - bound) / scale, lower - bound, upper - bound
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +99,21 @@ class CompiledProblem:
         """The Jacobian of the residual by x, as a function of (x, p); built at first use."""
         x, p, g = (self.nlp[name] for name in "xpg")
         return ca.Function("jacobian", [x, p], [ca.jacobian(g, x)])
+
+    @cached_property
+    def slopes(self) -> ca.Function:
+        """What the KKT error is judged by, see `softnlp.optimality.slopes`; built at first use."""
+        return slopes(self.nlp)
+
+    @property
+    def bounds(self) -> Bounds:
+        """The bounds of the unknowns and of the rows."""
+        return Bounds(self.lower_x, self.upper_x, self.lower_g, self.upper_g)
+
+    @property
+    def has_objective(self) -> bool:
+        """Whether something is minimised."""
+        return not self.nlp["f"].is_constant()
 
     @cached_property
     def _fixed_column(self) -> _Column:
@@ -172,19 +220,15 @@ def compile_problem(
             ca.Function(name, [x, p], results, ["x", "p"], list(names)) if names else ca.Function(name, [x, p], results)
         )
 
-    rows = [c.expression / c.scale for c in constraints]
-    residual = function("residual", [ca.vertcat(*(case.residuals for case in cases), *map(ca.vec, rows))])
-    fine = function("fine", [ca.vertcat(*(case.fine_residuals for case in cases), *map(ca.vec, rows))])
+    scaled = [c.scaled() for c in constraints]
+    rows = [row for row, _, _ in scaled]
+    residual = function("residual", [ca.vertcat(*(case.residuals for case in cases), *rows)])
+    fine = function("fine", [ca.vertcat(*(case.fine_residuals for case in cases), *rows)])
     cost = function("cost", [objective])(x, p) if objective is not None else ca.MX(0)
     g = residual(x, p)
 
     equations = _all_equations(cases, constraints)
-    lower_g, upper_g = np.zeros(g.numel()), np.zeros(g.numel())
-    start = sum(case.residuals.numel() for case in cases)
-    for c in constraints:
-        stop = start + c.expression.numel()
-        lower_g[start:stop], upper_g[start:stop] = c.lower, c.upper
-        start = stop
+    none = np.zeros(sum(case.residuals.numel() for case in cases))
     states = x.numel() - free_size
     compiled = CompiledProblem(
         cases=tuple(cases),
@@ -201,8 +245,8 @@ def compile_problem(
         units=function("units", [ca.vertcat(*(ca.vertcat(case.length_unit, case.force_unit) for case in cases))]),
         lower_x=np.concatenate([*(np.full(q.size, q.lower / q.scale) for q in freed), np.full(states, -np.inf)]),
         upper_x=np.concatenate([*(np.full(q.size, q.upper / q.scale) for q in freed), np.full(states, np.inf)]),
-        lower_g=lower_g,
-        upper_g=upper_g,
+        lower_g=np.concatenate([none, *(lower for _, lower, _ in scaled)]),
+        upper_g=np.concatenate([none, *(upper for _, _, upper in scaled)]),
         is_square=objective is None and g.numel() == x.numel() and all(c.is_equality for c in constraints),
     )
     if freed or constraints:  # load cases alone are square and well posed

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from math import inf, pi, sin
+from math import inf, pi
 from numbers import Integral, Real
 from types import MappingProxyType
 from typing import Any
@@ -14,10 +13,13 @@ import casadi as ca
 
 from softnlp.errors import RobotError, nearest
 from softnlp.reading import choices, did_you_mean, shown
+from softnlp.rules import LOWERABLE_RULES as LOWERABLE_RULES
+from softnlp.rules import ROUND_OFF as ROUND_OFF
+from softnlp.rules import RULES, broken, in_mm, neighbours, rules
+from softnlp.rules import Violation as Violation
 from softnlp.units import DEGREE, MILLIMETRE
 
 MINIMUM_WALL = 0.8e-3  # delta_s of Eq. (1) [m]
-ROUND_OFF = 1e-9  # lengths closer than this are equal: published dimensions meet their rules exactly [m]
 LENGTH_LIMITS = (1e-6, 100.0)  # outside this the checks (and the unit) make no sense [m]
 LARGEST = 1e300  # beyond it, an int may not even have a float
 MOST_CHAMBERS = 1000
@@ -119,6 +121,12 @@ class Robot:
         return (self.outer_diameter - self.lumen_diameter - 2 * self.chamber_diameter) / 4 - self.chamber_wall
 
     @property
+    def side_walls(self) -> tuple[Any, Any]:
+        """Silicone between the threads and the surface, and between them and the lumen, numbers [m]."""
+        r_cp, r_co = self.chamber_circle_radius, self.chamber_radius
+        return self.outer_radius - r_cp - r_co, r_cp - r_co - self.lumen_radius
+
+    @property
     def set_of_chamber(self) -> tuple[int, ...]:
         """Set of each chamber, both counted from 0; N entries."""
         return tuple(n // self.chambers_per_set for n in range(self.chambers))
@@ -208,23 +216,12 @@ def robot(name: str, *, allow: Collection[str] = (), **overrides: Any) -> Robot:
     return made
 
 
-@dataclass(frozen=True)
-class Violation:
-    """A rule of manufacture that a robot breaks.
-
-    rule : "wall_thickness", "chamber_overlap" or "chambers_inside_wall". message : the rule and its numbers in mm,
-    chambers counted from 1. lowerable : whether it may be lowered to a warning. chambers : those concerned, counted
-    from 0 as in `Robot.chamber_centres`.
-    """
-
-    rule: str
-    message: str
-    lowerable: bool
-    chambers: tuple[int, ...]
-
-
-def violations(robot: Robot, minimum_wall: float = MINIMUM_WALL) -> tuple[Violation, ...]:
+def violations(
+    robot: Robot, minimum_wall: float = MINIMUM_WALL, walls: Mapping[str, bool] = MappingProxyType({})
+) -> tuple[Violation, ...]:
     """Return every rule of manufacture that a robot of numbers breaks, at most one entry a rule.
+
+    minimum_wall, walls : as of `rules`.
 
     Raises
     ------
@@ -232,8 +229,7 @@ def violations(robot: Robot, minimum_wall: float = MINIMUM_WALL) -> tuple[Violat
         When a dimension is a symbol, not finite, not positive or so far off that no robot is described.
     """
     _require_dimensions(robot)
-    found = (rule(robot, minimum_wall) for rule in _RULES.values())
-    return tuple(v for v in found if v is not None)
+    return broken(rules(robot, minimum_wall, walls))
 
 
 def check(robot: Robot, *, allow: Collection[str] = (), minimum_wall: float = MINIMUM_WALL) -> tuple[str, ...]:
@@ -256,8 +252,8 @@ def check(robot: Robot, *, allow: Collection[str] = (), minimum_wall: float = MI
     """
     for rule in allow:
         if rule not in LOWERABLE_RULES:
-            reason = "which can never be lowered" if rule in _RULES else "no such rule"
-            hint = "" if rule in _RULES else did_you_mean(str(rule), LOWERABLE_RULES)
+            reason = "which can never be lowered" if rule in RULES else "no such rule"
+            hint = "" if rule in RULES else did_you_mean(str(rule), LOWERABLE_RULES)
             raise RobotError(f"expected {choices(LOWERABLE_RULES)}, got {shown(rule)}, {reason}{hint}", key="allow")
     found = violations(robot, minimum_wall)
     refused = [v for v in found if v.rule not in allow]
@@ -275,7 +271,7 @@ def touching_stretch(robot: Robot) -> float:
     chambers overlap as they are.
     """
     _require_dimensions(robot)
-    chords = [chord for chord, _, _ in _neighbours(robot)]
+    chords = [chord for chord, _, _ in neighbours(robot)]
     return float((min(chords) / (2 * robot.chamber_radius)) ** 2) if chords else inf
 
 
@@ -310,7 +306,7 @@ def _require_dimensions(robot: Robot) -> None:
         )
     if robot.lumen_radius >= robot.outer_radius - ROUND_OFF:
         raise RobotError(
-            f"expected less than the outer diameter {_mm(robot.outer_diameter)}, got {_mm(robot.lumen_diameter)}",
+            f"expected less than the outer diameter {in_mm(robot.outer_diameter)}, got {in_mm(robot.lumen_diameter)}",
             key="lumen_diameter",
         )
 
@@ -323,74 +319,3 @@ def _require_angle(robot: Robot) -> None:
             f"expected an angle above 0 and up to 360 degrees, got {robot.chamber_angle / DEGREE:g} degrees",
             key="chamber_angle",
         )
-
-
-def _neighbours(robot: Robot) -> list[tuple[float, int, int]]:
-    """Return (chord between centres [m], chamber, next chamber) once around the circle, last to first included.
-
-    The chambers are sorted by angle first: with a large alpha_1 those of different sets interleave.
-    """
-    angles = [theta % (2 * pi) for theta in robot.chamber_angles()]
-    order = sorted(range(robot.chambers), key=angles.__getitem__)
-    pairs = list(pairwise(order))
-    if robot.chambers > 2:
-        pairs.append((order[-1], order[0]))
-    r_cp = robot.chamber_circle_radius
-    return [(2 * r_cp * abs(sin((angles[j] - angles[i]) / 2)), i, j) for i, j in pairs]
-
-
-def _wall_thickness(robot: Robot, minimum_wall: float) -> Violation | None:
-    """Eq. (1): delta_c + delta_r >= delta_s."""
-    wall = robot.chamber_wall + robot.outer_wall
-    if wall >= minimum_wall - ROUND_OFF:
-        return None
-    message = (
-        f"Eq. (1) leaves delta_c + delta_r = (D_r - D_i - 2 D_c)/4 = {_mm(wall)} of wall, "
-        f"less than the minimum {_mm(minimum_wall)}"
-    )
-    return Violation("wall_thickness", message, True, tuple(range(robot.chambers)))
-
-
-def _chamber_overlap(robot: Robot, minimum_wall: float) -> Violation | None:
-    """Neighbouring reinforced chambers do not touch: chord >= 2 r_co."""
-    width = 2 * robot.chamber_radius
-    close = [pair for pair in _neighbours(robot) if pair[0] < width - ROUND_OFF]
-    if not close:
-        return None
-    chord, i, j = min(close)
-    more = f" (and {len(close) - 1} more pairs)" if len(close) > 1 else ""
-    message = (
-        f"the centres of neighbouring chambers {i + 1} and {j + 1} are {_mm(chord)} apart, "
-        f"less than 2 r_co = {_mm(width)}{more}"
-    )
-    return Violation("chamber_overlap", message, True, tuple(sorted({n for _, *pair in close for n in pair})))
-
-
-def _chambers_inside_wall(robot: Robot, minimum_wall: float) -> Violation | None:
-    """Reinforced chambers stay between lumen and surface: r_i <= r_cp - r_co and r_cp + r_co <= r_r."""
-    inner = robot.chamber_circle_radius - robot.chamber_radius
-    outer = robot.chamber_circle_radius + robot.chamber_radius
-    broken = []
-    if outer > robot.outer_radius + ROUND_OFF:
-        broken.append(f"reach r_cp + r_co = {_mm(outer)}, beyond the outer radius {_mm(robot.outer_radius)}")
-    if inner < robot.lumen_radius - ROUND_OFF:
-        broken.append(f"begin at r_cp - r_co = {_mm(inner)}, inside the lumen radius {_mm(robot.lumen_radius)}")
-    if not broken:
-        return None
-    message = f"the reinforced chambers {' and '.join(broken)}"
-    return Violation("chambers_inside_wall", message, False, tuple(range(robot.chambers)))
-
-
-_RULES: Mapping[str, Callable[[Robot, float], Violation | None]] = MappingProxyType(
-    {
-        "wall_thickness": _wall_thickness,
-        "chamber_overlap": _chamber_overlap,
-        "chambers_inside_wall": _chambers_inside_wall,
-    }
-)
-LOWERABLE_RULES = ("wall_thickness", "chamber_overlap")
-
-
-def _mm(length: float) -> str:
-    """Format a length with as many digits as a drawing needs."""
-    return f"{round(length / MILLIMETRE, 6):.6g} mm"

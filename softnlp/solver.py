@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.optimality import OPTIMAL, kkt_error
 from softnlp.problem import CompiledProblem
 
 Array = NDArray[np.float64]
@@ -49,7 +50,8 @@ class Solution:
     """A point x of a problem at fixed values p, and what is known of it.
 
     residual : largest scaled violation of any equation or bound, evaluated again; inf when it is not a number.
-    iterations : of every attempt that led here. engine_status : IPOPT's own word, for information only.
+    kkt : error of the first-order conditions, evaluated again, see `softnlp.optimality.kkt_error`; 0 where nothing is
+    minimised. iterations : of every attempt that led here. engine_status : IPOPT's own word, for information only.
     """
 
     x: Array
@@ -57,10 +59,16 @@ class Solution:
     residual: float
     iterations: int
     engine_status: str
+    kkt: float = 0.0
 
     def holds(self, tolerance: float) -> bool:
-        """Whether every equation and bound holds within the tolerance."""
+        """Whether every equation and bound holds within the tolerance: feasible, which is not yet optimal."""
         return self.residual <= tolerance
+
+    @property
+    def optimal(self) -> bool:
+        """Whether the point is feasible and the first-order conditions hold, both within `OPTIMAL`."""
+        return self.holds(OPTIMAL) and self.kkt <= OPTIMAL
 
 
 class LinearSolver(Protocol):
@@ -218,8 +226,9 @@ class Engine:
             except RuntimeError as error:  # the engine gave up on a number that is not finite
                 return Solution(x_start, p, float("inf"), 0, str(error).splitlines()[-1])
             stats = self._solver.stats()
-        x = np.asarray(result["x"], dtype=float).ravel()
-        return Solution(x, p, violation(problem, x, p), int(stats["iter_count"]), str(stats["return_status"]))
+        x, *lam = (np.asarray(result[key], dtype=float).ravel() for key in ("x", "lam_x", "lam_g"))
+        kkt = kkt_error(problem.slopes, problem.bounds, p, x_start, x, *lam) if problem.has_objective else 0.0
+        return Solution(x, p, violation(problem, x, p), int(stats["iter_count"]), str(stats["return_status"]), kkt)
 
 
 def _size(g: Array) -> float:

@@ -16,6 +16,7 @@ class Status(StrEnum):
     INACCURATE = "inaccurate"
     FOLD = "fold"
     OUT_OF_REACH = "out_of_reach"
+    NOT_OPTIMAL = "not_optimal"
 
     @property
     def has_solution(self) -> bool:
@@ -44,4 +45,7 @@ _ADVICE = {
     ),
     Status.FOLD: "the branch followed from zero pressure turns back before this step",
     Status.OUT_OF_REACH: "no pressure within the bounds reaches the target",
+    Status.NOT_OPTIMAL: (
+        "every equation holds, but the point is not shown to be a minimum; start nearer, free less, or allow more steps"
+    ),
 }

@@ -19,8 +19,19 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 # A module imports only what stands above it; the modules of MIXED may import each other within their package.
 LAYERS = (
     *("errors", "status", "units", "conventions", "numerics", "reading", "contact_settings"),
-    *("formula", "laws", "material_reading", "materials", "robot", "section", "rod", "tip", "transcription"),
-    *("quantities", "loadcase", "unloaded", "problem", "branch", "solver", "condensed", "continuation", "stability"),
+    *("formula", "laws", "material_reading", "materials", "rules", "robot", "section", "rod", "tip", "transcription"),
+    *(
+        "quantities",
+        "loadcase",
+        "unloaded",
+        "optimality",
+        "problem",
+        "branch",
+        "solver",
+        "condensed",
+        "continuation",
+        "stability",
+    ),
     "implicit",
     *("evaluation", "evaluation.statistics"),
     *(

@@ -83,6 +83,7 @@ def candidate_table(done: Design, candidate: Candidate) -> dict[str, Any]:
         "active": [active_table(done, active) for active in candidate.active],
         "starts": candidate.starts,
         "agreeing": candidate.agreeing,
+        "optimal": candidate.optimal,
         "iterations": candidate.iterations,
         "intervals": candidate.intervals,
         "residual": _plain(candidate.step.residual if candidate.step else None),
@@ -139,12 +140,15 @@ def design_csv(done: Design) -> str:
     outputs = [o.file_key for o in known_outputs(done)]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["number", "status", *(f"choice {key}" for key in keys), *outputs, "reasons", "warnings"])
+    writer.writerow(
+        ["number", "status", *(f"choice {key}" for key in keys), *outputs, "reasons", "warnings", "optimal"]
+    )
     for candidate in done.candidates:
         table = candidate_table(done, candidate)
         cells = [table["choices"].get(key) for key in keys] + [table["outputs"][key] for key in outputs]
         row = [table["number"], table["status"], *("" if cell is None else cell for cell in cells)]
-        writer.writerow([*row, "; ".join(table["reasons"]), "; ".join(table["warnings"])])
+        known = "" if candidate.optimal is None else str(candidate.optimal).lower()
+        writer.writerow([*row, "; ".join(table["reasons"]), "; ".join(table["warnings"]), known])
     return text.getvalue()
 
 
@@ -188,7 +192,8 @@ def design_lines(done: Design) -> Group:
     for c in done.candidates:
         cells = [_digits(c.outputs.get(o.name), o.scale) for o in columns]
         style = "bold green" if c is done.best else "" if c.is_feasible else "bright_black"
-        table.add_row(str(c.number), label(done, c), c.status, *cells, style=style)
+        status = f"{c.status}, not optimal" if c.optimal is False else c.status
+        table.add_row(str(c.number), label(done, c), status, *cells, style=style)
     return Group(table, *(Text(line, style) for line, style in _notes(done)))
 
 

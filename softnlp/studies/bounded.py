@@ -113,6 +113,22 @@ def curvature(measure: Map, here: Measured, weights: Array, limits: Limits) -> A
     return symmetric
 
 
+def could_gain(here: Measured, limits: Limits, *, meets: bool) -> float:
+    """Return what the first-order conditions leave at a point, evaluated anew: 0 at an optimum.
+
+    It is the longest step by which a plain quadratic model with the true gradient would move within the limits: that
+    of |z|^2 / 2 along r = 0 where the target is met, over the size of z; else that of |r| along the scaled pressures.
+    """
+    n = here.z.size
+    A, b = limits.rows(here.z, 1.0)
+    if meets:
+        step, size = quadratic_step(np.eye(n), here.z, A, b, here.J), max(1.0, float(np.max(np.abs(here.z))))
+    else:
+        size = max(float(np.linalg.norm(here.J, 2) * np.linalg.norm(here.r)), MET)
+        step, size = quadratic_step(np.eye(n), here.J.T @ here.r / size, A, b), 1.0
+    return float(np.max(np.abs(step), initial=0.0)) / size
+
+
 def _definite(H: Array) -> Array:
     """Return H with its negative curvatures turned, and none of them 0."""
     sizes, axes = np.linalg.eigh(H)

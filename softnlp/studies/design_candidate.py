@@ -47,6 +47,10 @@ class Candidate:
         Limits that hold the objective back, of continuous choices.
     agreeing, starts
         How many of how many first guesses led here.
+    optimal
+        Whether the first-order conditions of the best choice hold at its continuous choices, evaluated again; None
+        where nothing continuous was chosen or nothing was found. A candidate that is feasible but not optimal says
+        so in `warnings`.
     iterations, intervals
         Of the optimisation, and of the grid it was solved again on.
     warnings
@@ -68,6 +72,7 @@ class Candidate:
     active: tuple[Active, ...] = ()
     agreeing: int = 0
     starts: int = 0
+    optimal: bool | None = None
     iterations: int = 0
     intervals: int | None = None
     warnings: tuple[str, ...] = ()
@@ -215,8 +220,9 @@ def _candidate(
         active=found.active,
         agreeing=found.agreeing,
         starts=found.starts,
+        optimal=found.optimal,
         iterations=found.iterations,
         intervals=found.intervals or (step.intervals if step else None),
-        warnings=step.warnings if step else (),
+        warnings=(*found.doubt, *(step.warnings if step else ())),
         step=step,
     )

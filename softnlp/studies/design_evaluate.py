@@ -15,6 +15,7 @@ from softnlp.errors import RobotError
 from softnlp.loadcase import RodFunctions
 from softnlp.quantities import Model
 from softnlp.robot import Robot, touching_stretch, violations
+from softnlp.rules import neighbours
 from softnlp.status import Status
 from softnlp.studies.blocked import BlockedSolver
 from softnlp.studies.blocked_grid import Blocked
@@ -35,12 +36,8 @@ _TINY = 1e-24  # [m^2] under the root of the tip's deflection, whose slope has a
 
 def robot_outputs(robot: Robot) -> dict[str, Any]:
     """Return the outputs of kind "robot", SI; numbers or symbols as the dimensions are."""
-    r_cp, r_co = robot.chamber_circle_radius, robot.chamber_radius
-    walls = {
-        "outer_wall": robot.outer_radius - r_cp - r_co,
-        "inner_wall": r_cp - r_co - robot.lumen_radius,
-        "wall": robot.chamber_wall + robot.outer_wall,
-    }
+    outer, inner = robot.side_walls
+    walls = {"outer_wall": outer, "inner_wall": inner, "wall": robot.chamber_wall + robot.outer_wall}
     names = [output.name for output in OUTPUTS.values() if output.kind == "robot" and output.name not in walls]
     return {name: getattr(robot, name) for name in names} | walls
 
@@ -60,17 +57,11 @@ def free_outputs(case: Mapping[str, Any], length: Any) -> dict[str, Any]:
 
 
 def chamber_gaps(robot: Robot, stretch: Any) -> list[Any]:
-    """Return the gaps between neighbouring reinforced chambers at a stretch [m], numbers or symbols.
+    """Return the gaps between neighbouring reinforced chambers at a stretch [m], as of `softnlp.rules.neighbours`.
 
-    In a set neighbours are alpha_1 apart, from one set to the next 2 pi / n1 - (n2 - 1) alpha_1: the sets are taken not
-    to interleave. The circle shrinks as lambda^-1/2 (S2), r_co stays.
+    The circle shrinks as lambda^-1/2 (S2), r_co stays.
     """
-    n1, n2 = robot.chamber_sets, robot.chambers_per_set
-    angles = [robot.chamber_angle] if n2 > 1 else []
-    if n1 > 1 or n2 > 2:
-        angles.append(2 * ca.pi / n1 - (n2 - 1) * robot.chamber_angle)
-    shrink = stretch**-0.5
-    return [2 * robot.chamber_circle_radius * shrink * ca.sin(a / 2) - 2 * robot.chamber_radius for a in angles]
+    return [chord * stretch**-0.5 - 2 * robot.chamber_radius for chord, _, _ in neighbours(robot)]
 
 
 def pose_outputs(pose: Pose, length: float) -> dict[str, float]:
@@ -109,7 +100,7 @@ def missed(outputs: Mapping[str, float], requirements: Mapping[str, Limits]) -> 
 def broken_rules(robot: Robot, task: DesignTask) -> list[str]:
     """Return the rules of manufacture and the requirements on dimensions that a robot of numbers breaks."""
     try:
-        found = violations(robot, task.minimum_wall)
+        found = violations(robot, task.minimum_wall, task.walls)
     except RobotError as error:
         return [str(error)]
     rules = [f"{v.rule}: {v.message}" for v in found if not (v.lowerable and v.rule in task.allow)]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.loadcase import LoadCase
+from softnlp.optimality import OPTIMAL, kkt_error, not_optimal
 from softnlp.quantities import Model
 from softnlp.rod import STATE_SIZE
 from softnlp.solver import violation
@@ -64,7 +65,7 @@ class Optimum:
     """Where the program ended from one start.
 
     x : of the program. values : the continuous choices, and "pressure", SI. objective : SI. violation : largest scaled
-    one, evaluated again. engine_status : IPOPT's own word, for information.
+    one, evaluated again. kkt : as of `softnlp.solver.Solution`. engine_status : IPOPT's own word, for information.
     """
 
     x: Array
@@ -74,6 +75,7 @@ class Optimum:
     active: tuple[Active, ...]
     iterations: int
     engine_status: str
+    kkt: float = np.inf
 
     @property
     def holds(self) -> bool:
@@ -87,6 +89,7 @@ class Optimised:
 
     found : the design, solved again to the accuracy of the setting; None where nothing was. reasons : why it is not
     feasible, none where it is. agreeing, starts : how many of how many starts ended there. failed : a solver gave up.
+    optimal : whether the first-order conditions hold there; None where nothing was optimised. doubt : why not.
     """
 
     found: Evaluation | None
@@ -97,6 +100,8 @@ class Optimised:
     iterations: int = 0
     intervals: int = 0
     failed: bool = False
+    optimal: bool | None = None
+    doubt: tuple[str, ...] = ()
 
 
 class Optimiser:
@@ -127,7 +132,7 @@ class Optimiser:
         if not any(o.holds for o in optima):
             optima += [self._stepwise(e, intervals) for e in begun]
         spent = sum(o.iterations for o in optima)
-        sign = self.evaluator.task.sign
+        task, sign = self.evaluator.task, self.evaluator.task.sign
         order = sorted((o for o in optima if o.holds), key=lambda o: -sign * o.objective)
         refused: list[tuple[Evaluation, tuple[str, ...]]] = []
         tried: list[float] = []
@@ -136,10 +141,14 @@ class Optimiser:
                 continue
             tried.append(optimum.objective)
             found, final, used = self._confirmed(model, optimum, intervals)
-            reasons = self._disagreement(found, final) or tuple(unmet(found, self.evaluator.task))
+            missing = [*unmet(found, task), *broken_rules(found.model.robot, task)]
+            reasons = self._disagreement(found, final) or tuple(dict.fromkeys(missing))
             if not reasons:
                 close = [o for o in order if abs(o.objective - optimum.objective) <= 1e-5 * abs(optimum.objective)]
-                return Optimised(found, (), final.active, len(close), len(begun), spent, used)
+                optimal = final.kkt <= OPTIMAL
+                doubt = () if optimal else (not_optimal(final.kkt, final.engine_status),)
+                done = Optimised(found, (), final.active, len(close), len(begun), spent, used)
+                return replace(done, optimal=optimal, doubt=doubt)
             refused.append((found, reasons))
         if refused:
             found, reasons = refused[0]
@@ -180,9 +189,8 @@ class Optimiser:
             result = posed.solver(x0=x, p=p, lbx=lower, ubx=upper, lbg=posed.lower, ubg=posed.upper)
         except RuntimeError as error:  # IPOPT met a number that is not finite
             return Optimum(x, {}, np.nan, np.inf, (), 0, str(error).splitlines()[-1])
-        stats = posed.solver.stats()
-        x = np.asarray(result["x"], dtype=float).ravel()
-        lam_g, lam_x = (np.asarray(result[key]).ravel() for key in ("lam_g", "lam_x"))
+        stats, begun = posed.solver.stats(), x
+        x, lam_x, lam_g = (np.asarray(result[key], dtype=float).ravel() for key in ("x", "lam_x", "lam_g"))
         values = {name.removeprefix("robot."): float(v[0]) for name, v in problem.free_values(x).items()}
         values["pressure"] = values.pop(PRESSURE, pressure)
         return Optimum(
@@ -193,6 +201,7 @@ class Optimiser:
             active=tuple(self._active(posed, lam_g, lam_x, scale)),
             iterations=int(stats["iter_count"]),
             engine_status=str(stats["return_status"]),
+            kkt=kkt_error(posed.slopes, posed.bounds, p, begun, x, lam_x, lam_g),
         )
 
     def start(self, begun: Evaluation, posed: DesignProblem) -> tuple[Array, Array, float]:

@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 
 from softnlp.condensed import CondensedSolver
 from softnlp.loadcase import LoadCase, load_case
+from softnlp.optimality import Bounds, slopes
 from softnlp.problem import CompiledProblem, Constraint, compile_problem
 from softnlp.quantities import quantity, with_symbols
 from softnlp.robot import Robot
+from softnlp.rules import rules
 from softnlp.studies.design_evaluate import Evaluator, chamber_gaps, free_outputs, robot_outputs
-from softnlp.studies.design_task import OUTPUTS, Range
+from softnlp.studies.design_task import OUTPUTS, DesignTask, Range
 from softnlp.transcription import MultipleShooting
 from softnlp.units import MILLIMETRE
 from softnlp.unloaded import unloaded_case
@@ -68,6 +70,19 @@ class DesignProblem:
     def upper(self) -> Array:
         """Upper limits of every row."""
         return np.append(self.problem.upper_g, [np.inf] * (self.guard is not None))
+
+    @property
+    def bounds(self) -> Bounds:
+        """Bounds of the choices, the states and every row."""
+        return Bounds(self.problem.lower_x, self.problem.upper_x, self.lower, self.upper)
+
+    @cached_property
+    def slopes(self) -> ca.Function:
+        """What the KKT error is judged by, the guard's row included."""
+        nlp = dict(self.problem.nlp)
+        if self.guard is not None:
+            nlp["g"] = ca.vertcat(nlp["g"], self.guard(nlp["x"], nlp["p"]))
+        return slopes(nlp)
 
     @cached_property
     def solver(self) -> ca.Function:
@@ -147,7 +162,7 @@ def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) ->
     chosen = [f"robot.{name}" for name in task.ranges] + [PRESSURE] * isinstance(task.pressure, Range)
     moved = ca.vertcat(*(q.symbol for q in [*declared.values(), applied] if q.name in chosen))
     unknown = ca.vertcat(moved, *(symbol for case in cases for symbol in case.symbols))
-    rows = [*_rules(robot, task.minimum_wall, task.allow), *_guards(cases, robot), *_required(outputs, evaluator)]
+    rows = [*_rules(robot, task), *_guards(cases, robot), *_required(outputs, evaluator)]
     constraints = [row for row in rows if ca.depends_on(row.expression, unknown)]
     scale = quantity(OBJECTIVE_SCALE, "1", 1.0)
     problem = compile_problem(
@@ -177,23 +192,11 @@ def _limits(constraints: list[Constraint], problem: CompiledProblem) -> Iterator
         yield Limit("fold of the blocked shape", row, 1.0, "1")
 
 
-def _rules(robot: Robot, minimum_wall: float, allow: tuple[str, ...]) -> Iterator[Constraint]:
-    """Yield the rules of manufacture as smooth inequalities [mm]; those of numbers only are checked elsewhere.
-
-    The sets are taken not to interleave, as for `chamber_gaps`.
-    """
-
-    def rule(name: str, expression: Any, lower: float = 0.0) -> Constraint:
-        return Constraint(name, ca.MX(expression), lower / MILLIMETRE, np.inf, "m", MILLIMETRE)
-
-    if "wall_thickness" not in allow:
-        yield rule("wall_thickness", robot.chamber_wall + robot.outer_wall, minimum_wall)
-    if "chamber_overlap" not in allow:
-        for gap in chamber_gaps(robot, 1.0):
-            yield rule("chamber_overlap", gap)
-    walls = robot_outputs(robot)
-    yield rule("chambers_inside_wall", walls["outer_wall"])
-    yield rule("chambers_inside_wall", walls["inner_wall"])
+def _rules(robot: Robot, task: DesignTask) -> Iterator[Constraint]:
+    """Yield the rules of manufacture as inequalities; those of numbers only are checked elsewhere."""
+    for rule in rules(robot, task.minimum_wall, task.walls):
+        if rule.name not in task.allow:
+            yield Constraint(rule.row, ca.MX(rule.value), rule.least, np.inf, "m", MILLIMETRE)
 
 
 def _guards(cases: list[LoadCase], robot: Robot) -> Iterator[Constraint]:
@@ -212,4 +215,4 @@ def _required(outputs: Mapping[str, Any], evaluator: Evaluator) -> Iterator[Cons
     for name, limits in evaluator.task.requirements.items():
         finite = [abs(v) for v in (limits.lower, limits.upper) if np.isfinite(v)]
         scale = max([*finite, 1e-3 * OUTPUTS[name].scale])
-        yield Constraint(name, ca.MX(outputs[name]), limits.lower / scale, limits.upper / scale, name, scale)
+        yield Constraint(name, ca.MX(outputs[name]), limits.lower, limits.upper, name, scale)

@@ -22,6 +22,9 @@ MOST_ENUMERATED = 5000  # combinations above which a search takes the place of e
 COUNTS = tuple(d.field for d in DIMENSIONS if d.scale is None)
 SIZES = tuple(d.field for d in DIMENSIONS if d.scale is not None)
 
+_LAYOUT = ("chamber_circle_diameter", "chamber_diameter", "chamber_wall")
+_MOVED_BY = {"outer_wall": {"outer_diameter", *_LAYOUT}, "inner_wall": {"lumen_diameter", *_LAYOUT}}
+
 
 @dataclass(frozen=True)
 class Output:
@@ -177,7 +180,8 @@ class DesignTask:
     allow
         Rules of manufacture that may be broken.
     minimum_wall
-        delta_s of Eq. (1) [m].
+        delta_s, the least wall of Eq. (1) and, see `softnlp.rules.rules`, of the outer and of the inner wall each,
+        unless `requirements` has a least one of its own [m].
     starts
         First guesses of each optimisation; None is 4, and 2 where one number alone is free.
     trials
@@ -219,6 +223,12 @@ class DesignTask:
     def lists(self) -> dict[str, Sequence[Any]]:
         """The discrete choices by name, each (choices,) [SI]."""
         return {name: values for name, values in self.choices.items() if not isinstance(values, Range)}
+
+    @property
+    def walls(self) -> dict[str, bool]:
+        """The walls that must leave delta_s, and whether a choice moves each: those without a least one required."""
+        asked = {name for name, limits in self.requirements.items() if limits.lower > -inf}
+        return {name: not keys.isdisjoint(self.choices) for name, keys in _MOVED_BY.items() if name not in asked}
 
     @property
     def is_continuous(self) -> bool:

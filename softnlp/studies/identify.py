@@ -18,6 +18,7 @@ from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.errors import InputError, MaterialError
 from softnlp.materials import Material
 from softnlp.numerics import Numerics
+from softnlp.optimality import OPTIMAL, misfit_slope, not_optimal
 from softnlp.quantities import Model
 from softnlp.rod import Loads
 from softnlp.status import Status
@@ -279,16 +280,17 @@ class _Fit:
             if not np.max(J[:, k]) > 0:
                 raise InputError(f"no measurement depends on {name!r}; fix it", key="free")
 
-    def _held(self, x: Array) -> list[bool]:
-        """Whether each constant is at a bound."""
-        free = self.free
-        near = _AT_BOUND * np.maximum(free.scale, np.abs(x))
-        return [bool(v) for v in (x - free.lower < near) | (free.upper - x < near)]
+    def _at_bounds(self, x: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Whether each constant is at its lower bound, and at its upper one."""
+        near = _AT_BOUND * np.maximum(self.free.scale, np.abs(x))
+        return x - self.free.lower < near, self.free.upper - x < near
 
     def _found(self, x: Array, first: Sequence[Prediction], last: Sequence[Prediction]) -> Identified:
-        held = self._held(x)
+        low, high = self._at_bounds(x)
+        held = [bool(h) for h in low | high]
         at_bound = tuple(name for name, h in zip(self.free.names, held, strict=True) if h)
-        known = uncertainty(self.free.names, self.jacobian(last), self.residuals(last), held)
+        J, r = self.jacobian(last), self.residuals(last)
+        known = uncertainty(self.free.names, J, r, held)
         warnings = list(known.warnings)
         for k, name in enumerate(self.free.names):
             if held[k]:
@@ -297,6 +299,8 @@ class _Fit:
                 )
         warnings += self._stretched(last)
         status, message = Status.SOLVED, "the sum of squares is at a minimum"
+        if (kkt := misfit_slope(J, r, low, high)) > OPTIMAL:
+            status, message = Status.NOT_OPTIMAL, not_optimal(kkt, f"{self.evaluations} evaluations")
         material, coefficients = self.material, self.coefficients
         try:
             material, coefficients = self.free.applied(x, material, coefficients)

@@ -44,7 +44,8 @@ _OBJECTIVE = RELATIVE_NOISE**2  # what multiplies the cost, so that its gradient
 class IdentifiedAtOnce:
     """What the NLP gave. constants : by name as asked, SI, nan unless solved. cost : half the sum of squares.
 
-    residual : largest scaled violation of any equation, evaluated again.
+    status : "not_optimal" where the poses hold but the sum of squares is not at a minimum. residual : largest scaled
+    violation of any equation, evaluated again.
     """
 
     status: Status
@@ -193,11 +194,12 @@ def identify_at_once(
     solution = Engine(problem, tolerance=1e-10).solve(p, np.concatenate([head, *nlp.guesses]))
     cost = float(ca.Function("cost", [problem.nlp["x"], problem.nlp["p"]], [problem.nlp["f"]])(solution.x, p))
     cost /= _OBJECTIVE
-    solved = solution.holds(nlp.numerics.tolerance) and solution.engine_status == "Solve_Succeeded"
+    holds = solution.holds(nlp.numerics.tolerance)
+    solved = holds and solution.optimal
     found = problem.free_values(solution.x)
     constants = {
         name: float(found[q][0]) if solved else float("nan")
         for name, q in zip(chosen.names, chosen.quantities, strict=True)
     }
-    status = Status.SOLVED if solved else Status.DIVERGED
+    status = Status.SOLVED if solved else Status.NOT_OPTIMAL if holds else Status.DIVERGED
     return IdentifiedAtOnce(status, constants, cost if solved else float("nan"), solution.residual, solution.iterations)

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from softnlp.branch import stretch_on_branch
 from softnlp.numerics import Numerics
+from softnlp.optimality import OPTIMAL, not_optimal
 from softnlp.quantities import Model
 from softnlp.rod import Loads
 from softnlp.status import Status
 from softnlp.studies.aiming import Aim, Table, aim_of, spread, tabulated
-from softnlp.studies.bounded import Limits, Map, Measured, least_norm, nearest
+from softnlp.studies.bounded import Limits, Map, Measured, could_gain, least_norm, nearest
 from softnlp.studies.derivatives import PoseDerivatives
 from softnlp.studies.inverse_nlp import InverseProblem, inverse_problem, pressure_of
 from softnlp.studies.inverse_task import InverseTask, Target
@@ -119,8 +120,15 @@ class InverseSolver:
             step = rejected or Step(self.task.lower, Status.DIVERGED, Status.DIVERGED.advice)
             return replace(step, aimed=aim.aimed(None), solve_time=time.perf_counter() - began), None
         warnings = [*best.step.warnings, *self._jumped(best, chosen, near)]
-        step = replace(best.step, aimed=best.aimed, warnings=tuple(warnings), solve_time=time.perf_counter() - began)
-        if not self._meets(aim, best):
+        met = self._meets(aim, best)
+        aimed = best.aimed
+        if self._redundant(aim) or not met:
+            left = self._left(aim, best, meets=met)
+            aimed = replace(best.aimed, optimal=left <= OPTIMAL)
+            if left > OPTIMAL:
+                warnings.append(not_optimal(left, "the search of pressures"))
+        step = replace(best.step, aimed=aimed, warnings=tuple(warnings), solve_time=time.perf_counter() - began)
+        if not met:
             message = self._out_of_reach(aim, best, rejected)
             step = replace(step, status=Status.OUT_OF_REACH, message=message)
         return step, best
@@ -185,6 +193,13 @@ class InverseSolver:
             if float(np.linalg.norm(least.r)) <= _COARSE_MET:
                 point = aim.measured(least.memo)
         return Found(point, second, met, continues)
+
+    def _left(self, aim: Aim, reached: Reached, *, meets: bool) -> float:
+        """Return what the first-order conditions leave at an answer, on its pose's grid; inf where it has no slope."""
+        point = self._map(reached.solved.intervals).of(reached.solved)
+        if point is None:
+            return float("inf")
+        return could_gain(aim.conditioned(point) if meets else aim.measured(point), self.limits, meets=meets)
 
     def _redundant(self, aim: Aim) -> bool:
         """Whether there are more pressures to choose than the target has conditions."""

@@ -185,6 +185,9 @@ class Aimed:
     tip_position, tip_direction
         (3,) where the tip is then, [m] and [1], also where that is the nearest reachable point only; None without any
         pose.
+    optimal
+        Whether the pressures satisfy the first-order conditions of what was chosen: the least pressures where the
+        target is met with sets to spare, else the nearest tip. None where nothing was left to choose.
     """
 
     position: Array | None
@@ -193,6 +196,7 @@ class Aimed:
     angle: float | None = None
     tip_position: Array | None = None
     tip_direction: Array | None = None
+    optimal: bool | None = None
 
 
 @dataclass(frozen=True, eq=False)

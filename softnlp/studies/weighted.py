@@ -95,7 +95,8 @@ class Weighted:
     """Minimises the weighted squares; stands in for an `Engine` of the square problem.
 
     A solution's p holds the errors that were left, in "contact.force_error", "contact.moment_error" and
-    "contact.gap_error". In a plane of symmetry the minimum is sought in that plane: outside it are lower ones.
+    "contact.gap_error"; its kkt is the last step to the linearised minimum, which solves the first-order conditions.
+    In a plane of symmetry the minimum is sought in that plane: outside it are lower ones.
     """
 
     def __init__(
@@ -157,8 +158,9 @@ class Weighted:
             e_L, slope = self._length_error(solution)
             along = inverse**2 * slope
             wanted = -along * W_L**2 * (e_L - slope @ s) / (1 + W_L**2 * (slope @ along))
-            if float(np.max(np.abs(wanted - s))) <= enough * max(1.0, float(np.max(np.abs(s)))):
-                return replace(solution, iterations=spent)
+            left = float(np.max(np.abs(wanted - s)))
+            if left <= enough * max(1.0, float(np.max(np.abs(s)))):
+                return replace(solution, iterations=spent, kkt=left)
             history.append((s, wanted))
             s = _accelerated(history[-_MEMORY:])
         return replace(solution, residual=float("inf"), iterations=spent)
@@ -188,9 +190,10 @@ class Weighted:
                 dx = step.solve(x, given, g)
             except np.linalg.LinAlgError:
                 return Solution(x, given, float("inf"), k, "the minimum is not determined")
-            if float(np.max(np.abs(dx))) <= enough * max(1.0, float(np.max(np.abs(x)))):
+            left = float(np.max(np.abs(dx)))
+            if left <= enough * max(1.0, float(np.max(np.abs(x)))):
                 given, g = judged(x + dx)
-                return Solution(x + dx, given, float(np.max(np.abs(g))), k + 1, "minimum of the weighted squares")
+                return Solution(x + dx, given, float(np.max(np.abs(g))), k + 1, "minimum of the weighted squares", left)
             history.append((x, x + dx))
             x = _accelerated(history[-_MEMORY:])
         return Solution(x, given, float("inf"), _STEPS, "Gauss-Newton reached its iteration limit")
