@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
+from softnlp.gravity import gravity_named
 from softnlp.section import Section
 
 Vector = tuple[float, float, float]
@@ -31,12 +32,18 @@ class Loads:
     tip_moment
         (3,) M_e [N m].
     gravity
-        (3,) acceleration g [m/s^2]; zeros switch it off.
+        (3,) acceleration g [m/s^2]; zeros switch it off. One of the words of a scenario, "standing" or "hanging" for
+        instance, becomes that of the earth. Raises `InputError` for another word.
     """
 
     tip_force: Any = (0.0, 0.0, 0.0)
     tip_moment: Any = (0.0, 0.0, 0.0)
     gravity: Any = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Take a word for gravity."""
+        if isinstance(self.gravity, str):
+            object.__setattr__(self, "gravity", gravity_named(self.gravity))
 
 
 class RodSection(NamedTuple):

@@ -6,27 +6,18 @@ words what does not fit; what needs more than one key, or another file, is check
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import hypot
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator
 from pydantic_core import PydanticCustomError
 
+from softnlp.gravity import DIRECTIONS, unknown_direction
 from softnlp.numerics import Numerics
-from softnlp.reading import choices, did_you_mean, shown
+from softnlp.reading import choices, shown
 from softnlp.robot import MINIMUM_WALL
 from softnlp.units import MILLIMETRE
 
-DIRECTIONS: Mapping[str, tuple[float, float, float]] = {
-    "off": (0.0, 0.0, 0.0),
-    "-z": (0.0, 0.0, -1.0),
-    "+z": (0.0, 0.0, 1.0),
-    "-x": (-1.0, 0.0, 0.0),
-    "+x": (1.0, 0.0, 0.0),
-    "-y": (0.0, -1.0, 0.0),
-    "+y": (0.0, 1.0, 0.0),
-}
 MOST_INTERVALS = 2000
 LARGEST_COMPONENT = 1e300
 MOST_STEPS = 1_000_000
@@ -43,8 +34,7 @@ def _direction(value: Any) -> tuple[float, float, float]:
     """Gravity's direction: one of the names, or a vector to be normalised."""
     if isinstance(value, str):
         if value not in DIRECTIONS:
-            hint = did_you_mean(value, DIRECTIONS)
-            raise wrong(f"expected one of {choices(DIRECTIONS)}, or a vector, got {shown(value)}{hint}")
+            raise wrong(unknown_direction(value))
         return DIRECTIONS[value]
     if not isinstance(value, list):
         raise wrong(f"expected one of {choices(DIRECTIONS)}, or a vector of 3 numbers, got {shown(value)}")

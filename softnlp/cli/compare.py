@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
+from softnlp.gravity import gravity_lines
 
 if TYPE_CHECKING:
     from softnlp.evaluation.comparison import Comparison
@@ -102,6 +103,8 @@ def _say(task: CompareTask, found: Comparison) -> None:
 
     robots = ", ".join(o.label for o in found.observed)
     say(f"{task.scenario.title}: {robots}; {task.scenario.material.name}; {len(task.columns.rows)} rows measured")
+    for line in gravity_lines(task.scenario.loads.gravity):
+        say(line)
     for name in found.observables:
         what = OBSERVABLES[name]
         say(f"\n{what.words} [{what.unit}]: {found.measured(name)} measured")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say, say_rows
 from softnlp.errors import InputError
+from softnlp.gravity import gravity_lines
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -172,6 +173,8 @@ def _say_robots(asked: Scenario, found: Identified) -> None:
     from softnlp.results.identify_document import UNITS, file_name
 
     say(f"{asked.title}: {', '.join(d.label for d in found.data)}; {asked.material.name} ({asked.material.law.name})")
+    for line in gravity_lines(asked.loads.gravity):
+        say(line)
     if found.status != "solved":
         say(f"{found.status}: {found.message}")
         return

@@ -9,6 +9,7 @@ from cyclopts import Parameter
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
 from softnlp.errors import InputError
+from softnlp.gravity import gravity_lines
 
 
 def sensitivity(
@@ -89,6 +90,8 @@ def sensitivity(
     if json:
         say(document_text(document).rstrip("\n"))
     elif report.solved:
+        for line in gravity_lines(report.loads.gravity):
+            say(line)
         for heading, header, rows in table_rows(report):
             say(f"\n{heading}")
             say_rows(header, rows)

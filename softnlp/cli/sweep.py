@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, interrupt_asked, say
 from softnlp.errors import InputError
+from softnlp.gravity import gravity_lines
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -132,7 +133,8 @@ def _write_beside(asked: Scenario, folder: Path, *, replace: bool) -> None:
 def _told(asked: Scenario, folder: Path, summary: SweepSummary) -> int:
     """Print what a sweep came to; return the exit status."""
     model = f"{asked.robot.name}, {asked.material.name} ({asked.material.law.name})"
-    say("\n".join([f"{asked.title}: {model}", *(f"warning: {warning}" for warning in asked.warnings)]))
+    held = gravity_lines(asked.loads.gravity)
+    say("\n".join([f"{asked.title}: {model}", *held, *(f"warning: {warning}" for warning in asked.warnings)]))
     if summary.already and summary.already == summary.poses and not summary.written:
         say("this sweep was finished already; nothing was rewritten")
     elif summary.already:

@@ -11,6 +11,7 @@ import numpy as np
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, progress, say
 from softnlp.errors import InputError
+from softnlp.gravity import gravity_lines
 from softnlp.units import BAR, DEGREE, MILLIMETRE
 
 if TYPE_CHECKING:
@@ -165,6 +166,7 @@ def _summary_rows(found: Workspace, s: Summary) -> Iterator[tuple[str, str]]:
     """Yield what a sweep comes to, as name and value."""
     mm, deg = MILLIMETRE, DEGREE
     yield "workspace", f"{found.title}: {found.robot.name}, {found.material}"
+    yield from (("gravity", line) for line in gravity_lines(found.gravity))
     yield "poses", f"{s.poses:,}"
     yield "solved", f"{s.solved:,}" + (f" ({s.unstable:,} unstable)" if s.unstable else "")
     yield "failed", ", ".join(f"{n:,} {status}" for status, n in s.failed.items()) or "0"

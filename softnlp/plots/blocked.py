@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.gravity import is_hanging
 from softnlp.plots.abscissa import Abscissa, abscissa
 from softnlp.plots.body import (
-    ELEVATION,
-    direction,
+    Camera,
+    base_axes,
     disc,
     draw_arrow,
     draw_cut_open,
     draw_loads,
     frame,
     shaded,
-    side_azimuth,
-    standing_on_base,
+    side_camera,
     tube,
 )
 from softnlp.plots.series import finish_panels, new_panels, series
@@ -119,7 +119,7 @@ def _wall_panel(figure: Figure, centre: tuple[float, float], view: RunView, cont
 
     k = shown_step(view, contact)
     if k is None:
-        axes, reach = standing_on_base(figure, centre, view, -60.0)
+        axes, reach = base_axes(figure, centre, view, Camera(-60.0, is_hanging(view.loads.gravity)))
         frame(axes, np.vstack(reach))
         return axes
     body, free = view.bodies[k], contact.free[k]
@@ -128,9 +128,9 @@ def _wall_panel(figure: Figure, centre: tuple[float, float], view: RunView, cont
     L = view.robot.length / MILLIMETRE
     # From the robot's side of the wall, so that the free shape is what the wall veils.
     towards = -contact.normal[k][:2] if contact.has_wall else free.position[-1, :2]
-    azimuth = side_azimuth(towards, 1e-6, turn=-24.0)
-    axes, reach = standing_on_base(figure, centre, view, azimuth)
-    eye, light = direction(azimuth, ELEVATION), direction(azimuth - 50, 40)
+    camera = side_camera(towards, 1e-6, view.loads.gravity, turn=-24.0)
+    axes, reach = base_axes(figure, centre, view, camera)
+    light = camera.light
     reach += _draw_free(axes, free, light)
     others = [j for j in view.solved if j != k]
     lines = [b.position / MILLIMETRE for j in others if (b := view.bodies[j]) is not None]
@@ -145,14 +145,14 @@ def _wall_panel(figure: Figure, centre: tuple[float, float], view: RunView, cont
     if contact.has_wall:
         reach.append(_draw_wall(axes, contact.wall_point[k] / MILLIMETRE, contact.normal[k], at, view))
     only_last = replace(view, bodies=tuple(b if j == k else None for j, b in enumerate(view.bodies)))
-    reach += draw_cut_open(axes, only_last, k, eye, light, tip_frame=False)
+    reach += draw_cut_open(axes, only_last, k, camera.eye, light, tip_frame=False)
     if cap > 0:
         reach.append(_draw_cap(axes, body, cap, light))
     if contact.force[k] > 0:
         push = _ARROW * L * contact.normal[k]
         text = f"$F_b$ = {contact.force[k]:.3g} N"
-        reach += draw_arrow(axes, at - push, push, text, "wall's force", azimuth, at_tail=True)
-    reach += draw_loads(axes, view, body.position[-1] / MILLIMETRE, np.vstack(reach), azimuth)
+        reach += draw_arrow(axes, at - push, push, text, "wall's force", camera, at_tail=True)
+    reach += draw_loads(axes, view, body.position[-1] / MILLIMETRE, np.vstack(reach), camera)
     frame(axes, np.vstack(reach))
     return axes
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.gravity import gravity_lines, is_hanging
 from softnlp.mesh.rings import circle, placed
 from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, colour, step_colours
 from softnlp.results import Body, RunView
@@ -52,30 +54,62 @@ def disc(radius: float, facets: int, z: float) -> Array:
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(facets, z)])[None]
 
 
-def view_azimuth(view: RunView) -> float:
-    """Return the azimuth [deg] from which the last solved step bends to the right, almost side on."""
-    if not view.solved:
-        return -60.0
-    body = view.bodies[view.solved[-1]]
-    assert body is not None
-    return side_azimuth(body.position[-1, :2], 0.02 * view.robot.length)
+@dataclass(frozen=True)
+class Camera:
+    """From where axes are seen: from a little above, and with the base on top where the robot hangs.
+
+    azimuth : of the viewer about +z [deg]. hanging : whether the picture is turned upside down.
+    """
+
+    azimuth: float
+    hanging: bool
+
+    @property
+    def eye(self) -> Array:
+        """The unit vector towards the viewer (3,)."""
+        return direction(self.azimuth, -ELEVATION if self.hanging else ELEVATION)
+
+    @property
+    def right(self) -> Array:
+        """The level unit vector that points right in the picture (3,)."""
+        return direction(self.azimuth + (-90 if self.hanging else 90), 0)
+
+    @property
+    def light(self) -> Array:
+        """The unit vector towards the light (3,), from the upper left."""
+        return direction(self.azimuth + 50, -40) if self.hanging else direction(self.azimuth - 50, 40)
+
+    def aim(self, axes: Any) -> None:
+        """Turn 3-D axes."""
+        upside_down = {"elev": -ELEVATION, "roll": 180} if self.hanging else {"elev": ELEVATION}
+        axes.view_init(azim=self.azimuth, **upside_down)
 
 
-def side_azimuth(towards: Array, least: float, turn: float = 20.0) -> float:
-    """Return the azimuth [deg] from which a horizontal vector points right, turned by so much; -60 if it is short."""
-    x, y = towards
-    return -60.0 if np.hypot(x, y) < least else float(np.degrees(np.arctan2(y, x))) - 90.0 + turn
+def side_camera(towards: Array, least: float, gravity: Sequence[float], turn: float = 20.0) -> Camera:
+    """Return the camera for which a level vector points right, turned by some degrees; a fixed one if it is short."""
+    (x, y), hanging = towards, is_hanging(gravity)
+    if np.hypot(x, y) < least:
+        return Camera(-60.0, hanging)
+    away = 90.0 - turn
+    return Camera(float(np.degrees(np.arctan2(y, x))) + (away if hanging else -away), hanging)
+
+
+def view_camera(view: RunView) -> Camera:
+    """Return the camera for which the last solved step bends to the right, almost side on."""
+    body = view.bodies[view.solved[-1]] if view.solved else None
+    towards = np.zeros(2) if body is None else body.position[-1, :2]
+    return side_camera(towards, 0.02 * view.robot.length, view.loads.gravity)
 
 
 def body_panel(figure: Figure, centre: tuple[float, float], view: RunView) -> Any:
     """Draw the 3-D panel of a run about a point of the figure [inch] and return its axes."""
     from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-    azimuth = view_azimuth(view)
-    axes, reach = standing_on_base(figure, centre, view, azimuth)
+    camera = view_camera(view)
+    axes, reach = base_axes(figure, centre, view, camera)
     solved = view.solved
     shades = step_colours(len(view.bodies))
-    light = direction(azimuth - 50, 40)
+    light = camera.light
     for k in _ghosts(solved):
         body = view.bodies[k]
         assert body is not None
@@ -91,16 +125,17 @@ def body_panel(figure: Figure, centre: tuple[float, float], view: RunView) -> An
             Line3DCollection(lines, colors=shades[list(solved)], linewidths=1.4, zorder=3, label="axes of the steps")
         )
         reach += lines
-        reach += draw_cut_open(axes, view, solved[-1], direction(azimuth, ELEVATION), light)
-        reach += draw_loads(axes, view, lines[-1][-1], np.vstack(reach), azimuth)
+        reach += draw_cut_open(axes, view, solved[-1], camera.eye, light)
+        reach += draw_loads(axes, view, lines[-1][-1], np.vstack(reach), camera)
     frame(axes, np.vstack(reach))
     return axes
 
 
-def standing_on_base(
-    figure: Figure, centre: tuple[float, float], view: RunView, azimuth: float
-) -> tuple[Any, list[Array]]:
-    """Return 3-D axes about a point of the figure [inch] with the base plate alone, and the points it reaches [mm]."""
+def base_axes(figure: Figure, centre: tuple[float, float], view: RunView, camera: Camera) -> tuple[Any, list[Array]]:
+    """Return 3-D axes about a point of the figure [inch] with the base plate alone, and the points it reaches [mm].
+
+    Gravity, where there is some, is said in words beneath.
+    """
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     width, height = figure.get_size_inches()
@@ -108,7 +143,9 @@ def standing_on_base(
     box = (left / width, bottom / height, _CANVAS / width, _CANVAS / height)
     axes: Any = figure.add_axes(box, projection="3d", computed_zorder=False)
     axes.patch.set_visible(False)
-    axes.view_init(elev=ELEVATION, azim=azimuth)
+    camera.aim(axes)
+    for line in gravity_lines(view.loads.gravity):
+        figure.text(0.018, 0.053, line, size=SMALL, color=GREY)
     axes.set_proj_type("ortho")
     plate = disc(0.75 * view.robot.outer_diameter / MILLIMETRE, 40, 0.0)
     axes.add_collection3d(
@@ -191,12 +228,12 @@ def direction(azimuth: float, elevation: float) -> Array:
     return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
 
 
-def draw_loads(axes: Any, view: RunView, tip: Array, reach: Array, azimuth: float) -> list[Array]:
+def draw_loads(axes: Any, view: RunView, tip: Array, reach: Array, camera: Camera) -> list[Array]:
     """Draw tip force, tip moment and gravity as arrows of one length with their size beside; return their ends [mm].
 
-    Gravity stands to the left of everything drawn so far, `reach`, as seen from the azimuth [deg].
+    Gravity stands to the left of everything drawn so far, `reach`.
     """
-    right = direction(azimuth + 90, 0)
+    right = camera.right
     size = _ARROW * view.robot.length / MILLIMETRE
     force, moment, gravity = (
         np.asarray(x, dtype=float) for x in (view.loads.tip_force, view.loads.tip_moment, view.loads.gravity)
@@ -212,7 +249,7 @@ def draw_loads(axes: Any, view: RunView, tip: Array, reach: Array, azimuth: floa
     for start, vector, text, label in arrows:
         norm = float(np.linalg.norm(vector))
         if norm > 0:
-            ends += draw_arrow(axes, start, size * vector / norm, text, label, azimuth)
+            ends += draw_arrow(axes, start, size * vector / norm, text, label, camera)
     return ends
 
 
@@ -222,7 +259,7 @@ def draw_arrow(
     step: Array,
     text: str,
     label: str,
-    azimuth: float,
+    camera: Camera,
     *,
     ink: str = INK,
     at_tail: bool = False,
@@ -231,7 +268,7 @@ def draw_arrow(
     from matplotlib.patheffects import withStroke
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-    eye, right = direction(azimuth, ELEVATION), direction(azimuth + 90, 0)
+    eye, right = camera.eye, camera.right
     size = float(np.linalg.norm(step))
     across = np.cross(step, eye)
     across = 0.4 * across / np.linalg.norm(across) if np.linalg.norm(across) > 0.1 * size else 0.4 * right

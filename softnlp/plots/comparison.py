@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.evaluation.statistics import groups, statistics
+from softnlp.gravity import gravity_lines, is_hanging
 from softnlp.plots.boxes import draw_boxes
 from softnlp.plots.cloud import mark_size
 from softnlp.plots.space import around, space_axes
@@ -46,9 +47,10 @@ def comparison_figure(workspace: Workspace, comparison: Comparison) -> Figure:
         f"{found.count:,} pairs",
         f"mean {found.mean:.3g} mm ({found.mean * part:.3g} % of length), largest {found.largest:.3g} mm",
     ]
+    parts += gravity_lines(workspace.gravity)
     figure = new_figure(_WIDTH, _HEIGHT, f"{workspace.title} against {comparison.against}", "  ·  ".join(parts))
     norm = _norm(comparison)
-    tips = _tips(figure, comparison, norm)
+    tips = _tips(figure, comparison, norm, hanging=is_hanging(workspace.gravity))
     places = ((0.6, 0.55, 0.17, 0.32), (0.82, 0.55, 0.17, 0.32))
     half = 1.08 * float(np.abs(comparison.error).max()) / MILLIMETRE or 1.0
     for place, (first, second) in zip(places, ((0, 2), (0, 1)), strict=True):
@@ -75,14 +77,14 @@ def _norm(comparison: Comparison) -> Any:
     return Normalize(0.0, float(comparison.distance.max()) / MILLIMETRE or 1.0)
 
 
-def _tips(figure: Figure, comparison: Comparison, norm: Any) -> int:
-    """Draw pairs of tips in 3-D; return how many."""
+def _tips(figure: Figure, comparison: Comparison, norm: Any, *, hanging: bool) -> int:
+    """Draw pairs of tips in 3-D, upside down where the robot hangs; return how many."""
     from matplotlib.cm import ScalarMappable
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
     k = thinned(comparison.other, _MOST_LINES)
     other, mine = comparison.other[k] / MILLIMETRE, comparison.tip_position[k] / MILLIMETRE
-    axes = space_axes(figure, (-0.02, 0.05, 0.56, 0.84), around(np.vstack([other, mine])))
+    axes = space_axes(figure, (-0.02, 0.05, 0.56, 0.84), around(np.vstack([other, mine])), hanging=hanging)
     distance = comparison.distance[k] / MILLIMETRE
     lines = Line3DCollection(np.stack([other, mine], axis=1), cmap=_MAP, norm=norm, linewidths=0.9, zorder=2)
     lines.set_array(distance)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.plots.body import ELEVATION, frame, side_azimuth, tube
+from softnlp.gravity import gravity_lines
+from softnlp.plots.body import frame, side_camera, tube
 from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, colour, new_figure, plain
 from softnlp.results import Body
 from softnlp.results.sensitivity import shown
@@ -50,8 +51,10 @@ def _tip_panel(figure: Figure, report: SensitivityReport) -> None:
     assert pose is not None
     axes: Any = figure.add_axes((0.0, 0.12, 0.52, 0.7), projection="3d", computed_zorder=False)
     axes.patch.set_visible(False)
-    azimuth = side_azimuth(pose.tip_position[:2], 0.02 * report.robot.length)
-    axes.view_init(elev=ELEVATION, azim=azimuth)
+    gravity = report.loads.gravity
+    side_camera(pose.tip_position[:2], 0.02 * report.robot.length, gravity).aim(axes)
+    for words in gravity_lines(gravity):
+        figure.text(0.018, 0.053, words, size=SMALL, color=GREY)
     axes.set_proj_type("ortho")
     quads, _ = tube(Body(pose.shape.position, pose.shape.rotation, pose.radii), pose.radii.outer, (0, 0), 24, 16)
     axes.add_collection3d(

@@ -27,12 +27,17 @@ def space_axes(
     place: tuple[float, float, float, float],
     limits: tuple[Array, Array],
     zoom: float = 0.94,
+    *,
+    hanging: bool = False,
 ) -> Any:
-    """Return axes in 3-D at a place of a figure, of one scale, between two corners (3,) [mm]."""
+    """Return axes in 3-D at a place of a figure, of one scale, between two corners (3,) [mm].
+
+    hanging : whether the base is to be on top.
+    """
     axes: Any = figure.add_axes(place, projection="3d", computed_zorder=False)
     axes.patch.set_visible(False)
     axes.set_proj_type("ortho")
-    axes.view_init(elev=18, azim=-58)
+    axes.view_init(elev=-18 if hanging else 18, azim=-58, roll=180 if hanging else 0)
     low, high = limits
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_box_aspect(high - low, zoom=zoom)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.gravity import gravity_lines, is_hanging
 from softnlp.plots.body import disc
 from softnlp.plots.cloud import VIEWS, Outline, mark_size, outline, seen, shown
 from softnlp.plots.space import space_axes
@@ -55,6 +56,7 @@ def workspace_figure(workspace: Workspace, colour: str = COLOUR) -> Figure:
     ]
     if unstable := int(np.count_nonzero(workspace.stable == 0)):
         parts.append(f"{unstable:,} unstable")
+    parts += gravity_lines(workspace.gravity)
     figure = new_figure(_WIDTH, _HEIGHT, workspace.title, "  ·  ".join(parts))
     if not len(tips):
         figure.text(0.5, 0.5, "No pose has a solution with this number", size=TEXT, color=WRONG, ha="center")
@@ -65,7 +67,9 @@ def workspace_figure(workspace: Workspace, colour: str = COLOUR) -> Figure:
     count = parameters(workspace)
     outlines = [outline(tips, view, count) for view in VIEWS]
 
-    drawn_3d = _cloud_panel(figure, tips, numbers, scale, (low, high), outlines, size)
+    drawn_3d = _cloud_panel(
+        figure, tips, numbers, scale, (low, high), outlines, size, hanging=is_hanging(workspace.gravity)
+    )
     drawn = [
         _projection(_place(figure, k, high - low), tips, numbers, scale, k, (low, high), outlines[k], size)
         for k in range(len(VIEWS))
@@ -104,14 +108,17 @@ def _cloud_panel(
     limits: tuple[Array, Array],
     outlines: list[Outline],
     size: float,
+    *,
+    hanging: bool,
 ) -> int:
     """Draw the cloud in 3-D with the outlines on the walls behind it; return how many poses are drawn."""
     from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
     low, high = limits
-    axes = space_axes(figure, (-0.025, 0.05, 0.56, 0.86), limits, zoom=0.96)
+    axes = space_axes(figure, (-0.025, 0.05, 0.56, 0.86), limits, zoom=0.96, hanging=hanging)
+    floor = high[2] if hanging else low[2]
     # the walls that the viewer sees behind the cloud, one for each projection
-    for (first, second, sight, _), wall, found in zip(VIEWS, (low[2], high[1], low[0]), outlines, strict=True):
+    for (first, second, sight, _), wall, found in zip(VIEWS, (floor, high[1], low[0]), outlines, strict=True):
         for edges, style in ((found.boundary, _BOUNDARY), (found.hull, _HULL)):
             if len(edges):
                 lines = np.full((len(edges), 2, 3), wall)

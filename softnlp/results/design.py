@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+from softnlp.gravity import gravity_lines
 from softnlp.materials import Material
 from softnlp.results.document import compact_json
 from softnlp.results.inputs import (
@@ -210,6 +211,7 @@ def _notes(done: Design) -> Iterator[tuple[str, str]]:
         if not candidate.is_feasible:
             yield f"{candidate.number} {candidate.status}: {'; '.join(candidate.reasons)}", "bright_black"
     best = done.best
+    yield from ((line, "") for line in gravity_lines(done.setting.loads.gravity))
     if best is None:
         yield "no candidate is feasible", "red"
         return

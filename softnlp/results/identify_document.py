@@ -13,7 +13,7 @@ import numpy as np
 
 from softnlp.evaluation.statistics import Statistics
 from softnlp.materials import Material
-from softnlp.results.inputs import package_version, tidy
+from softnlp.results.inputs import loads_table, package_version, tidy
 from softnlp.studies.free_constants import COEFFICIENTS
 from softnlp.studies.measurements import OBSERVABLES, column_slice
 from softnlp.units import BAR, DEGREE, MEGAPASCAL, MILLIMETRE
@@ -169,6 +169,7 @@ def robot_document(asked: Scenario, task: RobotTask, found: Identified) -> dict[
         )
     return {
         **_head(asked),
+        "loads": loads_table(asked.loads),
         "status": str(found.status),
         "message": found.message,
         "constants": constants,

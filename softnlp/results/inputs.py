@@ -10,6 +10,7 @@ from typing import Any
 
 from softnlp.contact_settings import ContactSettings
 from softnlp.conventions import Coefficients, Conventions
+from softnlp.gravity import gravity_words
 from softnlp.materials import Material
 from softnlp.robot import DIMENSIONS, Robot
 from softnlp.rod import Loads
@@ -87,12 +88,13 @@ def conventions_table(conventions: Conventions) -> dict[str, Any]:
     return table
 
 
-def loads_table(loads: Loads) -> dict[str, list[float]]:
-    """Return the dead loads in the world frame."""
+def loads_table(loads: Loads) -> dict[str, Any]:
+    """Return the dead loads in the world frame, gravity in words too."""
     return {
         "tip_force_N": [tidy(f) for f in loads.tip_force],
         "tip_moment_Nmm": [tidy(m, NEWTON_MILLIMETRE) for m in loads.tip_moment],
         "gravity_m_per_s2": [tidy(g) for g in loads.gravity],
+        "gravity": gravity_words(loads.gravity),
     }
 
 

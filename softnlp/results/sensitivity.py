@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.results.inputs import package_version, pressure_bar
+from softnlp.results.inputs import loads_table, package_version, pressure_bar
 from softnlp.studies.derivatives import entries_of
 from softnlp.studies.ellipsoids import Ellipsoid
 from softnlp.studies.report import SensitivityReport
@@ -44,6 +44,7 @@ def sensitivity_document(report: SensitivityReport, title: str, step: int) -> di
         "study": "sensitivity",
         "step": step,
         "pressure_bar": pressure_bar(s.step.pressure),
+        "loads": loads_table(report.loads),
         "status": s.step.status.value,
         "message": s.step.message,
         "warnings": list(s.warnings),

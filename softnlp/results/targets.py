@@ -48,6 +48,7 @@ TARGET_FIELDS: tuple[TargetField, ...] = (
         "nearest_mm", ("axis",), "mm", "the reachable tip position found", lambda a: _in(MILLIMETRE, a.tip_position)
     ),
     TargetField("nearest_direction", ("axis",), "1", "the tip's axis there", lambda a: a.tip_direction),
+    TargetField("optimal", (), "1", "whether nothing that was left to choose is better nearby", lambda a: a.optimal),
 )
 
 

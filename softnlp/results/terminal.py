@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
+from softnlp.gravity import gravity_lines
 from softnlp.results.fields import BLOCKED_FORCE, solved_pose
 from softnlp.results.targets import INVERSE
 from softnlp.studies.step import Run, Step
@@ -136,7 +137,8 @@ def _offset(run: Run, step: Step) -> str:
 
 
 def _notes(run: Run) -> Iterator[tuple[str, str]]:
-    """Yield (line, style) of failures and warnings, neighbouring steps with the same words on one line."""
+    """Yield (line, style) of gravity, failures and warnings, neighbouring steps with the same words on one line."""
+    yield from ((line, "") for line in gravity_lines(run.loads.gravity))
     failed = [(k, f"{s.status.value}: {s.message}") for k, s in enumerate(run.steps, start=1) if s in run.failed]
     warned = [(k, f"warning: {text}") for k, s in enumerate(run.steps, start=1) for text in s.warnings]
     yield from ((line, "red") for line in _grouped(failed))

@@ -49,6 +49,8 @@ class SensitivityReport:
         Of the tip, which is free to turn.
     bars, sampled
         Error bars to first order and by Monte Carlo, with tolerances; else None.
+    loads
+        As given.
     """
 
     robot: Robot
@@ -59,6 +61,7 @@ class SensitivityReport:
     stiffness: Ellipsoid
     bars: ErrorBars | None
     sampled: Sampled | None
+    loads: Loads = Loads()
 
     @property
     def solved(self) -> bool:
@@ -135,6 +138,7 @@ def sensitivity_report(
         stiffness_ellipsoid(found),
         bars,
         sampled,
+        loads,
     )
 
 

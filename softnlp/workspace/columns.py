@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.gravity import gravity_words
 from softnlp.robot import DIMENSIONS
 from softnlp.units import BAR, DEGREE, MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.workspace.plan import Plan
@@ -115,8 +116,8 @@ def _varied(plan: Plan, name: str) -> list[Column]:
     values = plan.values[:, plan.columns_of(name)]
     table, _, entry = name.partition(".")
     if name == "gravity":
-        size = np.linalg.norm(values, axis=1)
-        return [_given("gravity_size_m_per_s2", (), "m/s^2", "size of the gravity", size, 1.0)]
+        size, words = np.linalg.norm(values, axis=1), gravity_words(values[int(np.argmax(np.abs(values).sum(axis=1)))])
+        return [_given("gravity_size_m_per_s2", (), "m/s^2", f"size of gravity; {words}", size, 1.0)]
     if name in ("tip_force", "tip_moment"):
         what, unit, scale = ("force", "N", 1.0) if name == "tip_force" else ("moment", "Nmm", NEWTON_MILLIMETRE)
         shown = "N" if unit == "N" else "N mm"

@@ -63,6 +63,12 @@ class Workspace:
         return np.array([status.has_solution for status in STATUSES])[self.status]
 
     @property
+    def gravity(self) -> tuple[float, float, float]:
+        """Gravity of the poses (3,) [m/s^2]; of a varied size the direction alone counts."""
+        x, y, z = self.attributes["loads"]["gravity_m_per_s2"]
+        return float(x), float(y), float(z)
+
+    @property
     def tilt(self) -> Array:
         """The angle between tip axis and +z (N,) [rad]."""
         x, y, z = self.tip_axis.T

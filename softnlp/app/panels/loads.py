@@ -6,24 +6,16 @@ from nicegui import ui
 
 from softnlp.app.fields import choice_field, vector_field
 from softnlp.app.session import Session
-from softnlp.scenario_schema import DIRECTIONS
+from softnlp.gravity import DIRECTIONS, gravity_named, gravity_words
 
-_WORDS = {
-    "off": "off",
-    "-z": "standing on its base (-z)",
-    "+z": "hanging from its base (+z)",
-    "-x": "towards -x",
-    "+x": "towards +x",
-    "-y": "towards -y",
-    "+y": "towards +y",
-}
+_WORDS = {name: gravity_words(gravity_named(name)) for name in DIRECTIONS} | {"off": "off"}
 
 
 def loads_panel(session: Session) -> None:
     """Build the controls of [gravity] and [tip_load]."""
-    choice_field(
-        session, "gravity", "direction", "Gravity", {name: _WORDS[name] for name in DIRECTIONS}, default="off"
-    ).props("data-testid=gravity-direction")
+    choice_field(session, "gravity", "direction", "Gravity", _WORDS, default="off").props(
+        "data-testid=gravity-direction"
+    )
     for key, label, unit, step in (
         ("force_N", "Force at the tip", "N", 0.01),
         ("moment_Nmm", "Moment at the tip", "N mm", 0.1),

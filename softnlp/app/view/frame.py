@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softnlp.gravity import is_hanging
 from softnlp.mesh import resampled
 from softnlp.mesh.display import STATIONS
 from softnlp.results import Body
@@ -55,7 +56,7 @@ class Frame:
 
     robot : gives the layout of the chambers and the natural length. body : the shape. ghost : another, drawn faint.
     pressure_bar : (sets,). arrows : the loads that are not zero. wall : its point nearest to the contact [mm] and its
-    unit normal, or None. tip_cap : L_t [mm].
+    unit normal, or None. tip_cap : L_t [mm]. hanging : whether the base is shown on top.
     """
 
     robot: Robot
@@ -65,6 +66,7 @@ class Frame:
     arrows: tuple[Arrow, ...] = ()
     wall: tuple[Array, Array] | None = None
     tip_cap: float = 0.0
+    hanging: bool = False
 
 
 def frame_of(
@@ -108,6 +110,7 @@ def frame_of(
         _arrows(robot, body, (tip_force, tip_moment, gravity), contact, push),
         None if wall is None else ((contact - wall.gap(contact) * wall.normal) / MILLIMETRE, wall.normal),
         tip_cap / MILLIMETRE,
+        is_hanging(gravity),
     )
 
 

@@ -70,6 +70,7 @@ def frame_message(frame: Frame, number: int, full_bar: float) -> dict[str, Any]:
             for a in frame.arrows
         ],
         "cap": round(frame.tip_cap, 3),
+        "hanging": frame.hanging,
         "wall": None
         if frame.wall is None
         else {"point": _rounded(frame.wall[0]), "normal": _rounded(frame.wall[1], digits=6)},

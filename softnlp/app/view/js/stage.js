@@ -47,13 +47,9 @@ export class Stage {
     element.appendChild(canvas);
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(FIELD, 1, 1, 1e4);
-    this.camera.up.set(0, 0, 1);
     this.light = new THREE.DirectionalLight(0xffffff, 1.6);
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0xb8bcc4, 1.5), this.light);
-    this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.enableDamping = true;
-    this.controls.dampingFactor = 0.15;
-    this.controls.addEventListener("change", () => this.request());
+    this.hold(false);
     this.labels = new Set();
     this.surroundings = new Surroundings(this.labels);
     this.arrows = new Arrows(this.labels);
@@ -67,6 +63,16 @@ export class Stage {
     this.sizes = new ResizeObserver(() => this.resize());
     this.sizes.observe(element);
     this.resize();
+  }
+
+  // Which way is up; the controls read it once.
+  hold(hanging) {
+    this.controls?.dispose();
+    this.camera.up.set(0, 0, hanging ? -1 : 1);
+    this.controls = new OrbitControls(this.camera, this.renderer.domElement);
+    this.controls.enableDamping = true;
+    this.controls.dampingFactor = 0.15;
+    this.controls.addEventListener("change", () => this.request());
   }
 
   setRobot(message) {
@@ -98,7 +104,9 @@ export class Stage {
     const before = this.frame;
     this.frame = frame;
     this.tip = [...tip.subarray(0, 3)];
-    if (before === undefined) this.reset();
+    const turned = (before?.hanging ?? false) !== frame.hanging;
+    if (turned) this.hold(frame.hanging);
+    if (before === undefined || turned) this.reset();
     else if (before.length !== frame.length) this.grow(frame.length / before.length);
     this.rescale();
   }
@@ -128,7 +136,7 @@ export class Stage {
     const [a, e] = [radians(AZIMUTH), radians(ELEVATION)];
     const away = 4.8 * size * narrowness(this.camera.aspect);
     this.controls.target.set(0, 0, 0.45 * size);
-    this.camera.position.set(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e));
+    this.camera.position.set(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e) * this.camera.up.z);
     this.camera.position.multiplyScalar(away).add(this.controls.target);
     this.limit(size);
     this.controls.update();
@@ -164,7 +172,7 @@ export class Stage {
 
   render(ratio) {
     if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
-    this.light.position.copy(this.camera.position).add(new THREE.Vector3(0, 0, this.camera.position.length()));
+    this.light.position.copy(this.camera.position).addScaledVector(this.camera.up, this.camera.position.length());
     this.renderer.render(this.scene, this.camera);
   }
 
