@@ -144,6 +144,7 @@ def test_document_says_what_was_asked() -> None:
         "tip_force_N": [0.1, 0, 0],
         "tip_moment_Nmm": [0, 2, 0],
         "gravity_m_per_s2": [0, 0, -9.80665],
+        "gravity": "standing, gravity towards the base (-z)",
     }
     assert document["robot"] == {"name": "D25L60"} | {
         "outer_diameter_mm": 25, "lumen_diameter_mm": 9, "chamber_circle_diameter_mm": 17, "chamber_diameter_mm": 4.5,

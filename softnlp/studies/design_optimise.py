@@ -147,7 +147,8 @@ class Optimiser:
                 close = [o for o in order if abs(o.objective - optimum.objective) <= 1e-5 * abs(optimum.objective)]
                 optimal = final.kkt <= OPTIMAL
                 doubt = () if optimal else (not_optimal(final.kkt, final.engine_status),)
-                done = Optimised(found, (), final.active, len(close), len(begun), spent, used)
+                active = final.active if optimal else ()  # elsewhere multipliers say nothing
+                done = Optimised(found, (), active, len(close), len(begun), spent, used)
                 return replace(done, optimal=optimal, doubt=doubt)
             refused.append((found, reasons))
         if refused:
