@@ -11,7 +11,10 @@ import pytest
 
 pytest.importorskip("tomlkit", reason="the extra gui is not installed")
 
+from app_stage import done, enter, field, opened
+
 from softnlp.app.numbers import certificate_words, step_lines
+from softnlp.app.panels.loads import loads_panel
 from softnlp.app.session import LARGEST_FILE, Session
 from softnlp.errors import InputError
 from softnlp.results import to_json
@@ -51,6 +54,23 @@ def test_a_live_pose_is_the_step_of_the_saved_scenario(session: Session, study: 
         np.testing.assert_allclose(shown[key], saved[key], rtol=2e-6, atol=1e-4)
     if study == "blocked-force":
         assert shown["blocked_force_N"] == pytest.approx(saved["blocked_force_N"], rel=1e-6)
+
+
+def test_the_loads_say_how_the_robot_is_held() -> None:
+    async def visit() -> None:
+        async with opened(lambda stage: loads_panel(stage.session), "forward") as (user, stage):
+            assert field(user, "gravity.words").text == "no gravity"
+            for direction, words in (
+                ("hanging", "hanging, gravity away from the base (+z)"),
+                ("-z", "standing, gravity towards the base (-z)"),
+            ):
+                enter(user, "gravity.direction", direction)
+                assert stage.session.document.get("gravity", "direction") == direction
+                assert field(user, "gravity.words").text == words
+            stage.session.change("gravity", "direction", [3, 0, -4])
+            assert "tilted by 36.9 deg" in field(user, "gravity.words").text
+
+    done(visit())
 
 
 def test_live_poses_follow_the_robot_its_silicone_and_the_coefficients(session: Session) -> None:

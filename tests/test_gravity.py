@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 from softnlp import Loads, forward, load_scenario, material, robot
-from softnlp.app.view import frame_of
-from softnlp.app.view.message import frame_message
 from softnlp.errors import InputError
 from softnlp.gravity import DIRECTIONS, gravity_lines, gravity_named, gravity_words, is_hanging
 from softnlp.plots.body import Camera, side_camera
@@ -133,10 +131,3 @@ def test_the_camera_is_above_in_the_room_and_the_light_at_the_upper_left() -> No
         assert camera.right @ [-0.6, 0.8, 0] == pytest.approx(np.cos(np.radians(20)))
         assert (up * np.cross(camera.eye, camera.right))[2] > 0  # right of the viewer, with that way up
     assert side_camera(np.zeros(2), 0.1, (0, 0, G)) == Camera(-60.0, True)
-
-
-def test_the_view_of_the_app_is_told_which_way_is_up(held: dict[str, Any]) -> None:
-    for word, hanging in (("standing", False), ("hanging", True)):
-        view = view_of_run(held[word])
-        frame = frame_of(view.robot, view.bodies[0], view.pressure[0], gravity=view.loads.gravity)
-        assert frame_message(frame, 1, 1.0)["hanging"] is hanging

@@ -285,6 +285,17 @@ def test_a_force_beyond_a_fold_is_lost_and_the_one_before_it_stands() -> None:
     assert found.values[1, 0] == pytest.approx(alone.force, rel=1e-6)
 
 
+def test_a_search_that_is_stopped_says_that_it_is_not_at_a_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = seen(robot("D25L60"), POSES)
+    free = ("k_e", "k_b")
+    monkeypatch.setattr(sys.modules["softnlp.studies.identify"], "_MOST_EVALUATIONS", 1)
+    found = identify(data, SILICONE, free, coefficients=started(free))
+    assert found.status is Status.NOT_OPTIMAL
+    assert found.message.startswith("feasible, not optimal: the KKT error is ")
+    monkeypatch.undo()
+    assert identify(data, SILICONE, free, coefficients=started(free)).status is Status.SOLVED
+
+
 @pytest.mark.slow
 def test_one_nlp_of_all_poses_gives_the_same_constants() -> None:
     """On the same grid of a loaded robot both solve the same equations; the data have errors of some percent."""

@@ -15,7 +15,7 @@ from softnlp.branch import stretch_on_branch
 from softnlp.quantities import Model
 from softnlp.robot import Robot
 from softnlp.solver import Solution
-from softnlp.studies import inverse_solver
+from softnlp.studies import bounded, inverse_solver
 from softnlp.studies.aiming import Aim, aim_of
 from softnlp.studies.bounded import Limits, Measured, least_norm, nearest
 from softnlp.studies.derivatives import PoseDerivatives
@@ -104,6 +104,21 @@ def test_the_program_and_the_search_find_the_same_pressures(
     assert z.sum() <= limits.largest_sum
     binding = np.sum((z == limits.lower) | (z == limits.upper)) + (z.sum() > limits.largest_sum - 1e-9)
     assert binding >= (limits.largest_sum < 4.5)  # where there is a narrow limit, it is what holds the answer
+
+
+def test_an_answer_says_whether_nothing_nearby_is_better(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A direction leaves three sets a choice, out of reach there is a nearest tip, and a place leaves nothing."""
+    far = at(0.06, 0.03, 0.09)
+    for target, optimal in ((Target(None, TOWARDS), True), (far, True), (at(0.012, -0.004, 0.072), None)):
+        step, _ = unloaded().solve(target, None)
+        assert step.aimed is not None
+        assert step.aimed.optimal is optimal
+        assert not [words for words in step.warnings if "not optimal" in words]
+    monkeypatch.setattr(bounded, "_STEPS", 1)
+    step, _ = unloaded().solve(far, None)
+    assert step.aimed is not None
+    assert step.aimed.optimal is False
+    assert [words for words in step.warnings if words.startswith("feasible, not optimal")]
 
 
 def test_a_run_by_the_program_is_that_of_the_search() -> None:

@@ -83,6 +83,12 @@ def test_loads_are_arrows_with_their_size() -> None:
         assert gravity.vector == pytest.approx([0, 0, -size])
 
 
+def test_a_robot_that_hangs_is_shown_with_its_base_on_top() -> None:
+    for gravity, hanging in (((0, 0, -9.8), False), ((0, 0, 9.8), True), ((9.8, 0, 0), False), ((0, 0, 0), False)):
+        shown = frame_of(ARM, bent(), np.zeros(3), gravity=gravity)
+        assert frame_message(shown, 1, full_bar=1.0)["hanging"] is hanging
+
+
 def test_a_wall_stands_where_the_cap_meets_it_and_pushes_there() -> None:
     body = bent()
     wall = Wall(np.array([-0.05, 0.3, 0.7]), np.array([1.0, 0.0, 0.0]))

@@ -12,7 +12,8 @@ from softnlp.plots.style import SMALL, colour, new_figure, plain
 def figure():
     """Draw the three curves."""
     standing, hanging = (load_scenario(SCENARIOS / f"D15L60_{how}.toml") for how in ("standing", "hanging"))
-    asked = {"standing (-z)": standing, "no gravity": replace(standing, loads=Loads()), "hanging (+z)": hanging}
+    asked = {"standing, towards the base (-z)": standing, "no gravity": replace(standing, loads=Loads())}
+    asked["hanging, away from the base (+z)"] = hanging
     drawn = new_figure(6.4, 3.6, "Gravity on D15L60", "Ecoflex 00-30, Mooney-Rivlin, one set")
     axes = drawn.add_axes((0.11, 0.15, 0.85, 0.68))
     plain(axes, "pressure of set 1 [bar]", "bending angle [deg]")

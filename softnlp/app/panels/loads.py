@@ -8,7 +8,12 @@ from softnlp.app.fields import choice_field, vector_field
 from softnlp.app.session import Session
 from softnlp.gravity import DIRECTIONS, gravity_named, gravity_words
 
-_WORDS = {name: gravity_words(gravity_named(name)) for name in DIRECTIONS} | {"off": "off"}
+_WORDS = {
+    "off": "off",
+    "standing": "standing",
+    "hanging": "hanging",
+    **{name: f"{name}: {gravity_words(gravity_named(name))}" for name in DIRECTIONS if name[0] in "-+"},
+}
 
 
 def loads_panel(session: Session) -> None:
@@ -16,6 +21,13 @@ def loads_panel(session: Session) -> None:
     choice_field(session, "gravity", "direction", "Gravity", _WORDS, default="off").props(
         "data-testid=gravity-direction"
     )
+    held = ui.label().classes("text-xs opacity-70").props("data-testid=gravity-words").mark("gravity.words")
+
+    def say_held() -> None:
+        held.set_text("" if session.scenario is None else gravity_words(session.scenario.loads.gravity))
+
+    say_held()
+    session.on_scenario(say_held)
     for key, label, unit, step in (
         ("force_N", "Force at the tip", "N", 0.01),
         ("moment_Nmm", "Moment at the tip", "N mm", 0.1),
