@@ -88,7 +88,7 @@ def rules(robot: Any, minimum_wall: float, walls: Mapping[str, bool] = MappingPr
 
         def words() -> str:
             place, wall = "threads" if moved else "bores", name.replace("_", " ")
-            short = f"{in_mm(minimum_wall - value)} below the minimum {in_mm(minimum_wall)}"
+            short = f"{in_mm(minimum_wall - value)} below minimum_wall_mm = {in_mm(minimum_wall)}"
             return f"the {wall} beside the {place} is {in_mm(value)}, {short}"
 
         return Rule("wall_thickness", name, value, minimum_wall, words, every)

@@ -255,12 +255,12 @@ def test_a_wall_that_is_given_or_listed_is_judged_too() -> None:
     """Beside a circle of 19.4 mm the threads of D25L60 leave 0.05 mm; its bores leave the layer of 0.5 mm more."""
     listed = ring(choices={"chamber_circle_diameter": [19.4 * MILLIMETRE]})
     assert listed.reasons == (
-        "wall_thickness: the outer wall beside the threads is 0.05 mm, 0.75 mm below the minimum 0.8 mm",
+        "wall_thickness: the outer wall beside the threads is 0.05 mm, 0.75 mm below minimum_wall_mm = 0.8 mm",
     )
     off = replace(D25, chamber_circle_diameter=19.4 * MILLIMETRE)
     (given,) = design(off, SOFT, numbers(0.5 * BAR, requirements={})).candidates
     assert given.reasons == (
-        "wall_thickness: the outer wall beside the bores is 0.55 mm, 0.25 mm below the minimum 0.8 mm",
+        "wall_thickness: the outer wall beside the bores is 0.55 mm, 0.25 mm below minimum_wall_mm = 0.8 mm",
     )
     inner = replace(D25, chamber_circle_diameter=14.6 * MILLIMETRE)
     assert "inner wall" in design(inner, SOFT, numbers(0.5 * BAR, requirements={})).candidates[0].reasons[0]

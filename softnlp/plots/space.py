@@ -37,7 +37,7 @@ def space_axes(
     axes: Any = figure.add_axes(place, projection="3d", computed_zorder=False)
     axes.patch.set_visible(False)
     axes.set_proj_type("ortho")
-    axes.view_init(elev=-18 if hanging else 18, azim=-58, roll=180 if hanging else 0)
+    axes.view_init(**({"elev": -18, "azim": -122, "roll": 180} if hanging else {"elev": 18, "azim": -58}))
     low, high = limits
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_box_aspect(high - low, zoom=zoom)

@@ -116,9 +116,9 @@ def _cloud_panel(
 
     low, high = limits
     axes = space_axes(figure, (-0.025, 0.05, 0.56, 0.86), limits, zoom=0.96, hanging=hanging)
-    floor = high[2] if hanging else low[2]
+    floor, side = (high[2], high[0]) if hanging else (low[2], low[0])
     # the walls that the viewer sees behind the cloud, one for each projection
-    for (first, second, sight, _), wall, found in zip(VIEWS, (floor, high[1], low[0]), outlines, strict=True):
+    for (first, second, sight, _), wall, found in zip(VIEWS, (floor, high[1], side), outlines, strict=True):
         for edges, style in ((found.boundary, _BOUNDARY), (found.hull, _HULL)):
             if len(edges):
                 lines = np.full((len(edges), 2, 3), wall)

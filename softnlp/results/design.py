@@ -207,11 +207,11 @@ def shown_outputs(done: Design) -> list[Output]:
 
 def _notes(done: Design) -> Iterator[tuple[str, str]]:
     """Yield what is to be said below the table, with a style."""
+    yield from ((line, "") for line in gravity_lines(done.setting.loads.gravity))
     for candidate in done.candidates:
         if not candidate.is_feasible:
             yield f"{candidate.number} {candidate.status}: {'; '.join(candidate.reasons)}", "bright_black"
     best = done.best
-    yield from ((line, "") for line in gravity_lines(done.setting.loads.gravity))
     if best is None:
         yield "no candidate is feasible", "red"
         return
