@@ -311,6 +311,10 @@ def test_a_browser_draws_it_in_place_and_asks_nobody_else(server: str, tmp_path:
         page.evaluate("document.body.classList.add('body--dark')")
         page.wait_for_function(f"{STAGE}.scene.background.r < 0.1")
         assert (pixels(page)[5, 5] < light - 0.5).all()
+        page.click("#hang")
+        page.wait_for_function(f"{STAGE}.camera.up.z === -1 && {STAGE}.camera.position.z < {STAGE}.controls.target.z")
+        page.click("#bend")
+        page.wait_for_function(f"{STAGE}.camera.up.z === 1 && {STAGE}.camera.position.z > {STAGE}.controls.target.z")
         browser.close()
     assert not [line for line in said if not line.startswith(("log", "debug", "info"))]
     assert asked

@@ -77,6 +77,7 @@ def page(dark: bool = False) -> None:
     with ui.row():
         ui.button("bend", on_click=lambda: view.show(frame(0.8))).props("id=bend")
         ui.button("load", on_click=lambda: view.show(frame(0.8, 0.03, loaded=True))).props("id=load")
+        ui.button("hang", on_click=lambda: view.show(frame_of(ARM, *shape(0.8), gravity=(0, 0, 9.8)))).props("id=hang")
         ui.button("round", on_click=turn_round).props("id=round")
         ui.button("cloud", on_click=cloud).props("id=cloud")
         ui.button("picture", on_click=picture).props("id=picture")
