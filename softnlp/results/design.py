@@ -188,7 +188,7 @@ def design_lines(done: Design) -> Group:
     for c in done.candidates:
         cells = [_digits(c.outputs.get(o.name), o.scale) for o in columns]
         style = "bold green" if c is done.best else "" if c.is_feasible else "bright_black"
-        table.add_row(str(c.number), label(done, c), c.status, *cells, style=style)
+        table.add_row(str(c.number), Text(label(done, c)), c.status, *cells, style=style)
     return Group(table, *(Text(line, style) for line, style in _notes(done)))
 
 
