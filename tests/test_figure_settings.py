@@ -21,7 +21,7 @@ from softnlp import ROBOTS, InputError
 from softnlp.cli.figures import draw
 from softnlp.plots import save_figure, section_figure
 from softnlp.plots.canvas import EAST_ASIAN, MissingGlyphs, OwnFigure, own_settings
-from softnlp.plots.style import drawn, new_figure
+from softnlp.plots.style import in_own_style, new_figure
 
 THEIRS: dict[Any, Any] = {
     "text.usetex": True,
@@ -43,7 +43,7 @@ def section(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return save_figure(section_figure(ROBOTS["D25L60"]), tmp_path_factory.mktemp("plain") / "s.png").read_bytes()
 
 
-@drawn
+@in_own_style
 def titled(title: str) -> Figure:
     return new_figure(4.0, 1.0, title, "")
 
@@ -63,7 +63,7 @@ def test_a_thread_waits_until_another_has_put_the_settings_back() -> None:
     before = dict(mpl.rcParams)
     entered: list[bool] = []
 
-    @drawn
+    @in_own_style
     def enter() -> None:
         entered.append(True)
 

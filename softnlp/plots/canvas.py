@@ -17,6 +17,7 @@ from matplotlib import rc_context, rcParamsDefault
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
+from matplotlib.ticker import LogFormatter, LogFormatterMathtext
 
 from softnlp.reading import one_line
 
@@ -75,7 +76,11 @@ class OwnFigure(Figure):
         FigureCanvasAgg(self)
 
     def draw(self, renderer: Any) -> None:
-        """Draw; characters that no font has are one warning."""
+        """Draw; characters that no font has are one warning, powers of ten are written without mathematics."""
+        for axis in (axis for axes in self.axes for axis in (axes.xaxis, axes.yaxis)):
+            if isinstance(axis.get_major_formatter(), LogFormatterMathtext):
+                axis.set_major_formatter(LogFormatter())
+                axis.set_minor_formatter(LogFormatter())
         with own_settings(), warnings.catch_warnings(record=True) as heard:
             warnings.simplefilter("always")
             super().draw(renderer)

@@ -27,7 +27,7 @@ from softnlp.plots.compare_parts import (
     shown_labels,
 )
 from softnlp.plots.compare_tips import tips_figure
-from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, drawn, new_figure, plain
+from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, in_own_style, new_figure, plain
 from softnlp.runner_compare import CompareTask
 from softnlp.units import BAR
 
@@ -80,7 +80,7 @@ def _times(task: CompareTask) -> list[Array]:
     return [task.time[[place for _, place in rows.places]] for rows in task.rows]
 
 
-@drawn
+@in_own_style
 def observable_figure(found: Comparison, name: str, title: str, times: list[Array] | None = None) -> Figure:
     """Draw one number measured: its curves, the mean error by robot, the errors as boxes.
 

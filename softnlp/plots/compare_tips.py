@@ -12,7 +12,7 @@ from softnlp.plots.boxes import draw_boxes
 from softnlp.plots.cloud import mark_size
 from softnlp.plots.compare_parts import LEGEND_ROW, MEASURED, Look, legend, legend_rows, looks, shown_labels
 from softnlp.plots.space import around, space_axes
-from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, drawn, new_figure, plain
+from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, in_own_style, new_figure, plain
 from softnlp.units import MILLIMETRE
 from softnlp.workspace.boundary import thinned
 
@@ -27,7 +27,7 @@ _MOST_SHOWN = 4_000
 _BINS = 24
 
 
-@drawn
+@in_own_style
 def tips_figure(found: Comparison, title: str) -> Figure:
     """Draw measured and simulated tips, and how far they are apart.
 

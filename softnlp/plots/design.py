@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softnlp.plots.section import draw_section, stretched_radii
-from softnlp.plots.style import COLOURS, GREY, INK, PALE, SMALL, TEXT, drawn, new_figure, plain, user_text
+from softnlp.plots.style import COLOURS, GREY, INK, PALE, SMALL, TEXT, in_own_style, new_figure, plain, user_text
 from softnlp.results.design import held_back, label, pressure_words
 from softnlp.studies.design import Design
 from softnlp.studies.design_candidate import Candidate
@@ -24,7 +24,7 @@ _BEST, _FEASIBLE = COLOURS[1], COLOURS[0]
 _WIDTH, _ROW, _HEAD = 11.5, 0.24, 1.3  # of the figure, of a bar and of what is around the bars [inch]
 
 
-@drawn
+@in_own_style
 def design_figure(done: Design) -> Figure:
     """Draw a design: bars of the objective, the objective against what is required, and the best one's section.
 

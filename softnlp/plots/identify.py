@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, colour, drawn, new_figure, plain, user_text
+from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, colour, in_own_style, new_figure, plain, user_text
 from softnlp.results.identify_document import UNITS
 from softnlp.studies.measurements import column_slice
 
@@ -26,7 +26,7 @@ _LABELS = {
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")  # one more than colours, so that pairs repeat late
 
 
-@drawn
+@in_own_style
 def tensile_figure(fit: TensileFit, name: str, before: Any = None) -> Figure:
     """Draw the test with every fitted law, R^2 in the legend, and what each law leaves.
 
@@ -64,7 +64,7 @@ def tensile_figure(fit: TensileFit, name: str, before: Any = None) -> Figure:
     return figure
 
 
-@drawn
+@in_own_style
 def identified_figure(found: Identified, title: str) -> Figure:
     """Draw the model before and after against what was measured, a panel an observable and a marker a robot."""
     shown = [key for key in UNITS if key in found.errors()]

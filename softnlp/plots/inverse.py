@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from softnlp.plots.abscissa import STEP, Abscissa
 from softnlp.plots.body import body_panel, frame
 from softnlp.plots.series import finish_panels, new_panels, series
-from softnlp.plots.style import GREY, INK, SMALL, WRONG, colour, drawn, new_figure, plain, powers_of_ten
+from softnlp.plots.style import GREY, INK, SMALL, WRONG, colour, in_own_style, new_figure, plain
 from softnlp.results import RunView, TargetView
 from softnlp.units import DEGREE, MILLIMETRE
 
@@ -24,7 +24,7 @@ _LEAST_LEFT = 1e-9  # [mm] or [deg]: below it what is left is drawn at the foot 
 _ARROW = 0.22  # of L_0
 
 
-@drawn
+@in_own_style
 def inverse_figure(view: RunView, targets: TargetView) -> Figure:
     """Draw a run of inverse kinematics.
 
@@ -88,7 +88,6 @@ def _left(axes: Axes, x: Abscissa, targets: TargetView) -> None:
             axes.plot(x.values, shown, mark, color=ink, markersize=3.5, label=f"{name} left")
     plain(axes, x.label, f"left: {', '.join(names)}" if len(names) == 1 else "left [mm], [deg]")
     axes.set_yscale("log")
-    powers_of_ten(axes.yaxis)
     everything = np.concatenate([targets.distance / MILLIMETRE, targets.angle / DEGREE, [_LEAST_LEFT]])
     axes.set_ylim(_LEAST_LEFT / 3, max(1e-3, 5 * float(np.nanmax(everything))))
     if len(names) > 1:

@@ -9,7 +9,7 @@ import numpy as np
 
 from softnlp.errors import InputError
 from softnlp.materials import Material
-from softnlp.plots.style import GREY, INK, SMALL, colour, drawn, new_figure, plain, user_text
+from softnlp.plots.style import GREY, INK, SMALL, colour, in_own_style, new_figure, plain, user_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,7 +28,7 @@ _COLUMNS, _LINE = 6, 0.25  # of the legends: entries a line, height of a line [i
 CLIP = 1.25  # panels reach this far beyond the fitted range's values
 
 
-@drawn
+@in_own_style
 def material_figure(materials: Sequence[Material], stretch_range: tuple[float, float] = (1.0, 2.2)) -> Figure:
     """Draw engineering stress, true stress and tangent modulus [kPa] against stretch.
 

@@ -9,7 +9,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from softnlp.errors import InputError
-from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, colour, drawn, ink_on, new_figure
+from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, colour, in_own_style, ink_on, new_figure
 from softnlp.robot import Robot, Violation, touching_stretch
 from softnlp.studies.step import SectionRadii
 from softnlp.units import MILLIMETRE
@@ -51,7 +51,7 @@ def stretched_radii(robot: Robot, stretch: float) -> SectionRadii:
     )
 
 
-@drawn
+@in_own_style
 def section_figure(robot: Robot, violations: Sequence[Violation] = (), stretch: float = 1.0) -> Figure:
     """Draw a robot's cross-section to scale with its dimensions, and beside it the section at a stretch other than 1.
 

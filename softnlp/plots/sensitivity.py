@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.plots.body import ELEVATION, frame, side_azimuth, tube
-from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, colour, drawn, new_figure, plain, user_text
+from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, colour, in_own_style, new_figure, plain, user_text
 from softnlp.results import Body
 from softnlp.results.sensitivity import shown
 from softnlp.studies.derivatives import entries_of
@@ -26,7 +26,7 @@ _SIZE = 0.3  # largest semi-axis of an ellipsoid drawn, of L_0
 _MOST_BARS = 10
 
 
-@drawn
+@in_own_style
 def sensitivity_figure(report: SensitivityReport, title: str) -> Figure:
     """Draw the shape with its ellipsoids, the tip's Jacobian, and what each tolerance, or 1 %, does to the tip.
 

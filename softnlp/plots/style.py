@@ -23,7 +23,6 @@ from softnlp.results import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 INK, GREY, PALE = "#222222", "#767676", "#DDDDDD"
@@ -39,15 +38,13 @@ _R = TypeVar("_R")
 def import_alone() -> None:
     """Import matplotlib without what the user has set for it, which may be broken: for commands, which draw alone.
 
-    Its backend and its file of settings are read once, at its import; a folder of settings it cannot use is made up for
-    elsewhere. For a program that calls this package the user's settings are the right ones, and come back after us.
+    Its backend and its file of settings are read once, at its import. What it then logs, of a folder that it cannot write
+    for instance, is left out. A program that calls this package imports matplotlib as it likes.
     """
     if "matplotlib" in sys.modules:
         return
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     before = dict(os.environ)
-    if folder := before.get("MPLCONFIGDIR"):
-        os.environ["MPLCONFIGDIR"] = os.path.abspath(folder)
     os.environ.update(MPLBACKEND="agg", MATPLOTLIBRC=os.devnull)
     try:
         with chdir(Path(__file__).parent):  # a matplotlibrc where the user stands counts before all others
@@ -57,7 +54,7 @@ def import_alone() -> None:
         os.environ.update(before)
 
 
-def drawn(function: Callable[_P, _R]) -> Callable[_P, _R]:
+def in_own_style(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Let a function make figures under the project's own settings; `new_figure` needs it."""
 
     @wraps(function)
@@ -88,14 +85,14 @@ def new_figure(width: float, height: float, title: str, subtitle: str) -> Figure
     Raises
     ------
     RuntimeError
-        Outside a function that is `drawn`.
+        Outside a function that is `in_own_style`.
     """
     from matplotlib import rcParams
 
     from softnlp.plots.canvas import OwnFigure
 
     if rcParams["text.parse_math"]:
-        raise RuntimeError("a function that makes a figure needs the decorator softnlp.plots.style.drawn")
+        raise RuntimeError("a function that makes a figure needs the decorator softnlp.plots.style.in_own_style")
     figure = OwnFigure(figsize=(width, height), dpi=DPI, facecolor="white")
     left = 0.18 / width
     title, subtitle = (_heading(text, int(width * n)) for text, n in ((title, 8.0), (subtitle, 12.5)))
@@ -133,14 +130,6 @@ def plain(axes: Axes, x_label: str, y_label: str) -> None:
         axes.spines[side].set_visible(False)
     for side in ("left", "bottom"):
         axes.spines[side].set_color(GREY)
-
-
-def powers_of_ten(axis: Axis) -> None:
-    """Write the numbers of a logarithmic axis without mathematics, of which figures show none on their axes."""
-    from matplotlib.ticker import LogFormatter
-
-    axis.set_major_formatter(LogFormatter())
-    axis.set_minor_formatter(LogFormatter())
 
 
 def listed(words: Sequence[str]) -> str:

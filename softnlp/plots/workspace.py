@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from softnlp.plots.body import disc
 from softnlp.plots.cloud import VIEWS, Outline, mark_size, outline, seen, shown
 from softnlp.plots.space import space_axes
-from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, drawn, new_figure, plain, powers_of_ten
+from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, in_own_style, new_figure, plain
 from softnlp.units import MILLIMETRE
 from softnlp.workspace.read import Column, Workspace, read_column
 from softnlp.workspace.summary import parameters
@@ -29,7 +29,7 @@ _AXES = "xyz"
 _WIDTH, _HEIGHT = 11.0, 7.6
 
 
-@drawn
+@in_own_style
 def workspace_figure(workspace: Workspace, colour: str = COLOUR) -> Figure:
     """Draw where the tip goes: all poses in 3-D and seen along each axis.
 
@@ -209,12 +209,9 @@ def _projection(
 def _colour_bar(figure: Figure, column: Column, scale: Any) -> None:
     """Say what the colours mean, above the 3-D panel."""
     from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import LogNorm
 
     axes = figure.add_axes((0.05, 0.862, 0.36, 0.018))
     bar = figure.colorbar(ScalarMappable(scale, _MAP), cax=axes, orientation="horizontal")
-    if isinstance(scale, LogNorm):
-        powers_of_ten(bar.ax.xaxis)
     bar.outline.set_visible(False)
     bar.ax.tick_params(labelsize=SMALL, colors=INK, color=GREY)
     bar.set_label(column_label(column), size=TEXT, color=INK)
