@@ -16,6 +16,7 @@ import pytest
 from matplotlib.text import Text
 
 from softnlp.cli import main
+from softnlp.cli.console import say_rows
 from softnlp.cli.sweep import _bar
 from softnlp.plots.canvas import OwnFigure
 from softnlp.plots.style import user_text
@@ -212,6 +213,11 @@ def test_a_label_is_one_printable_line_of_a_few_words() -> None:
     assert user_text("two\nlines\tand \x1b[31m") == "two lines and \\x1b[31m"
     assert user_text("_hidden from legends") == " _hidden from legends"
     assert user_text(1000 * "x", 12) == 11 * "x" + "…"
+
+
+def test_a_row_of_a_table_is_a_line_whatever_is_in_it(capsys: pytest.CaptureFixture[str]) -> None:
+    say_rows(["name", "number"], [["[red]two\nlines\x1b[31m", "1"]])
+    assert capsys.readouterr().out.splitlines()[1:] == [r"[red]two\nlines\x1b[31m       1"]
 
 
 def test_the_bar_of_a_sweep_shows_any_title(monkeypatch: pytest.MonkeyPatch) -> None:

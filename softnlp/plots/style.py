@@ -38,7 +38,7 @@ _R = TypeVar("_R")
 def import_alone() -> None:
     """Import matplotlib without what the user has set for it, which may be broken: for commands, which draw alone.
 
-    Its backend and its file of settings are read once, at its import. What it then logs, of a folder that it cannot write
+    Its backend and its file of settings are read once, at its import. What it logs, of a folder that it cannot write
     for instance, is left out. A program that calls this package imports matplotlib as it likes.
     """
     if "matplotlib" in sys.modules:
