@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softnlp.plots.style import GREY, INK, SMALL, in_own_style, new_figure, save_figure
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.image import AxesImage
@@ -20,10 +22,9 @@ if TYPE_CHECKING:
 _MESSAGES = 4  # of each way, the most frequent
 
 
+@in_own_style
 def figure(poses: Sequence[Tried], buckling: float, path: Path) -> None:
     """Draw one panel a way: the share of directions solved, with the median iterations of those."""
-    from softnlp.plots.style import GREY, INK, SMALL, new_figure, save_figure
-
     names = [outcome.method for outcome in poses[0].outcomes]
     each = len({pose.direction for pose in poses if (pose.pressure_bar, pose.force) == _cell(poses[0])})
     drawn = new_figure(

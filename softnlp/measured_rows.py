@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from softnlp.columns import Columns
 from softnlp.errors import nearest
 from softnlp.pressures import HIGHEST_BAR, UNIT_HINT
-from softnlp.reading import shown
+from softnlp.reading import one_line, shown
 from softnlp.robot import ROBOTS, Robot
 from softnlp.units import BAR, DEGREE, MILLIMETRE
 
@@ -98,7 +98,7 @@ def rows_by_robot(
         for k, name in enumerate(columns.text("robot")):
             robot = _named(name, own, columns, k) if name else unnamed(columns, k)
             found.setdefault((name or robot.name, id(robot)), (robot, []))[1].append((columns, k))
-    return [RobotRows(robot, label, tuple(places)) for (label, _), (robot, places) in found.items()]
+    return [RobotRows(robot, one_line(label), tuple(places)) for (label, _), (robot, places) in found.items()]
 
 
 def _named(name: str, own: Mapping[str, Robot], columns: Columns, row: int) -> Robot:

@@ -16,7 +16,9 @@ from nicegui import ui
 from nicegui.testing import User
 
 from softnlp import Coefficients, forward, material, robot
+from softnlp.app.parts import Chart
 from softnlp.app.session import LARGEST_FILE
+from softnlp.app.stage import Stage
 from softnlp.app.tabs.identify import identify_tab
 from softnlp.app.tabs.identify_table import LETTERS, bounds_of, first_free, with_bound, with_free
 from softnlp.scenario import scenario_from_text
@@ -142,3 +144,19 @@ async def _tensile() -> None:
 
 def test_a_tensile_test_gives_a_silicone() -> None:
     done(_tensile())
+
+
+async def _named_traces() -> None:
+    trace = {"x": [0, 1], "y": [0, 1], "name": "<b>law</b> & $x_%{y}"}
+
+    def tab(stage: Stage) -> None:
+        Chart("a.chart", "x", "y").show([trace, {"x": [0], "y": [1]}])
+
+    async with opened(tab, "identify") as (user, _):
+        shown = field(user, "a.chart").figure["data"]
+    assert shown[0]["name"] == "&lt;b>law&lt;/b> &amp; $x_％{y}"
+    assert shown[1]["name"] == ""
+
+
+def test_the_names_of_a_chart_are_no_markup() -> None:
+    done(_named_traces())

@@ -329,6 +329,12 @@ def test_an_interrupted_move_leaves_the_old_file(tmp_path: Path, monkeypatch: py
     assert os.listdir(tmp_path) == ["a.txt"]
 
 
+def test_a_figure_that_fails_leaves_the_numbers(mixed: Run, tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError):
+        save(mixed, tmp_path, figure=lambda view: 1 // 0)
+    assert sorted(os.listdir(tmp_path)) == ["results.json", "results.nc", "table.csv", "versions.json"]
+
+
 def test_save_where_nothing_can_be_written(tmp_path: Path) -> None:
     run = ramp_run(2)
     (tmp_path / "file").write_text("mine")

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 from docs.figures._shared import SCENARIOS
 from softnlp import BAR, DEGREE, Loads, load_scenario, run_scenario
-from softnlp.plots.style import SMALL, colour, new_figure, plain
+from softnlp.plots.style import SMALL, colour, in_own_style, new_figure, plain
 
 
+@in_own_style
 def figure():
     """Draw the three curves."""
     standing, hanging = (load_scenario(SCENARIOS / f"D15L60_{how}.toml") for how in ("standing", "hanging"))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.app.theme import figure_config, figure_layout
+from softnlp.app.theme import figure_config, figure_layout, figure_text
 from softnlp.materials import Material
 from softnlp.plots.style import colour
 
@@ -100,7 +100,7 @@ def _curve(
     return {
         "type": "scatter",
         "mode": "lines",
-        "name": f"<b>{_plain(name)}</b>" if bold else _plain(name),
+        "name": f"<b>{figure_text(name)}</b>" if bold else figure_text(name),
         "x": [float(f"{v:.5g}") for v in x],
         "y": _values(material, x, measure),
         "line": {
@@ -109,7 +109,7 @@ def _curve(
             "dash": "solid" if bold else _DASHES.get(law, "solid"),
         },
         "opacity": 1.0 if bold or dark else 0.85,
-        "hovertemplate": "%{y:.4g} kPa at %{x:.3f}<extra>" + _plain(name) + "</extra>",
+        "hovertemplate": "%{y:.4g} kPa at %{x:.3f}<extra>" + figure_text(name) + "</extra>",
     }
 
 
@@ -156,8 +156,3 @@ def _reach(materials: list[Material], x: NDArray[np.float64], measure: str) -> l
 def _values(material: Material, x: NDArray[np.float64], measure: str) -> list[float | None]:
     values = np.asarray(getattr(material, measure)(x)) / KILOPASCAL
     return [float(f"{v:.5g}") if np.isfinite(v) and abs(v) < _LARGEST else None for v in np.ravel(values)]
-
-
-def _plain(text: str) -> str:
-    """Return a person's text without what plotly would read as markup."""
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace("%", "％")[:40]

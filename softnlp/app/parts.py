@@ -12,7 +12,7 @@ from nicegui import events, ui
 
 from softnlp.app.job import Progress, Stopped, in_background
 from softnlp.app.session import LARGEST_FILE
-from softnlp.app.theme import darkness, figure_config, figure_layout, on_dark
+from softnlp.app.theme import darkness, figure_config, figure_layout, figure_text, on_dark
 from softnlp.errors import InputError, SoftnlpError
 
 T = TypeVar("T")
@@ -203,8 +203,10 @@ class Chart:
     def show(
         self, traces: Sequence[Mapping[str, Any]], *, x_label: str | None = None, y_label: str | None = None
     ) -> None:
-        """Show traces, as plotly has them."""
+        """Show traces, as plotly has them; their names may be a person's."""
         self._traces = [dict(trace) for trace in traces]
+        for trace in self._traces:
+            trace["name"] = figure_text(trace.get("name", ""))
         self._labels = (x_label or self._labels[0], y_label or self._labels[1])
         self._place.set_visibility(bool(traces))
         if traces and self._plot is None:  # plotly cannot draw where nothing is shown

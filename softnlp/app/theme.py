@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ElementFilter, ui
 
-from softnlp.plots.style import COLOURS, WRONG
+from softnlp.plots.style import COLOURS, WRONG, user_text
 
 _BLUE, _VERMILION, _GREEN, _, _ORANGE, _SKY, _ = COLOURS
 _STYLE = f"""
@@ -49,6 +49,11 @@ def figure_layout(dark: bool) -> dict[str, Any]:
         "legend": {"orientation": "h", "y": 1.12},
         "margin": {"l": 48, "r": 8, "t": 8, "b": 40},
     }
+
+
+def figure_text(text: str) -> str:
+    """Return a person's text without what plotly would read as markup."""
+    return user_text(text).replace("&", "&amp;").replace("<", "&lt;").replace("%", "％")
 
 
 def figure_config() -> dict[str, Any]:

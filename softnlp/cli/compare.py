@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import json as json_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
+from softnlp.cli.figures import draw
 from softnlp.gravity import gravity_lines
 
 if TYPE_CHECKING:
@@ -147,8 +147,8 @@ def _complain_of_lost(found: Comparison) -> None:
 
 
 def _write(folder: Path, task: CompareTask, found: Comparison, document: str) -> None:
-    """Write everything, each file whole, after all of it is made."""
-    from softnlp.plots.compare import compare_figures
+    """Write the numbers, each file whole, after all of them are made, and then the figures."""
+    from softnlp.plots.compare import figure_makers
     from softnlp.results.comparison import rows_text, summary_text
     from softnlp.results.files import make_folder, write_whole
     from softnlp.results.inputs import versions
@@ -161,10 +161,7 @@ def _write(folder: Path, task: CompareTask, found: Comparison, document: str) ->
         "scenario.toml": task.scenario.text.encode(),
         "measured.csv": task.text.encode(),
     }
-    for name, figure in compare_figures(task, found).items():
-        png = io.BytesIO()
-        figure.savefig(png, format="png")
-        contents[f"{name}.png"] = png.getvalue()
     make_folder(folder)
     for name, content in contents.items():
         write_whole(folder / name, content)
+    draw({folder / f"{name}.png": figure for name, figure in figure_makers(task, found).items()}, folder)

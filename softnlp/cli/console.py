@@ -46,8 +46,8 @@ def complain(message: str) -> None:
 
 
 def say_rows(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print aligned columns of plain text, which pipes well; numbers to the right."""
-    table = [list(header), *map(list, rows)]
+    """Print aligned columns of plain text, which pipes well; numbers to the right, a row a line whatever is in it."""
+    table = [[one_line(cell) for cell in row] for row in (header, *rows)]
     widths = [max(len(row[k]) for row in table) for k in range(len(header))]
     numeric = [all(_is_number(row[k]) for row in rows) for k in range(len(header))]
     lines = []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json as json_module
 import os
 import tomllib
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say
+from softnlp.cli.figures import draw
 from softnlp.cli.folder import require_writable
 from softnlp.errors import InputError
 
@@ -101,7 +101,7 @@ def _solve(asked: Scenario, workers: int | None) -> tuple[Design, bool]:
 
 
 def _write(done: Design, folder: Path, asked: Scenario) -> None:
-    """Write everything; made before the first file is written, so that an error leaves no half of new results."""
+    """Write the numbers, made before the first file is written so that an error leaves no half, and the figure."""
     from softnlp.plots.design import design_figure
     from softnlp.results.design import best_scenario, design_csv, design_json
     from softnlp.results.files import make_folder, write_whole
@@ -110,12 +110,9 @@ def _write(done: Design, folder: Path, asked: Scenario) -> None:
     given = tomllib.loads(asked.text)
     if "file" in given["material"]:  # its path counted from the folder of the scenario
         given["material"]["file"] = str((asked.path.parent / given["material"]["file"]).resolve())
-    png = io.BytesIO()
-    design_figure(done).savefig(png, format="png")
     contents = {
         "design.json": design_json(done).encode(),
         "table.csv": design_csv(done).encode(),
-        "figure.png": png.getvalue(),
         "versions.json": (json_module.dumps(versions(), indent=2) + "\n").encode(),
         "scenario.toml": asked.text.encode(),
     }
@@ -127,6 +124,7 @@ def _write(done: Design, folder: Path, asked: Scenario) -> None:
         (folder / "best.toml").unlink(missing_ok=True)
     for name, content in contents.items():
         write_whole(folder / name, content)
+    draw({folder / "figure.png": lambda: design_figure(done)}, folder)
 
 
 def _table(done: Design) -> str:

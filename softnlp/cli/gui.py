@@ -24,6 +24,9 @@ def gui(scenario: Path | None = None, /, *, port: int | None = None, no_browser:
     missing = [name for name in ("nicegui", "plotly", "tomlkit") if find_spec(name) is None]
     if missing:
         raise InputError(f"the app needs {', '.join(missing)}: pip install 'softnlp[gui]'")
+    from softnlp.plots.style import import_alone
+
+    import_alone()
     from softnlp.app.server import serve
 
     serve(scenario, port, not no_browser)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import io
 import json as json_module
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say, say_rows
+from softnlp.cli.figures import draw
 from softnlp.errors import InputError
 from softnlp.gravity import gravity_lines
 
@@ -85,7 +86,7 @@ def _tensile(asked: Scenario, folder: Path | None, json: bool) -> int:
             "table.csv": tensile_table_text(task, fit),
             "material.toml": material_file_text(task, fit),
         }
-        _write(folder, asked, texts, tensile_figure(fit, task.name, task.before))
+        _write(folder, asked, texts, partial(tensile_figure, fit, task.name, task.before))
     if json:
         say(document.rstrip("\n"))
     else:
@@ -140,7 +141,7 @@ def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
             from softnlp.plots import identified_figure
 
             texts["identified.toml"] = identified_text(asked, found)
-            figure = identified_figure(found, asked.title)
+            figure = partial(identified_figure, found, asked.title)
         _write(folder, asked, texts, figure)
     if json:
         say(document.rstrip("\n"))
@@ -215,18 +216,16 @@ def _sigma_text(found: Identified, key: str) -> str:
     return f"{low:.3g}" if high <= low * 1.0001 else f"{low:.3g} to {high:.3g}"
 
 
-def _write(folder: Path, asked: Scenario, texts: Mapping[str, str], figure: Figure | None) -> None:
-    """Write everything, each file whole, after all of it is made."""
+def _write(folder: Path, asked: Scenario, texts: Mapping[str, str], figure: Callable[[], Figure] | None) -> None:
+    """Write the numbers, each file whole, after all of them are made, and then the figure."""
     from softnlp.results.files import make_folder, write_whole
     from softnlp.results.inputs import versions
 
     contents: dict[str, Any] = {name: text.encode() for name, text in texts.items()}
     contents["versions.json"] = (json_module.dumps(versions(), indent=2) + "\n").encode()
     contents["scenario.toml"] = asked.text.encode()
-    if figure is not None:
-        png = io.BytesIO()
-        figure.savefig(png, format="png")
-        contents["figure.png"] = png.getvalue()
     make_folder(folder)
     for name, content in contents.items():
         write_whole(folder / name, content)
+    if figure is not None:
+        draw({folder / "figure.png": figure}, folder)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from softnlp.cli.console import say
+from softnlp.cli.console import SOLVED, SOME_UNSOLVED, say
+from softnlp.cli.figures import draw
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def plot_section(robot: str, /, *, stretch: float = 1.0, out: Path | None = None) -> None:
+def plot_section(robot: str, /, *, stretch: float = 1.0, out: Path | None = None) -> int:
     """Draw a cross-section to scale, its sets coloured and the rules that it breaks marked.
 
     Parameters
@@ -34,7 +36,7 @@ def plot_section(robot: str, /, *, stretch: float = 1.0, out: Path | None = None
         made = library_robot(robot)
         broken = violations(made)
     name = "".join(c if c.isalnum() or c in "-_." else "-" for c in made.name)
-    _save(section_figure(made, broken, stretch), out or Path(f"section-{name}.png"))
+    return _save(lambda: section_figure(made, broken, stretch), out or Path(f"section-{name}.png"))
 
 
 def plot_material(
@@ -43,7 +45,7 @@ def plot_material(
     file: Path | None = None,
     stretch: float = 2.2,
     out: Path = Path("materials.png"),
-) -> None:
+) -> int:
     """Draw stress and tangent modulus against stretch.
 
     Parameters
@@ -67,10 +69,10 @@ def plot_material(
     for name in names or tuple(entries):
         laws = tuple(entries[name].models) if "all" in law and name in entries else law
         chosen += [material(name, model, file=file) for model in laws]
-    _save(material_figure(chosen, (1.0, stretch)), out)
+    return _save(lambda: material_figure(chosen, (1.0, stretch)), out)
 
 
-def plot_run(results: Path, /, *, out: Path | None = None) -> None:
+def plot_run(results: Path, /, *, out: Path | None = None) -> int:
     """Draw the results of a run again: shapes, bending angle and elongation.
 
     Parameters
@@ -84,11 +86,13 @@ def plot_run(results: Path, /, *, out: Path | None = None) -> None:
     from softnlp.results import load_run
 
     folder = results if results.is_dir() else results.parent
-    _save(run_figure(load_run(results)), out or folder / "figure.png")
+    view = load_run(results)
+    return _save(lambda: run_figure(view), out or folder / "figure.png")
 
 
-def _save(figure: Figure, path: Path) -> None:
-    """Write a figure and say where."""
-    from softnlp.plots import save_figure
-
-    say(f"drawn in {save_figure(figure, path)}")
+def _save(figure: Callable[[], Figure], path: Path) -> int:
+    """Write a figure and say where; return the exit status."""
+    written = draw({path: figure})
+    for drawn in written:
+        say(f"drawn in {drawn}")
+    return SOLVED if written else SOME_UNSOLVED

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say
+from softnlp.cli.figures import draw
 from softnlp.cli.folder import require_writable
 from softnlp.contact_settings import ContactTask
 from softnlp.errors import InputError
@@ -116,9 +117,10 @@ def _solve(asked: Scenario, branches: int) -> tuple[Run, bool]:
 def _write(done: Run, folder: Path, asked: Scenario) -> None:
     """Write results and figure."""
     from softnlp.plots import run_figure
-    from softnlp.results import save
+    from softnlp.results import save, view_of_run
 
-    save(done, folder, scenario_text=asked.text, figure=run_figure)
+    save(done, folder, scenario_text=asked.text)
+    draw({folder / "figure.png": lambda: run_figure(view_of_run(done))}, folder)
 
 
 def _table(done: Run) -> str:

@@ -8,6 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
+from softnlp.cli.figures import draw
 from softnlp.errors import InputError
 from softnlp.gravity import gravity_lines
 
@@ -77,16 +78,12 @@ def sensitivity(
     document = sensitivity_document(report, asked.title, chosen)
     folder = out if out is not None or json else Path("results") / scenario.stem
     if folder is not None:
-        import io
-
         from softnlp.plots.sensitivity import sensitivity_figure
         from softnlp.results.files import make_folder, write_whole
 
-        png = io.BytesIO()
-        sensitivity_figure(report, f"{asked.title}, step {chosen}").savefig(png, format="png")
         kept = make_folder(folder)
         write_whole(kept / "sensitivity.json", document_text(document).encode())
-        write_whole(kept / "sensitivity.png", png.getvalue())
+        draw({kept / "sensitivity.png": lambda: sensitivity_figure(report, f"{asked.title}, step {chosen}")}, folder)
     if json:
         say(document_text(document).rstrip("\n"))
     elif report.solved:

@@ -235,11 +235,18 @@ def _bar(title: str) -> Iterator[_Bar | _NoBar]:
 
     def begin() -> Any:
         from rich.console import Console
-        from rich.markup import escape
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            Progress,
+            RenderableColumn,
+            TextColumn,
+            TimeRemainingColumn,
+        )
+        from rich.text import Text
 
         columns = (
-            TextColumn(escape(title)),
+            RenderableColumn(Text(title)),
             BarColumn(),
             MofNCompleteColumn(),
             TextColumn("{task.fields[rate]}"),

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, progress, say
+from softnlp.cli.figures import draw
 from softnlp.errors import InputError
 from softnlp.gravity import gravity_lines
 from softnlp.units import BAR, DEGREE, MILLIMETRE
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from softnlp.workspace.boundary import Boundary
     from softnlp.workspace.comparison import Comparison
     from softnlp.workspace.measured import Measured
@@ -62,18 +65,18 @@ def workspace(
     csv
         Write all poses to this CSV file as well.
     """
-    from softnlp.plots import save_figure
+    from softnlp.plots.comparison import comparison_figure
     from softnlp.plots.dexterity import dexterity_figure
     from softnlp.plots.workspace import workspace_figure
     from softnlp.workspace.export import export_csv
-    from softnlp.workspace.read import load_workspace
+    from softnlp.workspace.read import load_workspace, read_column
     from softnlp.workspace.summary import summarise
 
     for key, value in (("--voxel-mm", voxel_mm), ("--radius-mm", radius_mm)):
         if value is not None and not (np.isfinite(value) and value > 0):
             raise InputError(f"expected a number above 0, got {value:g}", key=key)
     found = load_workspace(results)
-    figure = workspace_figure(found, colour)
+    read_column(found, colour)  # refused before anything is written
     compared = None if against is None else _compared(found, against, within_bar)
     summary = summarise(
         found,
@@ -82,14 +85,15 @@ def workspace(
     )
     cloud, others = _places(found, out)
     say("\n".join(_aligned(_summary_rows(found, summary))))
-    written = [save_figure(figure, cloud)]
-    if summary.dexterity is not None:
-        drawn = dexterity_figure(summary.dexterity, found.title, found.robot.name)
-        written.append(save_figure(drawn, others("dexterity", cloud.suffix)))
-    if compared is not None:
-        written += _write_comparison(found, *compared, others("comparison", cloud.suffix), others("comparison", ".csv"))
+    written = [] if compared is None else [_write_comparison(*compared, others("comparison", ".csv"))]
     if csv is not None:
         written.append(export_csv(found, csv))
+    figures: dict[Path, Callable[[], Figure]] = {cloud: lambda: workspace_figure(found, colour)}
+    if (dexterity := summary.dexterity) is not None:
+        figures[others("dexterity", cloud.suffix)] = lambda: dexterity_figure(dexterity, found.title, found.robot.name)
+    if compared is not None:
+        figures[others("comparison", cloud.suffix)] = lambda: comparison_figure(found, compared[0])
+    written += draw(figures, found.file.parent)
     say("\n".join(f"written to {path}" for path in written))
     asked_in_vain = compared is not None and compared[1] is not None and compared[0].unsolved
     return SOME_UNSOLVED if asked_in_vain else SOLVED
@@ -138,12 +142,8 @@ def _compared(found: Workspace, against: Path, within_bar: float) -> tuple[Compa
         return compare_measured(found, measured, within=within, progress=told), measured
 
 
-def _write_comparison(
-    found: Workspace, compared: Comparison, measured: Measured | None, drawn: Path, table: Path
-) -> list[Path]:
-    """Print and write a comparison; return the files."""
-    from softnlp.plots import save_figure
-    from softnlp.plots.comparison import comparison_figure
+def _write_comparison(compared: Comparison, measured: Measured | None, table: Path) -> Path:
+    """Print and write a comparison; return the file."""
     from softnlp.results.files import placed_whole
     from softnlp.workspace.comparison import comparison_rows
 
@@ -153,7 +153,7 @@ def _write_comparison(
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         writer.writerows(rows)
-    return [save_figure(comparison_figure(found, compared), drawn), table]
+    return table
 
 
 def _aligned(rows: Iterator[tuple[str, str]]) -> list[str]:

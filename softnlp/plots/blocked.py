@@ -24,7 +24,7 @@ from softnlp.plots.body import (
     tube,
 )
 from softnlp.plots.series import finish_panels, new_panels, series
-from softnlp.plots.style import GREY, INK, SMALL, colour, new_figure, step_colours
+from softnlp.plots.style import GREY, INK, SMALL, colour, in_own_style, new_figure, step_colours
 from softnlp.results import Body, ContactView, RunView
 from softnlp.units import DEGREE, MILLIMETRE
 
@@ -42,6 +42,7 @@ _ARROW = 0.32  # of L_0
 _ALONG_X = 1e-9  # a normal this near to x
 
 
+@in_own_style
 def blocked_figure(view: RunView, contact: ContactView, measured: Sequence[tuple[float, float]] = ()) -> Figure:
     """Draw a blocked force; `measured` is (pressure [Pa] or offset [m], force [N]), whichever was varied.
 

@@ -279,7 +279,7 @@ def draw_arrow(
     place, away = ("center", 0.22) if abs(sideways) < 0.4 else ("left" if sideways > 0 else "right", 0.05)
     end = start - away * step if at_tail else start + (1 + away) * step
     halo = [withStroke(linewidth=2.5, foreground="white")]
-    axes.text(*end, text, size=TEXT, color=ink, zorder=8, ha=place, va="center", path_effects=halo)
+    axes.text(*end, text, size=TEXT, color=ink, zorder=8, ha=place, va="center", path_effects=halo, parse_math=True)
     return [start[None], end[None]]
 
 

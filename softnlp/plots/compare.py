@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,9 +13,21 @@ from numpy.typing import NDArray
 from softnlp.evaluation.comparison import Comparison
 from softnlp.evaluation.observed import NUMBERS, OBSERVABLES
 from softnlp.evaluation.statistics import USED, groups
-from softnlp.plots.compare_parts import LEGEND_ROW, MEASURED, Look, bars, box_labels, boxes, legend, legend_rows, looks
+from softnlp.plots.compare_parts import (
+    LEGEND_ROW,
+    MEASURED,
+    Look,
+    bars,
+    box_labels,
+    boxes,
+    legend,
+    legend_rows,
+    looks,
+    robot_label,
+    shown_labels,
+)
 from softnlp.plots.compare_tips import tips_figure
-from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, new_figure, plain
+from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, in_own_style, new_figure, plain
 from softnlp.runner_compare import CompareTask
 from softnlp.units import BAR
 
@@ -46,12 +60,18 @@ class _Panel:
 
 def compare_figures(task: CompareTask, found: Comparison) -> dict[str, Figure]:
     """Return the figures of a comparison by name: one of each number measured, and "tips" of tip positions."""
-    made: dict[str, Figure] = {}
-    if "tip_position" in found.observables:
-        made["tips"] = tips_figure(found, task.scenario.title)
+    return {name: figure() for name, figure in figure_makers(task, found).items()}
+
+
+def figure_makers(task: CompareTask, found: Comparison) -> dict[str, Callable[[], Figure]]:
+    """Return what draws each of the `compare_figures`, by name."""
+    title, times = task.scenario.title, _times(task)
+    made: dict[str, Callable[[], Figure]] = {}
     for name in found.main_observables:
-        if name != "tip_position":
-            made[name] = observable_figure(found, name, task.scenario.title, _times(task))
+        if name == "tip_position":
+            made["tips"] = partial(tips_figure, found, title)
+        else:
+            made[name] = partial(observable_figure, found, name, title, times)
     return made
 
 
@@ -60,6 +80,7 @@ def _times(task: CompareTask) -> list[Array]:
     return [task.time[[place for _, place in rows.places]] for rows in task.rows]
 
 
+@in_own_style
 def observable_figure(found: Comparison, name: str, title: str, times: list[Array] | None = None) -> Figure:
     """Draw one number measured: its curves, the mean error by robot, the errors as boxes.
 
@@ -80,7 +101,7 @@ def observable_figure(found: Comparison, name: str, title: str, times: list[Arra
     foot = 0.12 + LEGEND_ROW * lines
     left = 2.05 * rows if curved else 0.5 + 0.3 * len(lanes)
     height = 0.8 + foot + max(4.0, left, 2.6 + 0.26 * len(found.variants))
-    robots = [o.label for k, o in enumerate(found.observed) if found.measured(name, k)]
+    robots = [robot_label(found, k) for k in range(len(found.observed)) if found.measured(name, k)]
     subtitle = [", ".join(robots), found.variants[0].material.name, f"{found.measured(name):,} measured"]
     best = found.best_of(name)
     if best is not None and len(found.variants) > 1:
@@ -91,7 +112,9 @@ def observable_figure(found: Comparison, name: str, title: str, times: list[Arra
     if curved:
         _curves(figure, found, name, panels, made, (columns, rows), (bottom, top))
     else:
-        axes = figure.add_axes((1.75 / _WIDTH, bottom, (_LEFT - 1.95) / _WIDTH, top - bottom))
+        longest = max(len(robot_label(found, panel.robot)) for panel, _ in lanes)
+        edge = 1.75 + 0.066 * max(0, longest - len("D25L60"))
+        axes = figure.add_axes((edge / _WIDTH, bottom, (_LEFT - 0.2 - edge) / _WIDTH, top - bottom))
         _measurements(axes, found, name, lanes, made)
     drawn = len(panels) if curved else len(lanes)
     if drawn < count:
@@ -117,7 +140,7 @@ def _handles(found: Comparison, made: list[Look], curved: bool) -> list[Any]:
     measured.set_label(MEASURED)
     lines = [
         Line2D([], [], color=look.colour, linestyle=look.line, linewidth=1.8, label=label)
-        for look, label in zip(made, found.labels, strict=True)
+        for look, label in zip(made, shown_labels(found), strict=True)
     ]
     return [measured, *lines]
 
@@ -127,7 +150,7 @@ def _handles(found: Comparison, made: list[Look], curved: bool) -> list[Any]:
 
 def _panels(found: Comparison, name: str, robot: int, time: Array | None) -> list[_Panel]:
     """Return the panels of a robot; rows at rest begin the curve of each combination of sets."""
-    o = found.observed[robot]
+    o, name_of_robot = found.observed[robot], robot_label(found, robot)
     kept = np.flatnonzero(np.isfinite(o.values[:, NUMBERS.index(name)]))
     P = o.pressure[kept]
     if not len(kept):
@@ -137,14 +160,14 @@ def _panels(found: Comparison, name: str, robot: int, time: Array | None) -> lis
     some = used[~rest]
     if np.any(np.nanmax(some, axis=1, initial=0.0) - np.nanmin(some, axis=1, initial=np.inf) > USED):
         if time is not None and np.isfinite(time[kept]).all():
-            return [_Panel(robot, o.label, kept, time[kept], "time [s]")]
-        return [_Panel(robot, o.label, kept, np.arange(1.0, len(kept) + 1), "row")]
+            return [_Panel(robot, name_of_robot, kept, time[kept], "time [s]")]
+        return [_Panel(robot, name_of_robot, kept, np.arange(1.0, len(kept) + 1), "row")]
     combinations = [(words, mask) for words, mask in groups(P) if not rest[mask].all()] or [("no set", rest)]
     made = []
     for words, mask in combinations:
         own = mask | rest
         order = np.argsort(P[own].max(axis=1), kind="stable")
-        title = o.label if len(combinations) == 1 else f"{o.label}, {words}"
+        title = name_of_robot if len(combinations) == 1 else f"{name_of_robot}, {words}"
         x = P[own].max(axis=1)[order] / BAR
         made.append(_Panel(robot, title, kept[own][order], x, f"pressure of {words} [bar]"))
     return made
@@ -225,7 +248,7 @@ def _measurements(axes: Axes, found: Comparison, name: str, lanes: list[tuple[_P
     step = 0.62 / max(len(made), 2)
     for y, (panel, row) in enumerate(lanes):
         o = found.observed[panel.robot]
-        names.append(f"{o.label}, {_pressed(o.pressure[row])}")
+        names.append(f"{robot_label(found, panel.robot)}, {_pressed(o.pressure[row])}")
         measured = o.values[row, column] / what.scale
         axes.axhline(y, color=PALE, linewidth=0.8, zorder=0)
         for v, look in enumerate(made):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from softnlp.evaluation.comparison import Comparison
 from softnlp.evaluation.observed import OBSERVABLES
 from softnlp.plots.boxes import draw_boxes
-from softnlp.plots.style import COLOURS, GREY, INK, SMALL, WRONG, colour, plain
+from softnlp.plots.style import COLOURS, GREY, INK, SMALL, WRONG, colour, plain, user_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,6 +26,7 @@ _HATCHES = ("", "////", "....", "xxxx", "----", "\\\\\\\\")
 MEASURED = "measured"
 LEGEND_ROW = 0.2  # [inch]
 _LABEL_WIDTH, _MOST_WRAPPED = 24, 8
+_LONGEST_LABEL, _LONGEST_ROBOT = 72, 24  # characters of a variant's label and of a robot's
 _NOTE_WIDTH = 4.4  # [inch]
 _WIDEST_BAR = 0.3
 _NOTE = "boxes: quartiles and median, diamonds: mean"
@@ -53,9 +54,19 @@ def looks(found: Comparison) -> list[Look]:
     return made
 
 
+def shown_labels(found: Comparison) -> list[str]:
+    """Return the labels of the variants as figures show them."""
+    return [user_text(label, _LONGEST_LABEL) for label in found.labels]
+
+
+def robot_label(found: Comparison, robot: int) -> str:
+    """Return the label of a robot as figures show it."""
+    return user_text(found.observed[robot].label, _LONGEST_ROBOT)
+
+
 def legend_rows(found: Comparison, width: float) -> tuple[int, int]:
     """Return (columns, rows) of a legend of the variants and the measurement on a figure so wide [inch]."""
-    longest = max(len(label) for label in [*found.labels, MEASURED])
+    longest = max(len(label) for label in [*shown_labels(found), MEASURED])
     columns = max(1, min(len(found.labels) + 1, int((width - _NOTE_WIDTH) / (0.75 + 0.068 * longest))))
     return columns, -(-(len(found.labels) + 1) // columns)
 
@@ -100,10 +111,10 @@ def bars(axes: Axes, found: Comparison, name: str, made: Sequence[Look]) -> None
         if (lost := ~np.isfinite(means)).any():
             foot = axes.get_xaxis_transform()
             axes.plot(places[lost], [0.025] * int(lost.sum()), "x", color=WRONG, markersize=4, transform=foot)
-    axes.set_xticks(range(len(robots)), [found.observed[k].label for k in robots])
+    axes.set_xticks(range(len(robots)), [robot_label(found, k) for k in robots])
     axes.set_xlim(-0.6, len(robots) - 0.4)
     axes.grid(False, axis="x")
-    crowded = sum(len(found.observed[k].label) for k in robots) > 40
+    crowded = sum(len(robot_label(found, k)) for k in robots) > 40
     axes.tick_params(axis="x", length=0, rotation=30 if crowded else 0)
 
 
@@ -112,7 +123,7 @@ def box_labels(found: Comparison) -> list[str]:
     if len(found.labels) == 1:
         return [""]
     width = _LABEL_WIDTH if len(found.labels) <= _MOST_WRAPPED else 100
-    return ["\n".join(wrap(label, width)) for label in found.labels]
+    return ["\n".join(wrap(label, width)) for label in shown_labels(found)]
 
 
 def boxes(axes: Axes, found: Comparison, name: str, made: Sequence[Look]) -> None:

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from softnlp.evaluation.comparison import AXES, Comparison
 from softnlp.plots.boxes import draw_boxes
 from softnlp.plots.cloud import mark_size
-from softnlp.plots.compare_parts import LEGEND_ROW, MEASURED, Look, legend, legend_rows, looks
+from softnlp.plots.compare_parts import LEGEND_ROW, MEASURED, Look, legend, legend_rows, looks, shown_labels
 from softnlp.plots.space import around, space_axes
-from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, new_figure, plain
+from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, in_own_style, new_figure, plain
 from softnlp.units import MILLIMETRE
 from softnlp.workspace.boundary import thinned
 
@@ -27,6 +27,7 @@ _MOST_SHOWN = 4_000
 _BINS = 24
 
 
+@in_own_style
 def tips_figure(found: Comparison, title: str) -> Figure:
     """Draw measured and simulated tips, and how far they are apart.
 
@@ -62,7 +63,7 @@ def _handles(found: Comparison, made: list[Look], best: int) -> list[Any]:
 
     dot: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 5}
     handles = [Line2D([], [], color=INK, markerfacecolor="white", label=MEASURED, **dot)]
-    for v, (look, label) in enumerate(zip(made, found.labels, strict=True)):
+    for v, (look, label) in enumerate(zip(made, shown_labels(found), strict=True)):
         mark = {"marker": "o", "markersize": 4} if v == best else {}
         handles.append(
             Line2D([], [], color=look.colour, linestyle=look.line, linewidth=1.8, label=label, **mark)  # type: ignore[arg-type]

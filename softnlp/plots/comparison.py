@@ -13,7 +13,7 @@ from softnlp.gravity import gravity_lines, is_hanging
 from softnlp.plots.boxes import draw_boxes
 from softnlp.plots.cloud import mark_size
 from softnlp.plots.space import around, space_axes
-from softnlp.plots.style import GREY, INK, SMALL, TEXT, colour, new_figure, plain
+from softnlp.plots.style import GREY, INK, SMALL, TEXT, colour, in_own_style, new_figure, plain
 from softnlp.units import DEGREE, MILLIMETRE
 from softnlp.workspace.boundary import thinned
 from softnlp.workspace.comparison import Comparison
@@ -31,6 +31,7 @@ _WIDTH, _HEIGHT = 11.0, 7.2
 _ALL = "all"
 
 
+@in_own_style
 def comparison_figure(workspace: Workspace, comparison: Comparison) -> Figure:
     """Draw how far the tips of a workspace are from the other's.
 

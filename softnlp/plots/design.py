@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from textwrap import shorten
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from softnlp.plots.section import draw_section, stretched_radii
-from softnlp.plots.style import COLOURS, GREY, INK, PALE, SMALL, TEXT, new_figure, plain
+from softnlp.plots.style import COLOURS, GREY, INK, PALE, SMALL, TEXT, in_own_style, new_figure, plain, user_text
 from softnlp.results.design import held_back, label, pressure_words
 from softnlp.studies.design import Design
 from softnlp.studies.design_candidate import Candidate
@@ -25,6 +24,7 @@ _BEST, _FEASIBLE = COLOURS[1], COLOURS[0]
 _WIDTH, _ROW, _HEAD = 11.5, 0.24, 1.3  # of the figure, of a bar and of what is around the bars [inch]
 
 
+@in_own_style
 def design_figure(done: Design) -> Figure:
     """Draw a design: bars of the objective, the objective against what is required, and the best one's section.
 
@@ -48,8 +48,8 @@ def design_figure(done: Design) -> Figure:
     if done.best is not None:
         best = done.best
         axes = figure.add_axes((0.64, 0.0, 0.35, 2.7 / height))
-        title = f"best: {shorten(label(done, best), 44)}, {best.outputs['pressure'] / 1e5:.4g} bar"
-        figure.text(0.63, 2.87 / height, title, size=TEXT, weight="bold", color=INK, va="top", parse_math=False)
+        title = f"best: {user_text(label(done, best), 34)}, {best.outputs['pressure'] / 1e5:.4g} bar"
+        figure.text(0.63, 2.87 / height, title, size=TEXT, weight="bold", color=INK, va="top")
         draw_section(axes, best.robot, stretched_radii(best.robot, 1.0), "", set(), made=True)
     return figure
 
@@ -78,17 +78,17 @@ def _bars(axes: Axes, done: Design, shown: list[Candidate]) -> None:
         colour = INK if candidate.is_feasible else GREY
         bold = "bold" if candidate is done.best else "normal"
         axes.text(max(value, 0.0) + 0.005 * widest, row, words, size=SMALL, color=colour, weight=bold, va="center",
-                  parse_math=False, clip_on=False)  # fmt: skip
+                  clip_on=False)  # fmt: skip
     axes.set_xlim(min(0.0, *values), 1.15 * widest)
     plain(axes, _axis(objective), "")
-    axes.set_yticks(rows, [f"{shorten(label(done, c), 32)}  {c.number}" for c in shown], size=SMALL)
+    axes.set_yticks(rows, [f"{user_text(label(done, c), 32)}  {c.number}" for c in shown], size=SMALL)
     axes.tick_params(axis="y", length=0)
     axes.grid(False, axis="y")
     axes.set_ylim(max(len(shown), _FEWEST) - 0.4, -0.6)
     if done.best is not None and len(shown) <= _FEWEST // 2:
         lines = ["held back by", *(words for words in held_back(done, done.best))]
         for k, line in enumerate(lines if len(lines) > 1 else []):
-            axes.text(0.02, 0.42 - 0.05 * k, line, size=SMALL, color=INK, transform=axes.transAxes, parse_math=False)
+            axes.text(0.02, 0.42 - 0.05 * k, line, size=SMALL, color=INK, transform=axes.transAxes)
     if len(shown) < len(done.candidates):
         axes.set_title(f"the first {len(shown)} of {len(done.candidates)}", size=SMALL, color=GREY, loc="left")
 
@@ -98,7 +98,7 @@ def _why(candidate: Candidate) -> str:
     words = "; ".join(candidate.reasons)
     for general in ("no step of the pressure", "no pressure"):
         words = words.removeprefix(f"{general} meets everything; nearest is ")
-    return words if len(words) <= _LONGEST else f"{words[:_LONGEST]}…"
+    return user_text(words, _LONGEST)
 
 
 def _against(done: Design) -> Output:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.plots.cloud import VIEWS
-from softnlp.plots.style import GREY, INK, SMALL, TEXT, new_figure, plain
+from softnlp.plots.style import GREY, INK, SMALL, TEXT, in_own_style, new_figure, plain
 from softnlp.units import DEGREE, MILLIMETRE
 from softnlp.workspace.dexterity import Dexterity, seen_along
 
@@ -21,6 +21,7 @@ _WIDTH, _HEIGHT, _ROW = 11.0, 11.8, 2.65
 _LEFT, _RIGHT, _GAP = 0.17, 0.985, 0.05
 
 
+@in_own_style
 def dexterity_figure(found: Dexterity, title: str, robot: str) -> Figure:
     """Draw maps of four numbers of the voxels, each seen along z, y and x: the largest of those behind each other.
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, colour, new_figure, plain
+from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, colour, in_own_style, new_figure, plain, user_text
 from softnlp.results.identify_document import UNITS
 from softnlp.studies.measurements import column_slice
 
@@ -26,6 +26,7 @@ _LABELS = {
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")  # one more than colours, so that pairs repeat late
 
 
+@in_own_style
 def tensile_figure(fit: TensileFit, name: str, before: Any = None) -> Figure:
     """Draw the test with every fitted law, R^2 in the legend, and what each law leaves.
 
@@ -48,19 +49,22 @@ def tensile_figure(fit: TensileFit, name: str, before: Any = None) -> Figure:
             color=GREY,
             linestyle=":",
             linewidth=1.3,
-            label=f"before: {before.name}, {before.law.name}",
+            label=user_text(f"before: {before.name}, {before.law.name}"),
         )
     order = np.argsort(fit.stretch, kind="stable")
     styles = ("-", "--", "-.", (0, (4, 1, 1, 1, 1, 1)), (0, (8, 2)))
     for k, f in enumerate(fit.fits.values()):
         look: dict[str, Any] = {"color": colour(k), "linestyle": styles[k % len(styles)], "linewidth": 1.5}
-        left.plot(stretch, f.stress(stretch) / KILOPASCAL, label=f"{f.law.name}, R² = {f.r_squared:.5f}", **look)
+        left.plot(
+            stretch, f.stress(stretch) / KILOPASCAL, label=f"{user_text(f.law.name)}, R² = {f.r_squared:.5f}", **look
+        )
         right.plot(fit.stretch[order], (f.stress(fit.stretch) - fit.stress)[order] / KILOPASCAL, **look)
     right.axhline(0.0, color=GREY, linewidth=0.8, zorder=1)
     left.legend(fontsize=SMALL, frameon=False, labelcolor=INK)
     return figure
 
 
+@in_own_style
 def identified_figure(found: Identified, title: str) -> Figure:
     """Draw the model before and after against what was measured, a panel an observable and a marker a robot."""
     shown = [key for key in UNITS if key in found.errors()]
@@ -83,7 +87,7 @@ def identified_figure(found: Identified, title: str) -> Figure:
             look: dict[str, Any] = {"linestyle": "none", "marker": _MARKERS[j % len(_MARKERS)], "markersize": 5}
             old, new = found.before[j][:, where] / unit, found.after[j][:, where] / unit
             axes.plot(measured.ravel(), old.ravel(), color=GREY, markerfacecolor="none", **look)
-            axes.plot(measured.ravel(), new.ravel(), color=colour(j), label=data.label, **look)
+            axes.plot(measured.ravel(), new.ravel(), color=colour(j), label=user_text(data.label), **look)
             ends += [measured, old, new]
         every = np.concatenate([e.ravel() for e in ends])
         low, high = float(np.nanmin(every)), float(np.nanmax(every))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from softnlp.plots.abscissa import STEP, Abscissa
 from softnlp.plots.body import body_panel, frame
 from softnlp.plots.series import finish_panels, new_panels, series
-from softnlp.plots.style import GREY, INK, SMALL, WRONG, colour, new_figure, plain
+from softnlp.plots.style import GREY, INK, SMALL, WRONG, colour, in_own_style, new_figure, plain
 from softnlp.results import RunView, TargetView
 from softnlp.units import DEGREE, MILLIMETRE
 
@@ -24,6 +24,7 @@ _LEAST_LEFT = 1e-9  # [mm] or [deg]: below it what is left is drawn at the foot 
 _ARROW = 0.22  # of L_0
 
 
+@in_own_style
 def inverse_figure(view: RunView, targets: TargetView) -> Figure:
     """Draw a run of inverse kinematics.
 

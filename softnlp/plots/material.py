@@ -9,7 +9,7 @@ import numpy as np
 
 from softnlp.errors import InputError
 from softnlp.materials import Material
-from softnlp.plots.style import GREY, INK, SMALL, colour, new_figure, plain
+from softnlp.plots.style import GREY, INK, SMALL, colour, in_own_style, new_figure, plain, user_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,6 +28,7 @@ _COLUMNS, _LINE = 6, 0.25  # of the legends: entries a line, height of a line [i
 CLIP = 1.25  # panels reach this far beyond the fitted range's values
 
 
+@in_own_style
 def material_figure(materials: Sequence[Material], stretch_range: tuple[float, float] = (1.0, 2.2)) -> Figure:
     """Draw engineering stress, true stress and tangent modulus [kPa] against stretch.
 
@@ -98,8 +99,8 @@ def line_styles(materials: Sequence[Material]) -> dict[str, Any]:
 def _legends(figure: Figure, names: list[str], laws: dict[str, Any], top: float) -> None:
     from matplotlib.lines import Line2D
 
-    colours = [Line2D([], [], color=colour(k), linewidth=3, label=name) for k, name in enumerate(names)]
-    styles = [Line2D([], [], color=INK, linestyle=style, label=law) for law, style in laws.items()]
+    colours = [Line2D([], [], color=colour(k), linewidth=3, label=user_text(name)) for k, name in enumerate(names)]
+    styles = [Line2D([], [], color=INK, linestyle=style, label=user_text(law)) for law, style in laws.items()]
     look: dict[str, Any] = {
         "loc": "upper left",
         "fontsize": SMALL,

@@ -10,7 +10,7 @@ from softnlp.plots.blocked import blocked_figure
 from softnlp.plots.body import body_panel
 from softnlp.plots.inverse import inverse_figure
 from softnlp.plots.series import finish_panels, new_panels, series
-from softnlp.plots.style import GREY, INK, SMALL, WRONG, colour, new_figure
+from softnlp.plots.style import GREY, INK, SMALL, WRONG, colour, in_own_style, new_figure
 from softnlp.results import RunView
 from softnlp.units import DEGREE, MILLIMETRE
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+@in_own_style
 def run_figure(view: RunView, measured: Sequence[tuple[float, float]] = ()) -> Figure:
     """Draw a run: a 3-D panel of all shapes, and bending angle and elongation against pressure, time or step.
 

@@ -9,7 +9,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from softnlp.errors import InputError
-from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, colour, ink_on, new_figure
+from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, colour, in_own_style, ink_on, new_figure
 from softnlp.robot import Robot, Violation, touching_stretch
 from softnlp.studies.step import SectionRadii
 from softnlp.units import MILLIMETRE
@@ -51,6 +51,7 @@ def stretched_radii(robot: Robot, stretch: float) -> SectionRadii:
     )
 
 
+@in_own_style
 def section_figure(robot: Robot, violations: Sequence[Violation] = (), stretch: float = 1.0) -> Figure:
     """Draw a robot's cross-section to scale with its dimensions, and beside it the section at a stretch other than 1.
 
@@ -84,7 +85,7 @@ def section_figure(robot: Robot, violations: Sequence[Violation] = (), stretch: 
             _circle(axes, (0, 0), robot.outer_radius, fill=False, edgecolor=GREY, linestyle=(0, (2, 3)), zorder=0)
     for j, line in enumerate(lines):
         y = (0.12 + _LINE * (len(lines) - 1 - j)) / height
-        figure.text(0.18 / width, y, line, size=SMALL, color=WRONG, va="bottom", parse_math=False)
+        figure.text(0.18 / width, y, line, size=SMALL, color=WRONG, va="bottom")
     _legend(figure, robot, height, columns)
     return figure
 
@@ -160,7 +161,7 @@ def _diameters(axes: Axes, radii: SectionRadii, R: float, made: bool) -> None:
             arrowprops={"arrowstyle": "<->", "color": INK, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0},
         )
         axes.text(
-            0, y, f"${letter}$ {_number(2 * r)}", size=SMALL, color=INK, ha="center", va="center",
+            0, y, f"${letter}$ {_number(2 * r)}", size=SMALL, color=INK, ha="center", va="center", parse_math=True,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.2},
         )  # fmt: skip
 
@@ -206,7 +207,7 @@ def _leader(axes: Axes, point: Point, height: float, text: str, R: float) -> Non
     x = _COLUMN * R
     axes.plot([point[0], x - 0.08 * R, x - 0.02 * R], [point[1], height, height], color=INK, linewidth=0.6, zorder=8)
     axes.plot(*point, ".", color=INK, markersize=3, zorder=8)
-    axes.text(x, height, text, size=SMALL, color=INK, va="center")
+    axes.text(x, height, text, size=SMALL, color=INK, va="center", parse_math=True)
 
 
 def _angle(axes: Axes, first: float, second: float, radius: float) -> None:

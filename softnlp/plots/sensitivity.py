@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from softnlp.gravity import gravity_lines
 from softnlp.plots.body import frame, side_camera, tube
-from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, colour, new_figure, plain
+from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, colour, in_own_style, new_figure, plain, user_text
 from softnlp.results import Body
 from softnlp.results.sensitivity import shown
 from softnlp.studies.derivatives import entries_of
@@ -27,6 +27,7 @@ _SIZE = 0.3  # largest semi-axis of an ellipsoid drawn, of L_0
 _MOST_BARS = 10
 
 
+@in_own_style
 def sensitivity_figure(report: SensitivityReport, title: str) -> Figure:
     """Draw the shape with its ellipsoids, the tip's Jacobian, and what each tolerance, or 1 %, does to the tip.
 
@@ -124,7 +125,7 @@ def _tornado(axes: Axes, report: SensitivityReport) -> None:
     order = np.argsort(sizes)[::-1][:_MOST_BARS][::-1]
     plain(axes, label, "")
     axes.barh(np.arange(len(order)), sizes[order], color=colour(2), height=0.7)
-    axes.set_yticks(np.arange(len(order)), [names[k] for k in order])
+    axes.set_yticks(np.arange(len(order)), [user_text(names[k]) for k in order])
     if bars is not None and report.sampled is not None:
         angle = s.outputs.index("bending_angle")
         unit, scale = shown(s.output_units[angle])

@@ -11,7 +11,7 @@ from softnlp.gravity import gravity_lines, is_hanging
 from softnlp.plots.body import disc
 from softnlp.plots.cloud import VIEWS, Outline, mark_size, outline, seen, shown
 from softnlp.plots.space import space_axes
-from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, new_figure, plain
+from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, in_own_style, new_figure, plain
 from softnlp.units import MILLIMETRE
 from softnlp.workspace.read import Column, Workspace, read_column
 from softnlp.workspace.summary import parameters
@@ -30,6 +30,7 @@ _AXES = "xyz"
 _WIDTH, _HEIGHT = 11.0, 7.6
 
 
+@in_own_style
 def workspace_figure(workspace: Workspace, colour: str = COLOUR) -> Figure:
     """Draw where the tip goes: all poses in 3-D and seen along each axis.
 

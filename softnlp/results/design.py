@@ -194,7 +194,7 @@ def design_lines(done: Design) -> Group:
         cells = [_digits(c.outputs.get(o.name), o.scale) for o in columns]
         style = "bold green" if c is done.best else "" if c.is_feasible else "bright_black"
         status = f"{c.status}, not optimal" if c.optimal is False else c.status
-        table.add_row(str(c.number), label(done, c), status, *cells, style=style)
+        table.add_row(str(c.number), Text(label(done, c)), status, *cells, style=style)
     return Group(table, *(Text(line, style) for line, style in _notes(done)))
 
 

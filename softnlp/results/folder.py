@@ -42,7 +42,8 @@ def save(
     scenario_text
         What was asked, kept as scenario.toml.
     figure
-        Draws the run, `softnlp.plots.run_figure` for instance; kept as figure.png.
+        Draws the run, `softnlp.plots.run_figure` for instance; kept as figure.png. Drawn last, so that an error of
+        drawing leaves the numbers.
 
     Returns
     -------
@@ -55,7 +56,7 @@ def save(
         When the folder or a file cannot be written.
     """
     folder = make_folder(directory)
-    # Everything is made before the first file is written, so that an error leaves no half of the new results.
+    # The numbers are all made before the first file is written, so that an error leaves no half of the new results.
     contents = {
         RESULTS_FILE: netcdf_bytes(run),
         "table.csv": table_text(run).encode(),
@@ -64,11 +65,12 @@ def save(
     }
     if scenario_text is not None:
         contents["scenario.toml"] = scenario_text.encode()
+    written = [write_whole(folder / name, content) for name, content in contents.items()]
     if figure is not None:
         png = io.BytesIO()
         figure(view_of_run(run)).savefig(png, format="png")
-        contents["figure.png"] = png.getvalue()
-    return [write_whole(folder / name, content) for name, content in contents.items()]
+        written.append(write_whole(folder / "figure.png", png.getvalue()))
+    return written
 
 
 def load_run(path: str | PathLike[str]) -> RunView:
