@@ -55,7 +55,7 @@ def use(monkeypatch: pytest.MonkeyPatch, solver: type[Any]) -> None:
     monkeypatch.setattr("softnlp.workspace.run.ChunkSolver", solver)
     monkeypatch.setattr("softnlp.workspace.worker.ChunkSolver", solver)
     monkeypatch.setattr("softnlp.workspace.worker._solvers", {})
-    monkeypatch.setattr(pool, "_context", lambda: multiprocessing.get_context("fork"))
+    monkeypatch.setattr(pool, "process_context", lambda: multiprocessing.get_context("fork"))
 
 
 @pytest.fixture
@@ -95,7 +95,7 @@ def test_workers_that_are_not_forked_give_the_same_bits(solved_here: Path, tmp_p
     thread = threading.Thread(target=ended.wait)
     thread.start()
     try:
-        assert pool._context().get_start_method() != "fork"
+        assert pool.process_context().get_start_method() != "fork"
         run_sweep(REAL, tmp_path, workers=2)
     finally:
         ended.set()

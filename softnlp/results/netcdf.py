@@ -23,7 +23,7 @@ def dataset_bytes(dataset: xr.Dataset) -> bytes:
     import h5netcdf
 
     content = io.BytesIO()
-    beside = {name: set(dataset[name].dims) for name in dataset.coords if name not in dataset.dims}
+    beside = {str(name): set(dataset[name].dims) for name in dataset.coords if name not in dataset.dims}
     with h5netcdf.File(content, "w") as file:
         put_attributes(file, dataset.attrs)
         file.dimensions = dict(dataset.sizes)
@@ -39,7 +39,7 @@ def put_attributes(target: Any, attributes: Mapping[str, Any]) -> None:
         target.attrs[name] = np.bytes_(value.encode()) if isinstance(value, str) else value
 
 
-def put(file: Any, name: str, dims: tuple[str, ...], values: Any, attributes: Mapping[str, Any]) -> None:
+def put(file: Any, name: Any, dims: Any, values: Any, attributes: Mapping[str, Any]) -> None:
     """Write a variable, of numbers or of text."""
     if values.dtype.kind in "OU":
         texts = encoded(values.tolist())
