@@ -28,8 +28,10 @@ def dataset_bytes(dataset: xr.Dataset) -> bytes:
         put_attributes(file, dataset.attrs)
         file.dimensions = dict(dataset.sizes)
         for name, variable in dataset.variables.items():
-            own = "" if name in dataset.coords else " ".join(c for c, dims in beside.items() if dims <= {*variable.dims})
-            put(file, name, variable.dims, variable.values, variable.attrs | ({"coordinates": own} if own else {}))
+            dims = set(variable.dims)
+            own = [] if name in dataset.coords else [c for c, of in beside.items() if of <= dims]
+            more = {"coordinates": " ".join(own)} if own else {}
+            put(file, name, variable.dims, variable.values, variable.attrs | more)
     return content.getvalue()
 
 

@@ -174,4 +174,3 @@ def _chunk(setting: Setting, task: DesignTask, chunk: Sequence[tuple[int, Mappin
     """Return the candidates of a chunk."""
     workshop = Workshop(setting, task)
     return [workshop.candidate(number, combination) for number, combination in chunk]
-

@@ -62,4 +62,3 @@ def prepare(plan: Plan, fingerprint: str) -> None:
 def solve_prepared(fingerprint: str, chunk: int) -> Block:
     """Return the solved poses of a chunk of the plan that `prepare` got."""
     return solve(_plans[fingerprint], fingerprint, chunk)
-
