@@ -19,7 +19,18 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from arc_runs import POINTS, arc_pose, arc_step, blocked_run, blocked_step, failed_step, offset_run, ramp_run, run_of
+from arc_runs import (
+    POINTS,
+    arc_pose,
+    arc_step,
+    blocked_run,
+    blocked_step,
+    failed_step,
+    offset_run,
+    ramp_run,
+    run_of,
+    weighted_run,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
@@ -45,7 +56,6 @@ from softnlp.robot import DIMENSIONS, robot
 from softnlp.rod import Loads
 from softnlp.scenario_contact import contact_settings
 from softnlp.scenario_schema import ContactTable
-from softnlp.solver import EquationResidual
 from softnlp.status import Status
 from softnlp.studies.step import Run, WeightSensitivity
 
@@ -454,15 +464,6 @@ CONTACT_KEYS = {
     *("blocked_force_N", "closure", "chamber_reaction_N", "gap_mm", "wall_point_mm", "wall_normal", "tip_cap_mm"),
     *("length_error_mm", "free_tip_position_mm", "free_bending_angle_deg"),
 }
-
-
-def weighted_run() -> Run:
-    """Two steps of the `weighted` closure, and one that failed."""
-    body = robot("D25L60")
-    left = (EquationResidual("e_n", 0.03, "N", 0.15), EquationResidual("e_m", 2e-3, "N m", 0.4))
-    made = [blocked_step(body, [p, 0, 0], 0.5, closure="weighted", weighted=left) for p in (5e4, 1e5)]
-    contact = ContactSettings(closure="weighted", weights=ClosureWeights(force=2.0, moment=30.0, length=4e3))
-    return run_of([*made, failed_step([1.5e5, 0, 0])], study="blocked-force", contact=contact)
 
 
 def test_json_of_a_blocked_force_has_its_keys_in_their_units() -> None:

@@ -37,8 +37,13 @@ def dataset_bytes(dataset: xr.Dataset) -> bytes:
 
 def put_attributes(target: Any, attributes: Mapping[str, Any]) -> None:
     """Give a file or a variable of h5netcdf attributes, text as characters."""
+    import h5py
+
     for name, value in attributes.items():
-        target.attrs[name] = np.bytes_(value.encode()) if isinstance(value, str) else value
+        if isinstance(value, str):
+            text = value.encode()
+            value = np.array(text, h5py.string_dtype("utf-8", max(1, len(text))))
+        target.attrs[name] = value
 
 
 def put(file: Any, name: Any, dims: Any, values: Any, attributes: Mapping[str, Any]) -> None:
