@@ -23,6 +23,7 @@ SWEEP = scenario("[workspace]\nlevels = 2\nto_bar = 0.5\n" + QUICK)
 MODEL = 'robot = { name = "D25L60" }\nmaterial = { name = "Ecoflex 00-50", model = "mooney-rivlin" }\n'
 SOLVER = "solver = { intervals = 10, accuracy = 1e-3 }\n"
 PRESSURE = "pressure = { sequence_bar = [[0.3, 0.0, 0.0]] }\n"
+TARGET = "target = { tip_position_mm = [[10.0, 0.0, 72.0]] }\nbounds = { pressure_bar = [0.0, 1.5] }\n"
 DESIGN = """
 choices = { material.name = ["Ecoflex 00-50", "Dragon Skin 10"] }
 actuation = { sets = [1], pressure_bar = 0.3 }
