@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Real
 from types import MappingProxyType
@@ -90,6 +90,12 @@ class Law:
     formula: Callable[..., Any]
     modulus: Callable[..., Any] | None = None
 
+    @property
+    def told(self) -> tuple[str, ...]:
+        """Name, constants and formula in words, which do not change with CasADi; a built-in formula by its name."""
+        text = getattr(self.formula, "text", None) or getattr(self.formula, "__qualname__", "")
+        return self.name, *(constant.file_key for constant in self.constants), str(text)
+
     @cached_property
     def functions(self) -> LawFunctions:
         """Built on first use. Raises `MaterialError` where the formula is not an expression of the stretch."""
@@ -145,12 +151,31 @@ LAWS: Mapping[str, Law] = MappingProxyType(
 
 @dataclass(frozen=True)
 class _InPascal:
-    """A person's function, in MPa, as a law's formula, in Pa. A class, so that a law can be pickled."""
+    """A person's formula or function, in MPa, as a law's, in Pa. A class, so that a law can be pickled."""
 
     function: Callable[..., Any]
 
+    @property
+    def text(self) -> str:
+        """That of a formula."""
+        return str(getattr(self.function, "text", ""))
+
     def __call__(self, stretch: Any, **constants: Any) -> Any:
         return MEGAPASCAL * _single(self.function(stretch, **constants))
+
+
+@dataclass(frozen=True)
+class _Traced:
+    """A person's function as CasADi traced it, in Pa: any process can be sent it, wherever the function was defined.
+
+    text : its operations, with every number in full.
+    """
+
+    text: str
+    stress: Any = field(compare=False)
+
+    def __call__(self, stretch: Any, **constants: Any) -> Any:
+        return self.stress(stretch, *constants.values())
 
 
 def formula_law(name: str, formula: str, constants: Iterable[str]) -> Law:
@@ -210,7 +235,9 @@ def function_law(name: str, function: Callable[..., Any], constants: Iterable[st
     with _naming(name):
         if not callable(function):
             raise MaterialError(f"expected a function, got {shown(function)}")
-    return _own_law(name, function, names)
+    law = _own_law(name, function, names)
+    stress = law.functions.engineering_stress
+    return replace(law, formula=_Traced(_listed(stress), stress))
 
 
 def _own_law(name: str, function: Callable[..., Any], names: tuple[str, ...]) -> Law:
@@ -293,6 +320,17 @@ def _literals(function: Any) -> list[float]:
     """Return the numbers that stand in an SX function's expression graph."""
     instructions = range(function.n_instructions())
     return [function.instruction_constant(k) for k in instructions if function.instruction_id(k) == ca.OP_CONST]
+
+
+def _listed(function: Any) -> str:
+    """Return the operations of an SX function as text, its numbers in full."""
+    names = {number: name for name, number in vars(ca).items() if name.startswith("OP_")}
+    lines = []
+    for k in range(function.n_instructions()):
+        number = function.instruction_id(k)
+        value = float(function.instruction_constant(k)).hex() if number == ca.OP_CONST else ""
+        lines.append(f"{names[number]} {function.instruction_input(k)} {function.instruction_output(k)} {value}")
+    return "\n".join(lines)
 
 
 def evaluate(function: Any, *arguments: Any) -> Any:

@@ -2,41 +2,82 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+from weakref import finalize
 
+from softnlp.errors import InputError
 from softnlp.runner_blocked import run_blocked
 from softnlp.runner_inverse import run_inverse
 from softnlp.runner_run import run_of
-from softnlp.scenario import Scenario
+from softnlp.scenario import Scenario, scenario_of
 from softnlp.studies.forward import forward
 from softnlp.studies.step import Run, Step
+
+if TYPE_CHECKING:  # imported where needed: a run takes none of them
+    from softnlp.studies.design import Design
+    from softnlp.studies.identified import Identified
+    from softnlp.studies.tensile import TensileFit
+    from softnlp.workspace.read import Workspace
 
 Progress = Callable[[int, Step], None]
 
 
-def run_scenario(scenario: Scenario, progress: Progress | None = None, branches: int = 0) -> Run:
-    """Run the study of a scenario, every step in order.
+def run_scenario(
+    scenario: Scenario,
+    progress: Callable[[int, Any], None] | None = None,
+    branches: int = 0,
+    *,
+    workers: int = 1,
+    folder: str | PathLike[str] | None = None,
+) -> Run | Identified | TensileFit | Design | Workspace:
+    """Run the study of a scenario.
 
     Parameters
     ----------
     scenario
-        Of `softnlp.load_scenario`, of a study that is a run: forward, blocked-force or inverse.
+        Of `softnlp.load_scenario`.
     progress
-        Called with the index and the step as each is done.
+        Called with a count and what is done: each step, candidate, evaluation of a fit, or `SweepProgress`.
     branches
         As `softnlp.blocked_force`.
+    workers
+        As `softnlp.run_sweep` and `softnlp.design`; the other studies take one process.
+    folder
+        Of study "workspace" alone, as `softnlp.run_sweep`; without it a temporary one, kept as long as the result.
 
     Returns
     -------
-    Run
-        Its steps carry a solution or a named status.
+    Run, Identified, TensileFit, Design or Workspace
+        A run for forward, blocked-force and inverse, whose steps carry a solution or a named status.
 
     Raises
     ------
     InputError
-        For pressures or loads that the study refuses.
+        For anything but a scenario, and for what the study refuses.
     """
+    study = scenario_of(scenario, None, "softnlp.run_scenario").study
+    if folder is not None and study != "workspace":
+        raise InputError(f"only study 'workspace' takes one, not {study!r}; softnlp.save writes a run", key="folder")
+    if study == "identify":
+        from softnlp.runner_identify import run_identify
+
+        return run_identify(scenario, progress)
+    if study == "design":
+        from softnlp.runner_design import run_design
+
+        return run_design(scenario, progress, workers)
+    if study == "workspace":
+        return _workspace(scenario, progress, workers, folder)
+    return solve_steps(scenario, progress, branches)
+
+
+def solve_steps(scenario: Scenario, progress: Progress | None = None, branches: int = 0) -> Run:
+    """Run a scenario whose study is a run, every step in order; as `run_scenario`."""
     return replace(STUDIES[scenario.study](scenario, progress, branches), warnings=scenario.warnings)
 
 
@@ -44,6 +85,22 @@ def partial_run(scenario: Scenario, steps: Sequence[Step]) -> Run:
     """Return the run of a scenario that was stopped after some steps; a warning says so."""
     note = f"stopped by the user after {len(steps)} of {scenario.step_count} steps"
     return run_of(scenario, steps, note)
+
+
+def _workspace(
+    scenario: Scenario, progress: Callable[[int, Any], None] | None, workers: int, folder: str | PathLike[str] | None
+) -> Workspace:
+    """Solve every pose of a workspace and read them."""
+    from softnlp.workspace.read import load_workspace
+    from softnlp.workspace.run import run_sweep
+
+    with ExitStack() as stack:
+        place = folder or stack.enter_context(tempfile.TemporaryDirectory(prefix="softnlp-"))
+        report = None if progress is None else lambda news: progress(news.done, news)
+        run_sweep(scenario, place, workers=workers, progress=report)
+        solved = load_workspace(place)
+        finalize(solved, stack.pop_all().close)
+    return solved
 
 
 def _forward(scenario: Scenario, progress: Progress | None, branches: int) -> Run:

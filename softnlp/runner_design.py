@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from softnlp.contact_settings import ContactSettings
-from softnlp.scenario import Scenario
+from softnlp.scenario import Scenario, scenario_of
 from softnlp.studies.design import Design, design, finished
 from softnlp.studies.design_candidate import Candidate
 from softnlp.studies.design_task import DesignTask, Setting
@@ -14,18 +14,31 @@ Progress = Callable[[int, Candidate], None]
 
 
 def run_design(scenario: Scenario, progress: Progress | None = None, workers: int = 1) -> Design:
-    """Run a scenario of study "design"; `progress` is called with the number done and each candidate.
+    """Run a scenario of study "design".
+
+    Parameters
+    ----------
+    scenario
+        Of `softnlp.load_scenario`, of study "design".
+    progress, workers
+        As `softnlp.design`.
+
+    Returns
+    -------
+    Design
+        As `softnlp.design`.
 
     Raises
     ------
     InputError
-        As `softnlp.design`.
+        For anything but such a scenario, and as `softnlp.design`.
     """
-    assert isinstance(scenario.task, DesignTask)
+    task = scenario_of(scenario, "design", "softnlp.run_design").task
+    assert isinstance(task, DesignTask)
     return design(
         scenario.robot,
         scenario.material,
-        scenario.task,
+        task,
         loads=scenario.loads,
         contact=scenario.contact or ContactSettings(),
         coefficients=scenario.coefficients,

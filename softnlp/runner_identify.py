@@ -14,6 +14,11 @@ from softnlp.studies.tensile import TensileFit, fit_tensile
 Progress = Callable[[int, float], None]
 
 
+def run_identify(scenario: Scenario, progress: Progress | None = None) -> Identified | TensileFit:
+    """Identify what a scenario asks for, from a tensile test, which has no progress, or from robots."""
+    return run_tensile(scenario) if isinstance(scenario.task, TensileTask) else run_robots(scenario, progress)
+
+
 def run_robots(scenario: Scenario, progress: Progress | None = None) -> Identified:
     """Identify constants from the measurements of robots; `progress` is that of `softnlp.identify`.
 

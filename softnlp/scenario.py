@@ -30,6 +30,7 @@ from softnlp.scenario_inverse import inverse_task
 from softnlp.scenario_schema import RobotTable, ScenarioFile
 from softnlp.scenario_workspace import workspace_task
 from softnlp.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
+from softnlp.workspace.plan import Plan
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -150,6 +151,25 @@ def scenario_from_text(text: str, path: str | PathLike[str]) -> Scenario:
         return _scenario(text, Path(path))
     except InputError as error:
         raise placed(error, fspath(path)) from None
+
+
+def scenario_of(given: object, study: str | None, function: str) -> Scenario:
+    """Return what a function was given, if that is a scenario of its study (None: of any).
+
+    Raises
+    ------
+    InputError
+        Naming the function to use instead.
+    """
+    wanted = f"{function} takes a scenario" + ("" if study is None else f" of study {study!r}")
+    if not isinstance(given, Scenario):
+        use = "softnlp.run_sweep solves a plan" if isinstance(given, Plan) else "softnlp.load_scenario reads one"
+        raise InputError(f"{wanted}, got a value of type {type(given).__name__}; {use}")
+    if study not in (None, given.study):
+        raise InputError(
+            f"{wanted}, got {given.study!r}; softnlp.run_scenario runs it", source=str(given.path), key="study"
+        )
+    return given
 
 
 def robot_of_scenario(path: str | PathLike[str]) -> tuple[Robot, tuple[Violation, ...]]:

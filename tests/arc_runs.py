@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from softnlp.contact_settings import ContactSettings
+from softnlp.contact_settings import ClosureWeights, ContactSettings
 from softnlp.conventions import REPRODUCTION, Coefficients
 from softnlp.materials import material
 from softnlp.robot import Robot, robot
@@ -208,3 +208,12 @@ def offset_run(offsets: Sequence[float] = (0.0, -0.01, -0.02, -0.03), force: flo
     ]
     made[-1] = replace(made[-1], status=Status.NO_CONTACT)
     return run_of(made, "D25L60", study="blocked-force", contact=ContactSettings())
+
+
+def weighted_run() -> Run:
+    """Two steps of the `weighted` closure, and one that failed."""
+    body = robot("D25L60")
+    left = (EquationResidual("e_n", 0.03, "N", 0.15), EquationResidual("e_m", 2e-3, "N m", 0.4))
+    made = [blocked_step(body, [p, 0, 0], 0.5, closure="weighted", weighted=left) for p in (5e4, 1e5)]
+    contact = ContactSettings(closure="weighted", weights=ClosureWeights(force=2.0, moment=30.0, length=4e3))
+    return run_of([*made, failed_step([1.5e5, 0, 0])], study="blocked-force", contact=contact)

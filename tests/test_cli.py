@@ -273,7 +273,7 @@ def test_a_file_in_the_place_of_the_folder_is_refused_before_the_solve(
     def solve(*_: Any) -> None:
         raise AssertionError("solved")
 
-    monkeypatch.setattr("softnlp.runner.run_scenario", solve)
+    monkeypatch.setattr("softnlp.runner.solve_steps", solve)
     Path("taken").write_text("a file")
     path = scenario()
     assert "expected a folder, got a file" in complaint(*cli("run", path, "--out", out))

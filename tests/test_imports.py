@@ -18,7 +18,7 @@ PACKAGE = Path(softnlp.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
 # A module imports only what stands above it; the modules of MIXED may import each other within their package.
 LAYERS = (
-    *("errors", "status", "units", "conventions", "numerics", "reading", "gravity", "contact_settings"),
+    *("errors", "status", "units", "conventions", "numerics", "reading", "gravity", "contact_settings", "processes"),
     *("formula", "laws", "material_reading", "materials", "rules", "robot", "section", "rod", "tip", "transcription"),
     *(
         "quantities",
@@ -88,14 +88,13 @@ LAYERS = (
         "runner_run",
         "runner_blocked",
         "runner_inverse",
-        "runner",
         "runner_design",
         "runner_identify",
         "runner_compare",
         "results",
     ),
     *("workspace.columns", "workspace.sink", "workspace.dataset", "workspace.run"),
-    *("workspace.read", "workspace.boundary", "workspace.dexterity", "workspace.summary", "workspace.export"),
+    *("workspace.read", "runner", "workspace.boundary", "workspace.dexterity", "workspace.summary", "workspace.export"),
     *("workspace.measured", "workspace.again", "workspace.comparison"),
     "palette",
     "mesh",

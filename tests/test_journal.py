@@ -187,6 +187,28 @@ def test_another_version_is_refused(tmp_path: Path) -> None:
     refused(tmp_path, "softnlp '1.2.3'", "this is 1.3.0", version="1.3.0")
 
 
+def test_other_versions_beside_are_kept_and_told_and_change_nothing(tmp_path: Path) -> None:
+    def written_with(casadi: str) -> list[dict[str, str]]:
+        with Journal(tmp_path / "j.sqlite", PLAN, VERSION, resume=True, versions={"casadi": casadi}) as journal:
+            return journal.earlier
+
+    assert written_with("3.8.0") == []
+    assert written_with("3.8.0") == []
+    assert written_with("3.9.0") == [{"casadi": "3.8.0"}]
+    assert written_with("3.8.0") == [{"casadi": "3.9.0"}]
+    assert written_with("4.0.0") == [{"casadi": "3.8.0"}, {"casadi": "3.9.0"}]
+
+
+def test_a_journal_of_version_0_1_is_refused_by_name(tmp_path: Path) -> None:
+    """Its fingerprint may be another one for the same sweep."""
+    path = filled(tmp_path, 2)
+    with sqlite3.connect(path) as file:
+        file.execute("PRAGMA user_version = 1")
+        file.execute("UPDATE meta SET value = '0.1.0' WHERE key = 'softnlp'")
+    file.close()
+    refused(tmp_path, "a journal of format 1, of softnlp '0.1.0'", "finish it with that version or begin again")
+
+
 def test_files_that_are_no_journal(tmp_path: Path) -> None:
     path = tmp_path / "journal.sqlite"
     for content in (

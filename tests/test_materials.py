@@ -290,7 +290,8 @@ def test_a_scalar_rebuilds_nothing() -> None:
 
 def test_materials_can_be_sent_to_another_process() -> None:
     own = Material("own", formula_law("mine", "c * (stretch - 1)", ["c"]), {"c": 0.05})
-    for model in (of("Ecoflex 00-50", "ogden"), own):
+    local = Material("local", function_law("mine", lambda s, c: c * ca.log(s), ["c"]), {"c": 0.05})
+    for model in (of("Ecoflex 00-50", "ogden"), own, local):
         for twin in (pickle.loads(pickle.dumps(model)), copy.deepcopy(model)):
             assert twin.tangent_modulus(1.4) == model.tangent_modulus(1.4)
             assert list(twin.constants.items()) == list(model.constants.items())

@@ -19,7 +19,18 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from arc_runs import POINTS, arc_pose, arc_step, blocked_run, blocked_step, failed_step, offset_run, ramp_run, run_of
+from arc_runs import (
+    POINTS,
+    arc_pose,
+    arc_step,
+    blocked_run,
+    blocked_step,
+    failed_step,
+    offset_run,
+    ramp_run,
+    run_of,
+    weighted_run,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
@@ -45,7 +56,6 @@ from softnlp.robot import DIMENSIONS, robot
 from softnlp.rod import Loads
 from softnlp.scenario_contact import contact_settings
 from softnlp.scenario_schema import ContactTable
-from softnlp.solver import EquationResidual
 from softnlp.status import Status
 from softnlp.studies.step import Run, WeightSensitivity
 
@@ -175,7 +185,7 @@ def test_every_variable_and_coordinate_says_its_unit_and_meaning(mixed: Run) -> 
     for name, variable in dataset.variables.items():
         assert variable.attrs.get("units"), name
         assert variable.attrs.get("long_name"), name
-    suffixes = {"_mm": "mm", "_bar": "bar", "_N": "N", "_Nmm": "N mm", "_deg": "degree", "_s": "s", "_per_m": "m-1"}
+    suffixes = {"_mm": "mm", "_bar": "bar", "_N": "N", "_Nmm": "N mm", "_deg": "degree", "_s": "s", "_per_m": "1/m"}
     for name, variable in dataset.variables.items():
         for suffix, unit in suffixes.items():
             if str(name).endswith(suffix):
@@ -208,7 +218,7 @@ def test_unsolved_steps_are_nan_with_their_status(mixed: Run) -> None:
     dataset = to_dataset(mixed)
     unsolved = dataset.status == "no_equilibrium"
     assert int(unsolved.sum()) == 3
-    kept = {"pressure_bar", "residual", "certificate", "certificate_scaled"}
+    kept = {"pressure_bar", "residual", *(n for n in dataset if str(n).startswith("certificate"))}
     for name, variable in dataset.data_vars.items():
         if variable.dtype.kind == "f" and "step" in variable.dims and name not in kept:
             values = np.isnan(variable.values).reshape(11, -1)
@@ -463,15 +473,6 @@ CONTACT_KEYS = {
 }
 
 
-def weighted_run() -> Run:
-    """Two steps of the `weighted` closure, and one that failed."""
-    body = robot("D25L60")
-    left = (EquationResidual("e_n", 0.03, "N", 0.15), EquationResidual("e_m", 2e-3, "N m", 0.4))
-    made = [blocked_step(body, [p, 0, 0], 0.5, closure="weighted", weighted=left) for p in (5e4, 1e5)]
-    contact = ContactSettings(closure="weighted", weights=ClosureWeights(force=2.0, moment=30.0, length=4e3))
-    return run_of([*made, failed_step([1.5e5, 0, 0])], study="blocked-force", contact=contact)
-
-
 def test_json_of_a_blocked_force_has_its_keys_in_their_units() -> None:
     run = blocked_run(failed=(4,), tip_cap=0.005, offset=-0.002)
     document = to_json(run)
@@ -544,10 +545,11 @@ def test_what_weighted_left_is_in_every_format_with_its_unit() -> None:
     assert [row["weighted_residual_e_n_N"] for row in rows] == ["0.03", "0.03", ""]
     assert [row["weighted_residual_e_m_Nm"] for row in rows] == ["0.002", "0.002", ""]
     dataset = to_dataset(run)
-    assert dataset.weighted_residual.sel(step=2, weighted_equation="e_m") == 2e-3
-    assert np.isnan(dataset.weighted_residual.sel(step=3)).all()
+    assert dataset.weighted_residual_Nm.sel(step=2, weighted_equation="e_m") == 2e-3
+    assert np.isnan(dataset.weighted_residual_N.sel(step=2, weighted_equation="e_m"))
+    assert np.isnan(dataset.weighted_residual_Nm.sel(step=3)).all()
     assert dataset.weighted_residual_unit.values.tolist() == ["N", "N m"]
-    assert "weighted_residual" not in to_dataset(blocked_run())
+    assert "weighted_residual_N" not in to_dataset(blocked_run())
 
 
 def test_csv_and_netcdf_of_a_blocked_force_agree_with_json(tmp_path: Path) -> None:

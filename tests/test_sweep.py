@@ -26,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # benchmarks/ is not install
 from softnlp.cli import main
 from softnlp.errors import InputError
 from softnlp.rod import Loads
+from softnlp.scenario import load_scenario
 from softnlp.status import Status
 from softnlp.studies.statics import PoseSolver
 from softnlp.units import BAR, MILLIMETRE
@@ -55,7 +56,7 @@ def use(monkeypatch: pytest.MonkeyPatch, solver: type[Any]) -> None:
     monkeypatch.setattr("softnlp.workspace.run.ChunkSolver", solver)
     monkeypatch.setattr("softnlp.workspace.worker.ChunkSolver", solver)
     monkeypatch.setattr("softnlp.workspace.worker._solvers", {})
-    monkeypatch.setattr(pool, "_context", lambda: multiprocessing.get_context("fork"))
+    monkeypatch.setattr(pool, "process_context", lambda: multiprocessing.get_context("fork"))
 
 
 @pytest.fixture
@@ -95,7 +96,7 @@ def test_workers_that_are_not_forked_give_the_same_bits(solved_here: Path, tmp_p
     thread = threading.Thread(target=ended.wait)
     thread.start()
     try:
-        assert pool._context().get_start_method() != "fork"
+        assert pool.process_context().get_start_method() != "fork"
         run_sweep(REAL, tmp_path, workers=2)
     finally:
         ended.set()
@@ -462,6 +463,19 @@ def test_warnings_of_the_robot_are_told_and_kept(tmp_path: Path, cli: Cli, no_so
     assert told.splitlines()[1].startswith("warning: wall_thickness: ")
     (warning,) = json.loads(opened(out).attrs["warnings"])
     assert warning.startswith("wall_thickness: ")
+
+
+def test_a_sweep_goes_on_with_another_casadi_and_says_so(
+    tmp_path: Path, cli: Cli, no_solving: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, out = written(tmp_path), tmp_path / "out"
+    for casadi in ("3.8.0", "3.9.0"):
+        monkeypatch.setattr("softnlp.workspace.run.package_version", {"casadi": casadi, "numpy": "2.4.0"}.get)
+        run_sweep(load_scenario(path), out, resume=True, stop=lambda: True)
+    status, told, _ = cli("sweep", path, "--out", out, "--resume")
+    assert status == 3  # every fifth pose is made up as failed
+    assert told.splitlines()[1] == "warning: the sweep was begun with casadi 3.8.0 and goes on with 3.9.0"
+    assert json.loads(opened(out).attrs["versions_before"]) == [{"casadi": "3.8.0", "numpy": "2.4.0"}]
 
 
 def test_what_a_full_disk_left_out_is_written_when_it_is_continued(tmp_path: Path, cli: Cli, no_solving: None) -> None:

@@ -18,6 +18,8 @@ from scipy.stats import qmc
 from sweeps import GRID, HEAD, scenario
 
 from softnlp.errors import InputError, RobotError
+from softnlp.laws import Law, formula_law, function_law
+from softnlp.materials import Material
 from softnlp.robot import ROBOTS, check
 from softnlp.scenario_workspace import MOST_POSES
 from softnlp.units import BAR
@@ -229,6 +231,29 @@ def test_a_fingerprint_is_the_same_in_another_process_and_after_pickling() -> No
         [sys.executable, "-c", code], input=formula + GRID, capture_output=True, text=True, check=True
     )
     assert told.stdout.strip() == plan.fingerprint()
+
+
+def test_a_fingerprint_tells_laws_apart_by_their_text_and_constants() -> None:
+    """Of a person's function by its operations, numbers in full; of none by what a release of CasADi makes of it."""
+    plan = planned(GRID)
+
+    def of(law: Law, c: float = 0.03) -> str:
+        return replace(plan, model=replace(plan.model, material=Material("mine", law, {"c": c}))).fingerprint()
+
+    def function(factor: float) -> Law:
+        return function_law("mine", lambda s, c: c * (s - s**-2) * factor, ["c"])
+
+    laws = [
+        formula_law("mine", "c * (stretch - stretch**-2)", ["c"]),
+        formula_law("mine", "c * (stretch - stretch**-3)", ["c"]),
+        function(1.5),
+        function(1.5 + 1e-15),
+    ]
+    prints = [of(law) for law in laws]
+    assert len({*prints, of(laws[0], 0.04), of(laws[2], 0.04), plan.fingerprint()}) == len(prints) + 3
+    assert of(function(1.5)) == of(pickle.loads(pickle.dumps(laws[2]))) == prints[2]
+    assert plan.model.material.law.told == ("mooney-rivlin", "C10_MPa", "C01_MPa", "C20_MPa", "_mooney_rivlin")
+    assert laws[0].told == ("mine", "c", "c * (stretch - stretch**-2)")
 
 
 def test_cells_are_whole_chunks() -> None:

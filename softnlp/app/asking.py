@@ -9,7 +9,7 @@ from softnlp.app.document import Document
 from softnlp.app.job import Progress, Stopped
 from softnlp.app.session import Session
 from softnlp.errors import InputError
-from softnlp.runner import partial_run, run_scenario
+from softnlp.runner import partial_run, solve_steps
 from softnlp.scenario import Scenario, scenario_from_text
 from softnlp.studies.step import Run, Step
 from softnlp.units import BAR
@@ -43,7 +43,7 @@ def run_steps(asked: Scenario, progress: Progress, on_step: Callable[[Step], Non
     Raises
     ------
     InputError
-        For more steps than the page takes, and as `run_scenario`.
+        For more steps than the page takes, and as `softnlp.run_scenario`.
     """
     if asked.step_count > MOST_STEPS:
         raise InputError(
@@ -59,7 +59,7 @@ def run_steps(asked: Scenario, progress: Progress, on_step: Callable[[Step], Non
             progress(len(steps), asked.step_count, f"{len(steps)} of {asked.step_count} steps")
 
     try:
-        return run_scenario(asked, done)
+        return solve_steps(asked, done)
     except Stopped:
         return partial_run(asked, steps)
 

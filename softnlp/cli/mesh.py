@@ -158,7 +158,7 @@ def _number(step: int | None, count: int) -> int:
 
 def _solved(asked: Scenario, number: int) -> list[Step]:
     """Solve the steps up to a number, each from the last, with a progress bar."""
-    from softnlp.runner import run_scenario
+    from softnlp.runner import solve_steps
 
     steps: list[Step] = []
     with progress(number, asked.title) as (advance, stop_asked):
@@ -170,5 +170,5 @@ def _solved(asked: Scenario, number: int) -> list[Step]:
                 raise _Enough
 
         with suppress(_Enough):
-            run_scenario(asked, keep)
+            solve_steps(asked, keep)
     return steps

@@ -96,7 +96,7 @@ def _require_branches(asked: Scenario, branches: int) -> None:
 
 def _solve(asked: Scenario, branches: int) -> tuple[Run, bool]:
     """Run a scenario with a progress bar; return the steps that were done and whether it was stopped before the end."""
-    from softnlp.runner import partial_run, run_scenario
+    from softnlp.runner import partial_run, solve_steps
 
     total = asked.step_count
     steps: list[Step] = []
@@ -109,7 +109,7 @@ def _solve(asked: Scenario, branches: int) -> tuple[Run, bool]:
                 raise _StopRun
 
         try:
-            return run_scenario(asked, keep, branches), False
+            return solve_steps(asked, keep, branches), False
         except _StopRun:
             return partial_run(asked, steps), True
 

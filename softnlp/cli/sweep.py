@@ -91,24 +91,21 @@ def _run(
     csv: bool = False,
 ) -> SweepSummary:
     """Run a sweep with a progress bar, and write what goes beside its result."""
-    from softnlp.workspace.planning import plan_of
     from softnlp.workspace.pool import cluster_executor
     from softnlp.workspace.run import run_sweep
 
-    plan = plan_of(asked)
     with ExitStack() as stack:
         executor: Executor | None = None if cluster is None else stack.enter_context(cluster_executor(cluster))
         bar = stack.enter_context(_bar(asked.title))
         stop = stack.enter_context(interrupt_asked(bar.stopping))
         summary = run_sweep(
-            plan,
+            asked,
             folder,
             executor=executor,
             workers=workers or _processors(),
             resume=resume,
             progress=bar.show,
             stop=stop,
-            about={"title": asked.title, "scenario": asked.text, "warnings": json_module.dumps(asked.warnings)},
             csv=csv,
         )
     if not summary.stopped:
@@ -134,7 +131,8 @@ def _told(asked: Scenario, folder: Path, summary: SweepSummary) -> int:
     """Print what a sweep came to; return the exit status."""
     model = f"{asked.robot.name}, {asked.material.name} ({asked.material.law.name})"
     held = gravity_lines(asked.loads.gravity)
-    say("\n".join([f"{asked.title}: {model}", *held, *(f"warning: {warning}" for warning in asked.warnings)]))
+    warnings = (f"warning: {w}" for w in (*asked.warnings, *summary.notes))
+    say("\n".join([f"{asked.title}: {model}", *held, *warnings]))
     if summary.already and summary.already == summary.poses and not summary.written:
         say("this sweep was finished already; nothing was rewritten")
     elif summary.already:

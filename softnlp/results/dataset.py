@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +29,7 @@ from softnlp.results.inputs import (
     robot_table,
     versions,
 )
+from softnlp.results.netcdf import dataset_bytes, said
 from softnlp.results.targets import INVERSE, TARGET_FIELDS, target_values
 from softnlp.solver import EquationResidual
 from softnlp.studies.step import Run, Step
@@ -74,19 +75,19 @@ def to_dataset(run: Run) -> xr.Dataset:
         "pressure_bar": (
             ("step", "set"),
             [pressure_bar(step.pressure) for step in steps],
-            _attributes("bar", "gauge pressure of each chamber set"),
+            said("bar", "gauge pressure of each chamber set"),
         ),
-        "status": (("step",), _text([s.status.value for s in steps]), _attributes("1", "how the step ended")),
-        "message": (("step",), _text([s.message for s in steps]), _attributes("1", "the same in words")),
+        "status": (("step",), _text([s.status.value for s in steps]), said("1", "how the step ended")),
+        "message": (("step",), _text([s.message for s in steps]), said("1", "the same in words")),
         "residual": (
             ("step",),
             [_number(s.residual) for s in steps],
-            _attributes("1", "largest equation error: force by EI/L^2, moment by EI/L, length by L"),
+            said("1", "largest equation error: force by EI/L^2, moment by EI/L, length by L"),
         ),
         "warnings": (
             ("step",),
             _text(["; ".join(s.warnings) for s in steps]),
-            _attributes("1", "warnings of the step"),
+            said("1", "warnings of the step"),
         ),
     }
     for field in dataset_fields(run):
@@ -96,7 +97,7 @@ def to_dataset(run: Run) -> xr.Dataset:
         variables |= _targets(run)
     if run.study == BLOCKED_FORCE:
         closures = _text([closure_of(run, step) or "" for step in steps])
-        variables["closure"] = (("step",), closures, _attributes("1", "which equations close the blocked shape"))
+        variables["closure"] = (("step",), closures, said("1", "which equations close the blocked shape"))
         variables |= _weighted(steps)
     return xr.Dataset(variables, coords=_coordinates(run, variables["arc"][1]), attrs=_global_attributes(run))
 
@@ -106,12 +107,7 @@ def netcdf_bytes(run: Run) -> bytes:
 
     It is made in memory: HDF5 writing to a full disk ends the interpreter instead of raising.
     """
-    content = to_dataset(run).to_netcdf(engine="h5netcdf")
-    return bytes(content)
-
-
-def _attributes(unit: str, meaning: str, **more: Any) -> dict[str, Any]:
-    return {"units": unit, "long_name": meaning, **more}
+    return dataset_bytes(to_dataset(run))
 
 
 def _number(value: float | None) -> float:
@@ -132,7 +128,7 @@ def _variable(field: Field, steps: Sequence[Step], sizes: dict[str, int]) -> Var
             "flag_values": np.array(list(STABLE_FLAGS.values()), np.int8),
             "flag_meanings": " ".join(STABLE_FLAGS),
         }
-        return dims, values, _attributes(field.unit, field.meaning, **meanings)
+        return dims, values, said(field.unit, field.meaning, **meanings)
     array = np.full((len(steps), *(sizes[d] for d in field.dims)), np.nan)
     for k, step in enumerate(steps):
         pose = solved_pose(step)
@@ -140,7 +136,7 @@ def _variable(field: Field, steps: Sequence[Step], sizes: dict[str, int]) -> Var
         if value is not None:
             value = np.asarray(value, dtype=float)
             array[k, ...][tuple(slice(n) for n in value.shape)] = value
-    return dims, array, _attributes(field.unit, field.meaning)
+    return dims, array, said(field.unit, field.meaning)
 
 
 def _targets(run: Run) -> dict[str, Variable]:
@@ -150,7 +146,7 @@ def _targets(run: Run) -> dict[str, Variable]:
     for field in TARGET_FIELDS:
         nothing = np.full((3,) * len(field.dims), np.nan)
         rows = [nothing if row[field.name] is None else row[field.name] for row in values]
-        made[field.name] = (("step", *field.dims), np.array(rows, float), _attributes(field.unit, field.meaning))
+        made[field.name] = (("step", *field.dims), np.array(rows, float), said(field.unit, field.meaning))
     return made
 
 
@@ -179,15 +175,23 @@ def _weighted(steps: Sequence[Step]) -> dict[str, Variable]:
         return {}
     dims, line = ("step", "weighted_equation"), ("weighted_equation",)
     return {
-        "weighted_residual": (
-            dims,
-            values[0],
-            _attributes("see weighted_residual_unit", "what `weighted` left of each equation"),
-        ),
-        "weighted_residual_scaled": (dims, values[1], _attributes("1", "the same, scaled as the certificate")),
-        "weighted_residual_unit": (line, _text(list(units.values())), _attributes("1", "unit of what was left")),
-        "weighted_equation": (line, _text(list(units)), _attributes("1", "equation that `weighted` weighs")),
+        **_by_unit("weighted_residual", dims, values[0], units, "what `weighted` left of each equation"),
+        "weighted_residual_scaled": (dims, values[1], said("1", "the same, scaled as the certificate")),
+        "weighted_residual_unit": (line, _text(list(units.values())), said("1", "unit of what was left")),
+        "weighted_equation": (line, _text(list(units)), said("1", "equation that `weighted` weighs")),
     }
+
+
+def _by_unit(
+    name: str, dims: tuple[str, ...], values: Array, units: Mapping[str, str], meaning: str
+) -> dict[str, Variable]:
+    """Return values of equations (step, equation) as a variable for each unit, NaN at the equations of another one."""
+    made: dict[str, Variable] = {}
+    for unit in dict.fromkeys(units.values()):
+        own = np.where([other == unit for other in units.values()], values, np.nan)
+        label = name if unit == "1" else f"{name}_{unit.replace(' ', '')}"
+        made[label] = (dims, own, said(unit, f"{meaning} that has this unit"))
+    return made
 
 
 def _certificate(steps: Sequence[Step]) -> dict[str, Variable]:
@@ -195,14 +199,14 @@ def _certificate(steps: Sequence[Step]) -> dict[str, Variable]:
     values, units = _spread([step.certificate for step in steps])
     dims = ("step", "equation")
     return {
-        "certificate": (dims, values[0], _attributes("see equation_unit", "largest error of each equation")),
+        **_by_unit("certificate", dims, values[0], units, "largest error of each equation"),
         "certificate_scaled": (
             dims,
             values[1],
-            _attributes("1", "the same: force by EI/L^2, moment by EI/L, length by L"),
+            said("1", "the same: force by EI/L^2, moment by EI/L, length by L"),
         ),
-        "equation_unit": (("equation",), _text(list(units.values())), _attributes("1", "unit of the certificate")),
-        "equation": (("equation",), _text(list(units)), _attributes("1", "equation of the certificate")),
+        "equation_unit": (("equation",), _text(list(units.values())), said("1", "unit of the certificate")),
+        "equation": (("equation",), _text(list(units)), said("1", "equation of the certificate")),
     }
 
 
@@ -210,22 +214,22 @@ def _coordinates(run: Run, arc: Array) -> dict[str, Variable]:
     robot = run.robot
     axes = {"axis": "axis", "row": "world axis", "col": "body axis"}
     coordinates: dict[str, Variable] = {
-        "step": (("step",), np.arange(1, len(run.steps) + 1), _attributes("1", "step of the run, from 1")),
-        "set": (("set",), np.arange(1, robot.chamber_sets + 1), _attributes("1", "chamber set, from 1")),
-        "chamber": (("chamber",), np.arange(1, robot.chambers + 1), _attributes("1", "chamber, set by set, from 1")),
+        "step": (("step",), np.arange(1, len(run.steps) + 1), said("1", "step of the run, from 1")),
+        "set": (("set",), np.arange(1, robot.chamber_sets + 1), said("1", "chamber set, from 1")),
+        "chamber": (("chamber",), np.arange(1, robot.chambers + 1), said("1", "chamber, set by set, from 1")),
         "chamber_set": (
             ("chamber",),
             np.array(robot.set_of_chamber) + 1,
-            _attributes("1", "set of each chamber, from 1"),
+            said("1", "set of each chamber, from 1"),
         ),
-        **{name: ((name,), list(AXES), _attributes("1", meaning)) for name, meaning in axes.items()},
+        **{name: ((name,), list(AXES), said("1", meaning)) for name, meaning in axes.items()},
     }
     if any(step.time is not None for step in run.steps):
         times = [_number(step.time) for step in run.steps]
-        coordinates["t_s"] = (("step",), times, _attributes("s", "time of the step"))
+        coordinates["t_s"] = (("step",), times, said("s", "time of the step"))
     solved = arc[~np.isnan(arc[:, :1]).all(axis=1)]
     if len(solved) and (solved == solved[0]).all():
-        coordinates["s"] = (("s",), solved[0], _attributes("1", "position along the rod s/L, from base to tip"))
+        coordinates["s"] = (("s",), solved[0], said("1", "position along the rod s/L, from base to tip"))
     return coordinates
 
 

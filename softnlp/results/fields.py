@@ -133,7 +133,7 @@ SHAPE_FIELDS: tuple[Field, ...] = (
         "shear and extension v in the body frame",
         lambda s, p: p.shape.shear_extension,
     ),
-    Field("curvature_per_m", ("s", "axis"), "m-1", "curvature u in the body frame", lambda s, p: p.shape.curvature),
+    Field("curvature_per_m", ("s", "axis"), "1/m", "curvature u in the body frame", lambda s, p: p.shape.curvature),
 )
 
 

@@ -129,9 +129,7 @@ def material_file_text(task: TensileTask, fit: TensileFit) -> str:
 
 def formula_of(law: Any) -> str | None:
     """Return the text of a person's law, None for a built-in one."""
-    function = getattr(law.formula, "function", None)
-    text = getattr(function, "text", None)
-    return str(text) if text is not None else None
+    return getattr(getattr(law.formula, "function", None), "text", None)
 
 
 def tensile_table_text(task: TensileTask, fit: TensileFit) -> str:

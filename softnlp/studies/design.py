@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import os
-import pickle
-import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
 from typing import Any
 
 from softnlp.contact_settings import ContactSettings
 from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.materials import Material
 from softnlp.numerics import Numerics
+from softnlp.processes import begin_worker, process_context
 from softnlp.quantities import Model
 from softnlp.robot import Robot
 from softnlp.rod import Loads
@@ -99,7 +97,7 @@ def design(
     coefficients, conventions, numerics, title
         As `softnlp.forward`.
     workers
-        Processes; above 1 a script needs `if __name__ == "__main__"`.
+        Processes, which do not run a script again.
     progress
         Called with the number done and each candidate as it is done; what it raises ends the study.
 
@@ -149,20 +147,11 @@ def _candidates(setting: Setting, task: DesignTask, workers: int) -> Iterator[Ca
         yield from searched(workshop)
         return
     every = list(enumerate(task.combinations(), start=1))
-    if workers > 1 and _can_be_sent(setting, task):
+    if workers > 1:
         yield from _in_processes(setting, task, every, workers)
         return
     for number, combination in every:
         yield workshop.candidate(number, combination)
-
-
-def _can_be_sent(setting: Setting, task: DesignTask) -> bool:
-    """Whether other processes can be given the task: a law of a person's own Python function may not."""
-    try:
-        pickle.dumps((setting, task))
-    except (pickle.PicklingError, AttributeError, TypeError):
-        return False
-    return True
 
 
 def _in_processes(
@@ -171,9 +160,8 @@ def _in_processes(
     """Yield candidates as processes finish them, those of one structure together."""
     grouped = sorted(every, key=lambda pair: structure(*with_choices(setting, pair[1])))
     chunks = [grouped[k : k + _CHUNK] for k in range(0, len(grouped), _CHUNK)]
-    pool = ProcessPoolExecutor(
-        min(workers, os.cpu_count() or 1), mp_context=get_context("spawn"), initializer=_leave_interrupts
-    )
+    count = min(workers, len(chunks), os.cpu_count() or 1)
+    pool = ProcessPoolExecutor(count, mp_context=process_context(), initializer=begin_worker)
     try:
         jobs = [pool.submit(_chunk, setting, task, chunk) for chunk in chunks]
         for job in as_completed(jobs):
@@ -186,8 +174,3 @@ def _chunk(setting: Setting, task: DesignTask, chunk: Sequence[tuple[int, Mappin
     """Return the candidates of a chunk."""
     workshop = Workshop(setting, task)
     return [workshop.candidate(number, combination) for number, combination in chunk]
-
-
-def _leave_interrupts() -> None:
-    """Leave Ctrl-C to the process that asked."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -20,6 +20,7 @@ Array = NDArray[Any]
 
 TEXT = "text"
 _STATUS_NAMES = np.array([status.value for status in STATUSES], dtype=object)
+LONGEST_STATUS = max(len(status.value) for status in STATUSES)
 _STABLE_FLAGS = {"not_solved": -1, "unstable": 0, "stable": 1}
 _DECIMALS = 12
 

@@ -25,7 +25,8 @@ from softnlp.results.inputs import (
     robot_table,
     versions,
 )
-from softnlp.workspace.columns import TEXT, Column, columns
+from softnlp.results.netcdf import as_characters, encoded, put, put_attributes, put_characters, said
+from softnlp.workspace.columns import LONGEST_STATUS, TEXT, Column, columns
 from softnlp.workspace.journal import Journal
 from softnlp.workspace.plan import Plan
 from softnlp.workspace.poses import Rows
@@ -61,13 +62,16 @@ def write_workspace(path: str | PathLike[str], plan: Plan, journal: Journal, abo
         sink = Sink(raw)
         try:
             with h5netcdf.File(sink, "w") as file:
-                file.attrs.update(_attributes(plan) | dict(about))
+                put_attributes(file, _attributes(plan) | dict(about))
                 _declare(file, plan, listed)
                 sink.check()
                 for start, rows in _slabs(plan, journal, MEMORY):
                     numbers = np.arange(start, start + rows.size, dtype=np.int64)
                     for column in listed:
-                        file.variables[column.name][start : start + rows.size] = column.of(rows, numbers)
+                        values = column.of(rows, numbers)
+                        if column.kind == TEXT:
+                            values = as_characters(values.astype(f"S{LONGEST_STATUS}"))
+                        file.variables[column.name][start : start + rows.size] = values
                         sink.check()
                 _write_messages(file, journal, sink)
         finally:
@@ -112,7 +116,7 @@ def data_hash(path: str | PathLike[str]) -> str:
             digest.update(f"{name} {variable.dimensions} {variable.shape} {variable.dtype}\n".encode())
             for start in range(0, variable.shape[0], _TEXTS_AT_ONCE):
                 values = np.asarray(variable[start : start + _TEXTS_AT_ONCE])
-                if values.dtype.kind in "OUS":
+                if values.dtype.kind == "O":  # of a file of version 0.1
                     digest.update("\0".join(map(str, values.tolist())).encode())
                 else:
                     digest.update(np.ascontiguousarray(values).tobytes())
@@ -137,24 +141,19 @@ def _sizes(plan: Plan) -> dict[str, int]:
 
 def _declare(file: Any, plan: Plan, listed: tuple[Column, ...]) -> None:
     """Make the dimensions, their coordinates and every variable."""
-    import h5py
-
     sizes = {"pose": plan.poses, **_sizes(plan)}
     file.dimensions = sizes
-    text = h5py.string_dtype()
     for name, meaning in (("pose", "pose of the sweep"), ("set", "chamber set"), ("chamber", "chamber, set by set")):
         numbers = np.arange(1, sizes[name] + 1, dtype=np.int64)
-        file.create_variable(name, (name,), "i8", data=numbers).attrs.update(_said("1", f"{meaning}, from 1"))
+        put(file, name, (name,), numbers, said("1", f"{meaning}, from 1"))
     for name, meaning in (("axis", "axis"), ("row", "world axis"), ("col", "body axis")):
-        file.create_variable(name, (name,), text, data=np.array(_AXES, object)).attrs.update(_said("1", meaning))
+        put(file, name, (name,), np.array(_AXES), said("1", meaning))
     for column in listed:
-        kind = text if column.kind == TEXT else column.kind
-        variable = file.create_variable(column.name, ("pose", *column.dims), kind)
-        variable.attrs.update(_said(column.unit, column.meaning) | column.more)
-
-
-def _said(unit: str, meaning: str) -> dict[str, Any]:
-    return {"units": unit, "long_name": meaning}
+        dims, attributes = ("pose", *column.dims), said(column.unit, column.meaning, **column.more)
+        if column.kind == TEXT:
+            put_characters(file, column.name, dims, LONGEST_STATUS, attributes)
+        else:
+            put_attributes(file.create_variable(column.name, dims, column.kind), attributes)
 
 
 def _slabs(plan: Plan, journal: Journal, memory: int) -> Iterator[tuple[int, Rows]]:
@@ -179,21 +178,20 @@ def _slabs(plan: Plan, journal: Journal, memory: int) -> Iterator[tuple[int, Row
 
 def _write_messages(file: Any, journal: Journal, sink: Sink) -> None:
     """Write what was said of poses that ended otherwise than solved, in the order in which they were walked."""
-    import h5py
-
-    count = sum(1 for _ in journal.messages())
-    if not count:
+    lengths = [len(text.encode()) for _, text in journal.messages()]
+    if not lengths:
         return
-    file.dimensions["unsolved"] = count
+    file.dimensions["unsolved"] = len(lengths)
     poses = file.create_variable("unsolved_pose", ("unsolved",), "i8")
-    poses.attrs.update(_said("1", "pose that ended otherwise than solved, from 1"))
-    texts = file.create_variable("unsolved_message", ("unsolved",), h5py.string_dtype())
-    texts.attrs.update(_said("1", "how it ended, in words"))
+    put_attributes(poses, said("1", "pose that ended otherwise than solved, from 1"))
+    about = said("1", "how it ended, in words")
+    width = max(1, *lengths)
+    texts = put_characters(file, "unsolved_message", ("unsolved",), width, about)
     told = journal.messages()
-    for start in range(0, count, _TEXTS_AT_ONCE):
+    for start in range(0, len(lengths), _TEXTS_AT_ONCE):
         part = list(islice(told, _TEXTS_AT_ONCE))
         poses[start : start + len(part)] = np.array([pose + 1 for pose, _ in part], np.int64)
-        texts[start : start + len(part)] = np.array([text for _, text in part], object)
+        texts[start : start + len(part)] = as_characters(encoded((text for _, text in part), width))
         sink.check()
 
 

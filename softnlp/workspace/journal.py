@@ -14,7 +14,7 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from softnlp.reading import one_line, shown
 from softnlp.workspace.plan import Plan
 from softnlp.workspace.poses import STATUSES, Block
 
-FORMAT = 1
+FORMAT = 2  # 1, of version 0.1, has fingerprints that change with CasADi
 APPLICATION_ID = 0x736E6C70  # "snlp", in the header of the file
 COMMIT_EVERY = 0.25  # [s]
 _PAGE = 16_384  # bytes; a chunk has some hundred thousand
@@ -53,11 +53,13 @@ class Journal:
     """The open journal of one plan; a context manager, which keeps what was added when it is left.
 
     path : of the file. done : (chunks,) whether a chunk is confirmed. counts : (statuses,) confirmed poses by how they
-    ended, in the order of `STATUSES`.
+    ended, in the order of `STATUSES`. earlier : versions of other packages with which it was written before this time.
     """
 
-    def __init__(self, path: Path, plan: Plan, version: str, *, resume: bool) -> None:
-        """Begin a journal, or with `resume` continue one where there is one.
+    def __init__(
+        self, path: Path, plan: Plan, version: str, *, resume: bool, versions: Mapping[str, str] = MappingProxyType({})
+    ) -> None:
+        """Begin a journal, or with `resume` continue one where there is one; `versions` are kept, and may differ.
 
         Raises
         ------
@@ -72,6 +74,7 @@ class Journal:
         self._committed = time.monotonic()
         self.done: NDArray[np.bool_] = np.zeros(plan.chunks, bool)
         self.counts: NDArray[np.int64] = np.zeros(len(STATUSES), np.int64)
+        self.earlier: list[dict[str, str]] = []
         with self._named():
             self._file = sqlite3.connect(path, timeout=0.0, isolation_level=None)
         try:
@@ -82,6 +85,7 @@ class Journal:
                     self._count()
                 else:
                     self._begin(identity(plan, version))
+                self._keep_versions(dict(versions))
         except BaseException:
             self._file.close()
             raise
@@ -194,7 +198,10 @@ class Journal:
         if self._pragma("application_id") != APPLICATION_ID:
             raise self._error("this sqlite file is not the journal of a sweep; choose another folder")
         if (found := self._pragma("user_version")) != FORMAT:
-            raise self._error(f"a journal of format {found}, this version writes {FORMAT}; choose another folder")
+            raise self._error(
+                f"a journal of format {found}, of softnlp {shown(self._meta().get('softnlp'))}; this version continues "
+                f"format {FORMAT}: finish it with that version or begin again in another folder"
+            )
         return True
 
     def _begin(self, told: Mapping[str, str]) -> None:
@@ -202,6 +209,12 @@ class Journal:
             for statement in (f"PRAGMA application_id = {APPLICATION_ID}", f"PRAGMA user_version = {FORMAT}", *_TABLES):
                 self._file.execute(statement)
             self._file.executemany("INSERT INTO meta VALUES (?, ?)", told.items())
+
+    def _keep_versions(self, now: dict[str, str]) -> None:
+        known = json.loads(self._meta().get("versions", "[]"))
+        self.earlier = [versions for versions in known if versions != now]
+        if now not in known:
+            self._file.execute("INSERT OR REPLACE INTO meta VALUES ('versions', ?)", (json.dumps([*known, now]),))
 
     def _compare(self, told: Mapping[str, str], resume: bool) -> None:
         """Refuse the journal of something else, and one that was not asked for."""

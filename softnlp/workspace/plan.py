@@ -98,7 +98,7 @@ class Plan:
             "robot": self.model.robot.name,
             "sets": [self.model.robot.chamber_sets, self.model.robot.chambers_per_set],
             "material": self.model.material.name,
-            "law": self.model.material.law.functions.true_stress.serialize(),
+            "law": self.model.material.law.told,
             "quantities": {name: [float(v).hex() for v in values] for name, values in self.nominal.items()},
             "wall": {n: [float(v).hex() for v in q.nominal] for n, q in contact_quantities(self.model).items()},
             "conventions": asdict(self.model.conventions),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.scenario import Scenario
+from softnlp.scenario import Scenario, scenario_of
 from softnlp.workspace.plan import CHUNK, Plan, cells
 from softnlp.workspace.table import pressure_table, varied_table
 from softnlp.workspace.task import WorkspaceTask
@@ -18,10 +18,14 @@ def plan_of(scenario: Scenario) -> Plan:
 
     Poses are numbered as `softnlp.workspace.table` lists them. Grids and samples are walked cell by cell, so that
     neighbours are solved together; pressures of the scenario's own in the order in which they are given.
+
+    Raises
+    ------
+    InputError
+        For anything else.
     """
-    task = scenario.task
-    if not isinstance(task, WorkspaceTask):
-        raise TypeError(f"expected a scenario of study 'workspace', got {scenario.study!r}")
+    task = scenario_of(scenario, "workspace", "plan_of").task
+    assert isinstance(task, WorkspaceTask)
     model = scenario.model
     pressures = pressure_table(task, scenario.robot.chamber_sets, scenario.pressures)
     varied, columns = _varied(task, scenario, len(pressures))

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import pickle
-import sys
 import tempfile
-import threading
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -15,6 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from softnlp.errors import InputError
+from softnlp.processes import process_context
 from softnlp.reading import one_line
 from softnlp.workspace.plan import Plan
 from softnlp.workspace.poses import Block
@@ -61,7 +59,7 @@ class ProcessCrew:
         self._pool.shutdown(wait=True, cancel_futures=True)
 
     def _start(self) -> ProcessPoolExecutor:
-        context = _context()
+        context = process_context()
         if context.get_start_method() == "fork":
             keep(*self._given)  # what is made here need not be made by each of them
         return ProcessPoolExecutor(self._workers, mp_context=context, initializer=prepare, initargs=self._given)
@@ -137,11 +135,3 @@ def cluster_executor(address: str) -> Iterator[Executor]:
         yield client.get_executor(pure=False)
     finally:
         client.close()
-
-
-def _context() -> Any:
-    """Return how processes are started: by fork, which is quickest, only where no thread runs that it would cut off."""
-    methods = multiprocessing.get_all_start_methods()
-    if sys.platform == "linux" and threading.active_count() == 1:
-        return multiprocessing.get_context("fork")
-    return multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")

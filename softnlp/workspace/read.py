@@ -182,7 +182,7 @@ def read_column(workspace: Workspace, name: str) -> Column:
         variable, index = known[name]
         values = np.asarray(data[variable][(slice(None), *index)], dtype=float)
         unit = _unit(data[variable])
-        meaning = str(data[variable].attrs.get("long_name", name))
+        meaning = str(_text(data[variable].attrs.get("long_name", name)))
     if variable in _POSE_NUMBERS:
         values[~workspace.solved] = np.nan
     return Column(name, unit, meaning, values)
@@ -258,7 +258,7 @@ def _attributes(data: Any) -> dict[str, Any]:
     """Return the global attributes, those that hold JSON parsed."""
     found: dict[str, Any] = {}
     for name, value in data.attrs.items():
-        text = value.decode() if isinstance(value, bytes) else value
+        text = _text(value)
         found[name] = json.loads(text) if isinstance(text, str) and text[:1] in "[{" and text else text
     return found
 
@@ -291,6 +291,8 @@ def _statuses(data: Any, N: int) -> NDArray[np.int8]:
     position = {status.value.encode(): k for k, status in enumerate(STATUSES)}
     for start in range(0, N, _SLAB):
         words = np.asarray(data["status"][start : start + _SLAB])
+        if words.ndim == 2:
+            words = np.ascontiguousarray(words).view(f"S{words.shape[1]}")[:, 0]
         for word in set(words.tolist()):
             text = word if isinstance(word, bytes) else str(word).encode()
             if text not in position:
@@ -312,7 +314,12 @@ def _columns(data: Any) -> Iterator[tuple[str, str, tuple[int, ...]]]:
 
 
 def _unit(found: Any) -> str:
-    return str(found.attrs.get("units", "1"))
+    return str(_text(found.attrs.get("units", "1")))
+
+
+def _text(value: Any) -> Any:
+    """Return text of characters, or of type `string` as version 0.1 wrote it."""
+    return value.decode() if isinstance(value, bytes) else value
 
 
 def _is_per_pose(found: Any) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -17,11 +18,14 @@ from softnlp import __version__
 from softnlp.errors import SoftnlpError
 from softnlp.reading import one_line
 from softnlp.results.files import make_folder
+from softnlp.results.inputs import package_version
+from softnlp.scenario import Scenario, scenario_of
 from softnlp.units import BAR
 from softnlp.workspace.chunk import ChunkSolver
 from softnlp.workspace.dataset import fingerprint_of, write_csv, write_workspace
 from softnlp.workspace.journal import Journal
 from softnlp.workspace.plan import Plan
+from softnlp.workspace.planning import plan_of
 from softnlp.workspace.pool import Crew, executor_crew, process_crew
 from softnlp.workspace.poses import STATUSES, Block
 
@@ -54,9 +58,24 @@ class SweepProgress:
 class SweepSummary:
     """What a sweep came to.
 
-    poses : of the plan. done, failed : confirmed, and of those without a solution. already : that were there before.
-    statuses : confirmed poses by how they ended. seconds : all of this run. stopped : before the end, when asked.
-    written : the files that this run wrote.
+    Attributes
+    ----------
+    poses
+        Of the plan.
+    done, failed
+        Confirmed, and of those without a solution.
+    already
+        That were there before.
+    statuses
+        Confirmed poses by how they ended.
+    seconds
+        Of all of this run [s].
+    stopped
+        Before the end, when asked.
+    written
+        The files that this run wrote.
+    notes
+        Versions of other packages with which some of the poses were solved before.
     """
 
     poses: int
@@ -67,10 +86,11 @@ class SweepSummary:
     seconds: float
     stopped: bool
     written: tuple[Path, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def rate(self) -> float:
-        """Poses solved a second."""
+        """Poses solved a second [1]."""
         return (self.done - self.already) / self.seconds if self.seconds > 0 else 0.0
 
 
@@ -80,8 +100,8 @@ _Tell = Callable[[], None]
 
 
 def run_sweep(
-    plan: Plan,
-    out: str | PathLike[str],
+    scenario: Scenario | Plan,
+    folder: str | PathLike[str],
     *,
     executor: Executor | None = None,
     workers: int = 1,
@@ -91,31 +111,61 @@ def run_sweep(
     about: Mapping[str, str] | None = None,
     csv: bool = False,
 ) -> SweepSummary:
-    """Solve every pose of a plan and write `workspace.nc`: the same, whoever solves what and in however many runs.
+    """Solve every pose of a workspace and write `workspace.nc`: the same, whoever solves what and in how many runs.
 
     Parameters
     ----------
-    out : folder, made where missing, for the journal and the result.
-    executor : solves the chunks, such as that of a Dask client; None takes `workers` processes of this machine, or this
-        process alone for one worker or very few poses.
-    resume : continue the sweep that has begun in `out`, if one has.
-    progress : called where poses were confirmed, the first time after the workers have started.
-    stop : asked now and then whether to stop; what is being solved is finished and kept.
-    about : further attributes of the result file, such as its title.
-    csv : write `workspace.csv` as well; one that is there is replaced in any case.
+    scenario
+        Of study "workspace", or a plan of one.
+    folder
+        Made where missing, for the journal and the result.
+    executor
+        Solves the chunks, such as that of a Dask client; None takes processes of this machine.
+    workers
+        Processes, which do not run a script again; this one alone for one worker or very few poses.
+    resume
+        Continue the sweep that has begun in the folder, if one has.
+    progress
+        Called where poses were confirmed, the first time after the workers have started.
+    stop
+        Asked now and then whether to stop; what is being solved is finished and kept.
+    about
+        Attributes of the result file beside those of a scenario, such as a title.
+    csv
+        Write `workspace.csv` as well; one that is there is replaced in any case.
+
+    Returns
+    -------
+    SweepSummary
+        Counts and files; `softnlp.workspace.read.load_workspace` reads the poses.
 
     Raises
     ------
     InputError
-        As `Journal`, and where the result cannot be written.
+        For anything but such a scenario or a plan; where the folder holds another sweep, or cannot be written.
     SweepError
         Where workers die again and again, or a chunk cannot be solved. What was confirmed before is kept.
     """
+    if isinstance(scenario, Plan):
+        plan, told = scenario, dict(about or {})
+    else:
+        plan = plan_of(scenario_of(scenario, "workspace", "softnlp.run_sweep"))
+        warnings = json.dumps(scenario.warnings)
+        told = {"title": scenario.title, "scenario": scenario.text, "warnings": warnings, **(about or {})}
     began = time.monotonic()
-    folder = make_folder(out)
+    folder = make_folder(folder)
     result, table = folder / WORKSPACE_FILE, folder / CSV_FILE
-    with Journal(folder / JOURNAL_FILE, plan, __version__, resume=resume) as journal:
+    versions = {package: package_version(package) for package in ("casadi", "numpy")}
+    with Journal(folder / JOURNAL_FILE, plan, __version__, resume=resume, versions=versions) as journal:
         already = journal.poses
+        if journal.earlier:
+            told["versions_before"] = json.dumps(journal.earlier)
+        notes = tuple(
+            f"the sweep was begun with {package} {before[package]} and goes on with {now}"
+            for before in journal.earlier
+            for package, now in versions.items()
+            if before.get(package, now) != now
+        )
 
         def report() -> None:
             if progress is not None:
@@ -125,7 +175,8 @@ def run_sweep(
         def summary(stopped: bool, *written: Path) -> SweepSummary:
             seconds = time.monotonic() - began
             counts = {status.value: int(n) for status, n in zip(STATUSES, journal.counts, strict=True) if n}
-            return SweepSummary(plan.poses, journal.poses, journal.failed, already, counts, seconds, stopped, written)
+            poses, failed = journal.poses, journal.failed
+            return SweepSummary(plan.poses, poses, failed, already, counts, seconds, stopped, written, notes)
 
         todo = [int(chunk) for chunk in np.flatnonzero(~journal.done)]
         finished = not todo and fingerprint_of(result) == plan.fingerprint()
@@ -137,7 +188,7 @@ def run_sweep(
                 return summary(True)
             for left in folder.glob(f".{WORKSPACE_FILE[:-3]}.*.part"):  # of a process that was killed while writing
                 left.unlink(missing_ok=True)
-        written = [] if finished else [write_workspace(result, plan, journal, about or {})]
+        written = [] if finished else [write_workspace(result, plan, journal, told)]
         if (csv and not table.exists()) or (written and table.exists()):
             written.append(write_csv(table, plan, journal))
         return summary(False, *written)

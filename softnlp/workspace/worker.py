@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import pickle
-import signal
 import threading
 from dataclasses import dataclass
-from multiprocessing import connection, parent_process
 from pathlib import Path
 
+from softnlp.processes import begin_worker
 from softnlp.workspace.chunk import ChunkSolver
 from softnlp.workspace.plan import Plan
 from softnlp.workspace.poses import Block
@@ -56,19 +54,11 @@ def _kept(source: Plan | PlanFile, fingerprint: str) -> ChunkSolver:
 
 
 def prepare(plan: Plan, fingerprint: str) -> None:
-    """Begin a worker of a process pool: keep the plan, leave Ctrl-C to the parent, and end when the parent has gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Begin a worker of a process pool, and keep the plan."""
+    begin_worker()
     _plans[fingerprint] = plan
-    if (parent := parent_process()) is not None:
-        # A parent that was killed tells nobody; its workers would wait for the next chunk for ever.
-        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
 
 
 def solve_prepared(fingerprint: str, chunk: int) -> Block:
     """Return the solved poses of a chunk of the plan that `prepare` got."""
     return solve(_plans[fingerprint], fingerprint, chunk)
-
-
-def _end_with(sentinel: int) -> None:
-    connection.wait([sentinel])
-    os._exit(1)
