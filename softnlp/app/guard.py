@@ -75,7 +75,7 @@ def refusal(
     own = {server[0], *(_LOOPBACK if _is_loopback(server[0]) else ())}
     host = authority(hosts[0]) if len(hosts) == 1 else None
     if host is None or not (host[0] in own or _trusts(trusted, host)):
-        return _words("Host", hosts)
+        return _words("Host", hosts, host)
     for origin in origins:
         scheme, _, rest = origin.lower().partition("://")
         port = _PORTS.get(scheme)
@@ -85,7 +85,7 @@ def refusal(
         name, asked_port = asked[0], asked[1] or port
         same = (name, asked_port) == (host[0], host[1] or port)
         if not (same or (name in own and asked_port == server[1]) or _trusts(trusted, asked)):
-            return _words("Origin", [origin])
+            return _words("Origin", [origin], asked)
     return None
 
 
@@ -148,9 +148,10 @@ def _trusts(trusted: Collection[Authority], asked: Authority) -> bool:
     return asked in trusted or (asked[0], None) in trusted
 
 
-def _words(header: str, values: Sequence[str]) -> str:
+def _words(header: str, values: Sequence[str], asked: Authority | None = None) -> str:
     got = ", ".join(shown(value) for value in values) or "missing"
+    name = "NAME" if asked is None else asked[0]
     return (
         f"Refused: the header {header} of this request is {got}, which is not this server's own. If people shall open "
-        "softnlp under that name, start it with softnlp gui --trusted-host NAME."
+        f"softnlp under that name, start it with softnlp gui --trusted-host {name}"
     )

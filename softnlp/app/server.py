@@ -202,20 +202,21 @@ _FAVICON = (
 )
 
 _OPEN = (
-    "note: {address} is open to every machine that reaches this one, without a password; the app answers under that "
-    "address only, and under the names of --trusted-host"
+    "note: at {address} every machine that reaches this one can use the app, without a password; it answers to this "
+    "machine's addresses, and to the names of --trusted-host"
 )
-# Says what is wrong where a proxy takes a path away, so that none of the files is found, or sends another host.
-_ALONE = r"""<script>addEventListener("load", () => {
+# Says what is wrong where a proxy takes a path away, so that no file is found, or names another host to the server.
+_ALONE = r"""<script>addEventListener("load", async () => {
   const say = words => {
     document.body.style = "font: 16px sans-serif; margin: 3em";
     document.body.textContent = words;
   };
+  const refused = words => { if (words.startsWith("Refused")) say(words); };
+  window.socket?.on("connect_error", error => { if (error.description === 403) refused(error.context.responseText); });
+  if (window.socket) return;
   const path = location.pathname.replace(/\/+$/, "");
   if (!window.io) say("softnlp cannot load its own files. " + (path
     ? `A proxy takes the path ${path} away. Start softnlp with that path: softnlp gui --root-path ${path}`
     : "Look whether its server still runs, then load this page again."));
-  window.socket?.on("connect_error", error => {
-    if (error.description === 403) say(error.context.responseText);
-  });
+  else refused(await (await fetch(location.href, { method: "POST" })).text());  // a browser sends Origin with it
 });</script>"""
