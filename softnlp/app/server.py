@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import json
 import socket
 import sys
 from collections.abc import Sequence
@@ -17,6 +16,7 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
 from softnlp.app.guard import Guard, root_path, trusted_host
+from softnlp.app.kept import free_when_left, keep, recall
 from softnlp.app.page import build_page
 from softnlp.app.session import Session
 from softnlp.errors import InputError, SoftnlpError
@@ -25,8 +25,6 @@ from softnlp.reading import shown
 HOST = "127.0.0.1"
 FIRST_PORT, LAST_PORT = 8080, 8179
 RECONNECT_S = 60.0
-# Where a browser tab keeps its scenario and the files of it, for when the connection or the server was lost.
-_KEPT, _FILES = "softnlp.scenario", "softnlp.files"
 
 
 def serve(
@@ -110,9 +108,10 @@ async def open_tab(client: Client, scenario: Path | None) -> None:
             session.open_path(scenario)
         except SoftnlpError as error:  # it was there when the server started
             ui.notify(f"not opened: {error}", type="warning", multi_line=True)
-    await _recall(session)
+    await recall(session)
     build_page(session)
-    _keep(session)
+    keep(session)
+    free_when_left(client)
 
 
 def address_of(host: str) -> str:
@@ -164,36 +163,6 @@ def _not_found(request: Request, error: Exception) -> Response:
         "softnlp gui --root-path PATH\n",
         404,
     )
-
-
-def _keep(session: Session) -> None:
-    """Let the browser tab keep its scenario and files, so that a reload or a lost connection loses nothing."""
-    parts = {_KEPT: session.kept, _FILES: session.kept_files}
-    changed = set(parts)
-    written: dict[str, str] = {}
-
-    def write() -> None:
-        for key in tuple(changed):
-            text = parts[key]()
-            if written.get(key) != text:
-                written[key] = text
-                ui.run_javascript(f"sessionStorage.setItem({json.dumps(key)}, {json.dumps(text)})")
-        changed.clear()
-
-    session.on_scenario(lambda: changed.update(parts))
-    session.on_pressure(lambda: changed.add(_KEPT))  # files need not be read again for a slider
-    ui.timer(1.0, write)
-
-
-async def _recall(session: Session) -> None:
-    """Show what the browser tab kept."""
-    asked = f"return {json.dumps([_KEPT, _FILES])}.map(key => sessionStorage.getItem(key))"
-    kept, files = await ui.run_javascript(asked, timeout=10.0)
-    if isinstance(kept, str):
-        try:
-            session.recall(kept, files if isinstance(files, str) else "{}")
-        except SoftnlpError as error:
-            ui.notify(f"what this tab showed before could not be opened again: {error}", type="warning")
 
 
 _FAVICON = (
