@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from functools import partial
 
 from nicegui import Client, ui
+from starlette.requests import Request
+from starlette.responses import Response
 
 from softnlp.app.redraw import Redraw
 from softnlp.app.session import Session
@@ -13,8 +16,12 @@ from softnlp.errors import SoftnlpError
 
 _KEPT, _FILES = "softnlp.scenario", "softnlp.files"
 _PIECE = 400_000  # characters; a browser sends no message of more than a million bytes
+CLOSED = "/closed"
 # A tab that is closed says so, and its memory is free at once; one that only lost its connection may come back.
-_LEAVING = """addEventListener("pagehide", event => { if (!event.persisted) emitEvent("softnlp-closed"); });"""
+_LEAVING = f"""addEventListener("pagehide", event => {{
+  const who = `${{window.clientId}} ${{window.documentId}}`;
+  if (!event.persisted) navigator.sendBeacon(window.path_prefix + "{CLOSED}", who);
+}});"""
 
 
 def keep(session: Session) -> None:
@@ -60,12 +67,18 @@ async def _read(key: str) -> str:
     return "".join(map(str, pieces))
 
 
-def free_when_left(client: Client) -> None:
-    """Delete a page when its tab is closed or shows another one."""
-
-    def left() -> None:
-        if not client.is_deleted:
-            client.delete()
-
-    ui.on("softnlp-closed", left)
+def tell_when_closed() -> None:
+    """Let the browser tell when the page of the current slot is closed or another takes its place."""
     ui.run_javascript(_LEAVING)
+
+
+async def closed(request: Request) -> Response:
+    """Delete the page that a browser tells of."""
+    name, _, document = (await request.body()).decode(errors="replace").partition(" ")
+    client = Client.instances.get(name)
+    if client is not None:
+        for task in asyncio.all_tasks():  # of NiceGUI, which deletes it too some time after the connection has gone
+            if task.get_name() == f"delete content {document}":
+                task.cancel()
+        client.delete()
+    return Response(status_code=204)

@@ -16,7 +16,7 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
 from softnlp.app.guard import Guard, root_path, trusted_host
-from softnlp.app.kept import free_when_left, keep, recall
+from softnlp.app.kept import CLOSED, closed, keep, recall, tell_when_closed
 from softnlp.app.page import build_page
 from softnlp.app.session import Session
 from softnlp.errors import InputError, SoftnlpError
@@ -84,6 +84,7 @@ def serve(
 
     app.on_startup(begin)
     app.add_exception_handler(404, _not_found)
+    app.add_route(CLOSED, closed, methods=["POST"])
     ui.add_head_html(_ALONE, shared=True)
     if not ip_address(address).is_loopback:
         print(_OPEN.format(address=address), file=sys.stderr, flush=True)
@@ -111,7 +112,7 @@ async def open_tab(client: Client, scenario: Path | None) -> None:
     await recall(session)
     build_page(session)
     keep(session)
-    free_when_left(client)
+    tell_when_closed()
 
 
 def address_of(host: str) -> str:
