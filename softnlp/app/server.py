@@ -16,7 +16,7 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
 from softnlp.app.guard import Guard, root_path, trusted_host
-from softnlp.app.kept import CLOSED, closed, keep, recall, tell_when_closed
+from softnlp.app.kept import CLOSED, close_all, closed, keep, recall, tell_when_closed
 from softnlp.app.page import build_page
 from softnlp.app.session import Session
 from softnlp.errors import InputError, SoftnlpError
@@ -83,6 +83,7 @@ def serve(
             schedule_browser("http", urlsplit(said).hostname or HOST, chosen, "/")
 
     app.on_startup(begin)
+    app.on_shutdown(close_all)
     app.add_exception_handler(404, _not_found)
     app.add_route(CLOSED, closed, methods=["POST"])
     ui.add_head_html(_ALONE, shared=True)
