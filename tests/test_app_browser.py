@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import zipfile
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -201,16 +202,22 @@ def test_a_scenario_is_opened_with_its_files_and_saved_with_its_comments(tab: Wa
 
 def test_a_reload_and_another_tab(tab: Watched, new_tab: Any) -> None:
     tab.type("pressure-number-1", "0.37")
+    keeps(tab, "37000")
     other = new_tab()
     other.settled()
     assert other.input_value("input[data-testid=pressure-number-1]") == "0.8"
     tab.settled()
-    tab.page.wait_for_timeout(1500)
     before = tab.numbers()
     reload(tab)
     tab.value_becomes("pressure-number-1", "0.37")
     assert tab.numbers() == before
     other.page.close()
+
+
+def keeps(tab: Watched, text: str) -> None:
+    """Wait until the browser keeps a text of what is on the screen."""
+    kept = "Object.values(sessionStorage).join()"
+    tab.page.wait_for_function(f"{kept}.includes({text!r})")
 
 
 def reload(tab: Watched) -> None:
@@ -220,21 +227,51 @@ def reload(tab: Watched) -> None:
     tab.settled()
 
 
-def test_a_server_that_was_started_again_is_found_again(opener: Any) -> None:
-    """The tab keeps its scenario while there is no server, and shows it when there is one."""
+def test_a_server_that_was_started_again_is_found_again(
+    opener: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The tab keeps its scenario while there is no server, and shows it when there is one.
+
+    Neither the server that was stopped nor a tab that is closed leaves files behind.
+    """
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
     with ExitStack() as first:
         address, _ = first.enter_context(served())
         opened: Watched = opener(address)
+        opened.press("tab-blocked")
         opened.type("pressure-number-1", "0.41")
+        opened.type("robot-length_mm", "-60")  # which the picture does not follow
+        opened.page.wait_for_selector("[data-testid=message]:has-text('Not used')")
         opened.settled()
-        opened.page.wait_for_timeout(1500)
-        shown = opened.numbers()
+        keeps(opened, "-60")
+        shown, said = opened.numbers(), opened.text("message")
+        assert "blocked_force_N" in shown
+    assert not list(tmp_path.glob("softnlp-*"))
     opened.type("pressure-number-1", "0.9")  # into the void
     with served(port=int(address.rsplit(":", 1)[1].strip("/"))):
         opened.page.wait_for_function("document.querySelector('[data-frame]') !== null")
         opened.value_becomes("pressure-number-1", "0.41")
         opened.shows_again(shown)
-        opened.page.close()
+        assert opened.text("message") == said
+        assert opened.input_value("input[data-testid=robot-length_mm]") == "-60"
+        assert len(list(tmp_path.glob("softnlp-*"))) == 1
+        opened.page.close(run_before_unload=True)
+        for _ in range(150):
+            if not list(tmp_path.glob("softnlp-*")):
+                break
+            time.sleep(0.1)
+        assert not list(tmp_path.glob("softnlp-*"))
+
+
+def test_a_path_that_a_proxy_takes_away_is_said_in_words(new_tab: Any) -> None:
+    """A proxy that shows the page under /lab, while its files are looked for at the top, where there is nothing."""
+    page = new_tab().page
+    address = page.url
+    page.route("**/_nicegui/**", lambda route: route.fulfill(status=404))
+    page.route("**/lab/", lambda route: route.fulfill(response=route.fetch(url=address)))
+    page.goto(f"{address}lab/")
+    page.wait_for_selector("text=softnlp gui --root-path /lab")
+    page.close()
 
 
 def test_the_scenario_tab_edits_and_runs(tab: Watched) -> None:
@@ -537,7 +574,7 @@ def test_constants_are_identified_from_a_dropped_file(tab: Watched) -> None:
     tab.page.locator("[data-testid=sigma] .q-item").first.click()
     tab.type("sigma.bending_angle_deg", "10")
     tab.settled()
-    tab.page.wait_for_timeout(1500)  # once a second the browser keeps what is on the screen
+    keeps(tab, "measured_angles.csv")
     reload(tab)
     run(tab, "identify")
     tab.choose("identify.observable", "angle")

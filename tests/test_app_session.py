@@ -191,6 +191,31 @@ def test_a_file_that_cannot_be_opened_is_named_as_the_commands_name_it(session: 
         )
 
 
+def test_a_value_that_makes_no_sense_is_recalled_with_the_last_that_did(session: Session) -> None:
+    session.change("robot", "length_mm", 50.0)
+    session.set_pressure(np.array([0.3, 0.1, 0.0]) * BAR)
+    for table, key, value in (("robot", "length_mm", -5.0), ("material", "name", "no such"), ("robot", "name", 7)):
+        session.change(table, key, value)
+        assert session.problem is not None
+        other = Session()
+        other.recall(session.kept(), session.kept_files())
+        assert str(other.problem) == str(session.problem)
+        assert other.document.source() == session.document.source()
+        assert other.scenario is not None
+        assert session.scenario is not None
+        assert repr(other.scenario.robot) == repr(session.scenario.robot)
+        assert repr(other.scenario.material) == repr(session.scenario.material)
+        np.testing.assert_array_equal(other.pressure, session.pressure)
+        other.close()
+    session.change("robot", "name", "D25L60")
+    session.change("material", "name", "Ecoflex 00-50")
+    session.choose("identify")  # which awaits a file
+    other = Session()
+    other.recall(session.kept(), session.kept_files())
+    assert other.document.study == "identify"
+    other.close()
+
+
 def test_two_sessions_do_not_mix(session: Session) -> None:
     other = Session()
     other.change("robot", "name", "D10L40")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from nicegui import events, ui
 
+from softnlp.app.parts import while_open
 from softnlp.app.session import LARGEST_FILE, Session
 from softnlp.errors import InputError, SoftnlpError
 from softnlp.results import Body
@@ -43,6 +44,7 @@ def save(session: Session) -> None:
 def open_dialog(session: Session) -> ui.dialog:
     """Return a dialog that takes a scenario and the files that it names."""
 
+    @while_open
     async def taken(event: events.MultiUploadEventArguments) -> None:
         upload.reset()
         try:

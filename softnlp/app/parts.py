@@ -246,9 +246,20 @@ def _number(value: float) -> float | None:
     return float(value) if isfinite(value) else None
 
 
+def while_open(take: Callable[[T], Awaitable[None]]) -> Callable[[T], Awaitable[None]]:
+    """Return a function that lets go of `take` when the page of the current slot is deleted.
+
+    For what a library holds longer than the page: FastAPI keeps the last 4096 functions that took an upload.
+    """
+    held = [take]
+    ui.context.client.on_delete(held.clear)
+    return lambda event: held[0](event)
+
+
 def csv_drop(marker: str, label: str, take: Callable[[str, bytes], None]) -> ui.upload:
     """Show where a CSV file is dropped; `take` gets its name and content, and what it raises is told."""
 
+    @while_open
     async def arrived(event: events.UploadEventArguments) -> None:
         box.reset()
         if event.file.size() > LARGEST_FILE:

@@ -61,6 +61,7 @@ class Session:
         self.problem: InputError | None = None
         self.name = name
         self.document = Document(text)
+        self._sound = ""
         self.follows_file = True
         self.scenario = self._read()
         self.pressure = self._last_pressure()
@@ -90,7 +91,7 @@ class Session:
             raise placed(error, name) from None  # and not where it was tried
         for file, content in given.items():
             (self.folder / file).write_bytes(content)
-        self.document, self.problem = document, None
+        self.document, self.problem, self._sound = document, None, document.text()
         self.scenario = replace(scenario, path=self.folder / name)
         self.name, self.follows_file = name, True
         self.pressure = self._last_pressure()
@@ -168,7 +169,8 @@ class Session:
     def kept(self) -> str:
         """Return all that is on the screen as text, for `recall`."""
         kept = {"name": self.name, "source": self.document.source(), "study": self.document.study}
-        return json.dumps(kept | {"pressure": None if self.follows_file else self.pressure.tolist()})
+        sound = None if self.problem is None else self._sound  # what the picture shows meanwhile
+        return json.dumps(kept | {"sound": sound, "pressure": None if self.follows_file else self.pressure.tolist()})
 
     def kept_files(self) -> str:
         """Return the files that the scenario names as text, for `recall`; without those that are too much to keep."""
@@ -187,7 +189,12 @@ class Session:
             contents = {str(key): b64decode(content) for key, content in json.loads(files).items()}
         except (ValueError, KeyError, TypeError, AttributeError):
             raise InputError("expected what a tab of this app had kept") from None
-        self.open(str(source), str(name), contents)
+        sound = kept.get("sound")
+        self.open(str(sound or source), str(name), contents)
+        if sound:
+            self.document = Document(str(source))
+            self.document.study = str(study)
+            self.reread()
         self.choose(str(study))
         if pressure is not None and len(pressure) == len(self.pressure):
             self.set_pressure(np.asarray(pressure, dtype=float))
@@ -217,7 +224,10 @@ class Session:
         self.document.fit_pressures()
         for study in dict.fromkeys((self.document.study, "forward")):
             try:
-                return scenario_from_text(self.document.text(study), self.folder / self.name)
+                text = self.document.text(study)
+                scenario = scenario_from_text(text, self.folder / self.name)
+                self._sound = text
+                return scenario
             except InputError as error:
                 self.problem = self.problem or type(error)(error.message, table=error.table, key=error.key)
         return None
