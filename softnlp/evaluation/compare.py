@@ -80,7 +80,7 @@ def compare(
         if variant.closure is not None and variant.closure not in CLOSURES:
             raise InputError(f"expected one of {', '.join(CLOSURES)}, got {variant.closure!r}", key="closure")
     robots = tuple(observed(m) for m in given)
-    loads, contact = checked_loads(loads), checked_contact(contact)
+    loads, contact = checked_loads(loads), checked_contact(contact, [o.robot for o in robots])
     solver = (SweepSolver if together else RowSolver)(numerics, loads)
     work = _Work(solver, contact, shape == "blocked", _Count(_solves(robots, asked, shape == "blocked"), progress))
     simulated = tuple(tuple(work.solved(variant, o) for o in robots) for variant in asked)
