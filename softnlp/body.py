@@ -177,18 +177,17 @@ def _meeting(p: Array, a: Array, s: Array, radius: Array) -> Mask:
 def _ends_inside(p: Array, a: Array, s: Array, radius: float) -> bool:
     """Return whether a point of the face of an end lies in a part of the body that is no neighbour of it."""
     angle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
-    disc = np.concatenate([r * np.column_stack([np.cos(angle), np.sin(angle)]) for r in np.linspace(0.2, 1, 5)])
+    disc = np.concatenate([r * np.column_stack([np.cos(angle), np.sin(angle)]) for r in (0.0, 0.4, 0.7, 1.0)])
     for end in (0, -1):
-        far = np.flatnonzero(np.abs(s - s[end]) >= np.pi * radius)
-        if far.size < 2:
-            continue
+        close = (np.abs(s - s[end]) >= np.pi * radius) & (np.linalg.norm(p - p[end], axis=1) < 2.5 * radius)
+        k = np.flatnonzero(close[:-1] & close[1:])
         x = np.cross(a[end], np.eye(3)[np.argmin(np.abs(a[end]))])
         x /= np.linalg.norm(x)
         points = p[end] + radius * (disc @ np.array([x, np.cross(a[end], x)]))
-        ahead = ((points[:, None] - p[far]) * a[far]).sum(axis=2)
-        point, k = np.nonzero((ahead[:, :-1] >= 0) & (ahead[:, 1:] < 0))
-        part = (ahead[point, k] / (ahead[point, k] - ahead[point, k + 1]))[:, None]
-        centre = p[far[k]] + part * (p[far[k] + 1] - p[far[k]])
+        ahead, behind = (points @ a[j].T - (p[j] * a[j]).sum(axis=1) for j in (k, k + 1))
+        point, at = np.nonzero((ahead >= 0) & (behind < 0))
+        part = ahead[point, at] / (ahead[point, at] - behind[point, at])
+        centre = p[k[at]] + part[:, None] * (p[k[at] + 1] - p[k[at]])
         if (np.linalg.norm(points[point] - centre, axis=1) < (1 - _ROUNDING) * radius).any():
             return True
     return False

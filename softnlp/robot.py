@@ -242,7 +242,7 @@ def check(robot: Robot, *, allow: Collection[str] = (), minimum_wall: float = MI
     Parameters
     ----------
     robot : every dimension a number.
-    allow : rules among `LOWERABLE_RULES` that become warnings.
+    allow : names of `ALLOWABLE`; rules among `LOWERABLE_RULES` become warnings.
     minimum_wall : delta_s of Eq. (1) [m].
 
     Returns
@@ -255,10 +255,10 @@ def check(robot: Robot, *, allow: Collection[str] = (), minimum_wall: float = MI
         Naming the first rule that is broken and not allowed, with its numbers; or an unknown name in `allow`.
     """
     for rule in allow:
-        if rule not in LOWERABLE_RULES:
+        if rule not in ALLOWABLE:
             reason = "which can never be lowered" if rule in _RULES else "no such rule"
-            hint = "" if rule in _RULES else did_you_mean(str(rule), LOWERABLE_RULES)
-            raise RobotError(f"expected {choices(LOWERABLE_RULES)}, got {shown(rule)}, {reason}{hint}", key="allow")
+            hint = "" if rule in _RULES else did_you_mean(str(rule), ALLOWABLE)
+            raise RobotError(f"expected {choices(ALLOWABLE)}, got {shown(rule)}, {reason}{hint}", key="allow")
     found = violations(robot, minimum_wall)
     refused = [v for v in found if v.rule not in allow]
     if refused:
@@ -389,6 +389,9 @@ _RULES: Mapping[str, Callable[[Robot, float], Violation | None]] = MappingProxyT
     }
 )
 LOWERABLE_RULES = ("wall_thickness", "chamber_overlap")
+SELF_INTERSECTION = "self_intersection"
+"""Allowed, answers of inverse kinematics and design may be shapes that no body takes without passing through itself."""
+ALLOWABLE = (*LOWERABLE_RULES, SELF_INTERSECTION)
 
 
 def _mm(length: float) -> str:

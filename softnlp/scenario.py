@@ -315,7 +315,8 @@ def _workspace_task(given: Read) -> Task:
 
 
 def _inverse_task(given: Read) -> Task:
-    return inverse_task(given.file.target, given.file.bounds, given.robot)
+    task = inverse_task(given.file.target, given.file.bounds, given.robot)
+    return replace(task, allow=tuple(given.file.robot.allow))
 
 
 def _identify_task(given: Read) -> Task:

@@ -55,6 +55,8 @@ def workspace_figure(workspace: Workspace, colour: str = COLOUR) -> Figure:
     ]
     if unstable := int(np.count_nonzero(workspace.stable == 0)):
         parts.append(f"{unstable:,} unstable")
+    if through := int(np.count_nonzero(workspace.self_intersecting == 1)):
+        parts.append(f"{through:,} through themselves")
     figure = new_figure(_WIDTH, _HEIGHT, workspace.title, "  ·  ".join(parts))
     if not len(tips):
         figure.text(0.5, 0.5, "No pose has a solution with this number", size=TEXT, color=WRONG, ha="center")

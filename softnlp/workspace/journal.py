@@ -53,7 +53,7 @@ class Journal:
     """The open journal of one plan; a context manager, which keeps what was added when it is left.
 
     path : of the file. done : (chunks,) whether a chunk is confirmed. counts : (statuses,) confirmed poses by how they
-    ended, in the order of `STATUSES`.
+    ended, in the order of `STATUSES`. self_intersecting : how many of them pass through themselves.
     """
 
     def __init__(self, path: Path, plan: Plan, version: str, *, resume: bool) -> None:
@@ -72,6 +72,7 @@ class Journal:
         self._committed = time.monotonic()
         self.done: NDArray[np.bool_] = np.zeros(plan.chunks, bool)
         self.counts: NDArray[np.int64] = np.zeros(len(STATUSES), np.int64)
+        self.self_intersecting = 0
         with self._named():
             self._file = sqlite3.connect(path, timeout=0.0, isolation_level=None)
         try:
@@ -232,6 +233,7 @@ class Journal:
     def _confirm(self, block: Block) -> None:
         self.done[block.chunk] = True
         self.counts += np.bincount(block.rows["status"], minlength=len(STATUSES))
+        self.self_intersecting += int(np.count_nonzero(block.rows["self_intersecting"] == 1))
 
     def _block(self, record: tuple[Any, ...]) -> Block:
         """Return a chunk of a record."""

@@ -55,7 +55,7 @@ class SweepSummary:
     """What a sweep came to.
 
     poses : of the plan. done, failed : confirmed, and of those without a solution. already : that were there before.
-    statuses : confirmed poses by how they ended. seconds : all of this run. stopped : before the end, when asked.
+    statuses : confirmed poses by how they ended. self_intersecting : of them, that pass through themselves. seconds : all of this run. stopped : before the end, when asked.
     written : the files that this run wrote.
     """
 
@@ -64,6 +64,7 @@ class SweepSummary:
     failed: int
     already: int
     statuses: Mapping[str, int]
+    self_intersecting: int
     seconds: float
     stopped: bool
     written: tuple[Path, ...]
@@ -125,7 +126,10 @@ def run_sweep(
         def summary(stopped: bool, *written: Path) -> SweepSummary:
             seconds = time.monotonic() - began
             counts = {status.value: int(n) for status, n in zip(STATUSES, journal.counts, strict=True) if n}
-            return SweepSummary(plan.poses, journal.poses, journal.failed, already, counts, seconds, stopped, written)
+            through = journal.self_intersecting
+            return SweepSummary(
+                plan.poses, journal.poses, journal.failed, already, counts, through, seconds, stopped, written
+            )
 
         todo = [int(chunk) for chunk in np.flatnonzero(~journal.done)]
         finished = not todo and fingerprint_of(result) == plan.fingerprint()
