@@ -131,7 +131,8 @@ def _along(p: Array) -> Array:
 def _apart(p: Array) -> Array:
     """Return the squared distances between the stations (n, M, M)."""
     square = (p**2).sum(axis=2)
-    return np.maximum(square[:, :, None] + square[:, None] - 2 * p @ p.swapaxes(1, 2), 0.0)
+    apart: Array = np.maximum(square[:, :, None] + square[:, None] - 2 * p @ p.swapaxes(1, 2), 0.0)
+    return apart
 
 
 def _near(apart: Array, s: Array, radius: Array, slack: Array) -> Mask:

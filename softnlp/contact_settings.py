@@ -118,7 +118,7 @@ def require_in_front(contact: ContactSettings, lengths: Iterable[float], offsets
             raise InputError(
                 f"the unbent tip at {_row(at)} mm starts {-ahead / MILLIMETRE:.4g} mm behind the wall, which pushes "
                 f"along {_row(normal)}; turn the normal to {_row(-n for n in normal)}, or move the point to "
-                f"{_row(touching)} mm, where the wall touches the tip and several offsets can press it in",
+                f"{_row(touching)} mm, where it touches the tip, from where offsets above 0 press it in",
                 key="wall_normal",
             )
 

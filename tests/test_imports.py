@@ -21,7 +21,7 @@ LAYERS = (
     *("errors", "status", "units", "conventions", "numerics", "reading", "contact_settings"),
     *("formula", "laws", "material_reading", "materials", "robot", "section", "rod", "tip", "transcription"),
     *("quantities", "loadcase", "unloaded", "problem", "branch", "solver", "condensed", "continuation", "stability"),
-    "implicit",
+    *("body", "implicit"),
     *("evaluation", "evaluation.statistics"),
     *(
         "studies",

@@ -11,9 +11,9 @@ from softnlp.app.document import Document
 from softnlp.errors import RobotError
 from softnlp.reading import shown
 from softnlp.robot import (
+    ALLOWABLE,
     DIMENSIONS,
     LENGTH_LIMITS,
-    ALLOWABLE,
     MINIMUM_WALL,
     ROBOTS,
     Dimension,

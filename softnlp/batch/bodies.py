@@ -17,23 +17,31 @@ _AXIS = slice(9, 12)  # third column of the rotation in a state
 
 
 def self_intersecting(
-    shooting: Shooting, onward: str, start: Array, data: Array, tightness: Array, bending: Array, radius: Array, K: Array
+    shooting: Shooting,
+    onward: str,
+    start: Array,
+    data: Array,
+    *,
+    curvature: Array,
+    bending: Array,
+    radius: Array,
+    intervals: NDArray[np.int64],
 ) -> Mask:
     """Return which of n poses pass through themselves, as `softnlp.body.Fit` says it.
 
-    onward : the map of a step. start, data : as it takes them, (fields, n). tightness : curvature times radius. bending :
-    [rad]. radius : outer, scaled. K : intervals of each pose. Axes that turn little are not looked at, so most poses
+    onward : the map of a step. start, data : as it takes them, (fields, n). curvature, radius : the largest and the
+    outer one, scaled. bending : [rad]. intervals : of each pose. Axes that turn little are not followed, so most poses
     cost nothing.
     """
-    found: Mask = tightness >= 1
+    found: Mask = curvature * radius >= 1
     curled = np.flatnonzero(~found & (bending > TURN))
     if not curled.size:
         return found
-    intervals = int(min(K[curled].max(), np.ceil(_FINE * bending[curled].max())))
+    K = int(min(intervals[curled].max(), np.ceil(_FINE * bending[curled].max())))
     state, given = start[:, curled], data[:, curled]
     nodes = [state]
-    for k in range(intervals):
-        at = np.repeat([[k / intervals], [1 / intervals]], curled.size, axis=1)
+    for k in range(K):
+        at = np.repeat([[k / K], [1 / K]], curled.size, axis=1)
         state = shooting.apply(onward, np.vstack([state, given, at]))
         nodes.append(state)
     every = np.array(nodes).transpose(2, 0, 1)

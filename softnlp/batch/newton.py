@@ -42,9 +42,9 @@ class Batch:
 class Shot:
     """What came of the poses of a batch; scaled units.
 
-    base : m(0) (3, poses). tip : [p, R, n, m] (18,
-    poses). integrals : chamber lengths, bending angle, backbone length. curvature : the largest at a node. residual : the largest of the tip equations and
-    of the full equations between nodes. error, turn_error : estimated error of the tip's position and rotation.
+    base : m(0) (3, poses). tip : [p, R, n, m] (18, poses). integrals : chamber lengths, bending angle, backbone length.
+    curvature : the largest at a node. residual : the largest of the tip equations and of the full equations between
+    nodes. error, turn_error : estimated error of the tip's position and rotation.
     certain : whether no conjugate point and a positive definite tip show that the pose is stable.
     """
 

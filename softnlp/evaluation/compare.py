@@ -116,9 +116,11 @@ class _Work:
         values = np.full((len(o.pressure), len(NUMBERS)), np.nan)
         status: list[Status | None] = [None] * len(values)
         message = [""] * len(values)
+        through: set[int] = set()
 
         def put(rows: NDArray[np.intp], found: Solved, columns: slice | int) -> None:
             values[rows, columns] = found.values[:, columns]
+            through.update(rows[list(found.self_intersecting)].tolist())
             for row, ended, words in zip(rows.tolist(), found.status, found.message, strict=True):
                 known = status[row]
                 if known is None or known.has_solution:  # else what came first is told
@@ -131,7 +133,7 @@ class _Work:
             found = self._solver.solve(model, o.pressure[at_wall], contact, self._tell)
             put(at_wall, found, slice(0, len(NUMBERS)) if self._blocked else FORCE)
         values[~np.isfinite(o.values)] = np.nan
-        return Solved(values, tuple(status), tuple(message))
+        return Solved(values, tuple(status), tuple(message), frozenset(through))
 
     def _free_poses(self, variant: Variant, model: Model, o: Observed, rows: NDArray[np.intp]) -> Solved:
         key = _free_key(variant, o)

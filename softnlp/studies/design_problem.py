@@ -148,7 +148,8 @@ def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) ->
     chosen = [f"robot.{name}" for name in task.ranges] + [PRESSURE] * isinstance(task.pressure, Range)
     moved = ca.vertcat(*(q.symbol for q in [*declared.values(), applied] if q.name in chosen))
     unknown = ca.vertcat(moved, *(symbol for case in cases for symbol in case.symbols))
-    rows = [*_rules(robot, task.minimum_wall, task.allow), *_guards(cases), *_bodies(cases[0], robot, task.allow), *_required(outputs, evaluator)]
+    rows = [*_rules(robot, task.minimum_wall, task.allow), *_guards(cases), *_bodies(cases[0], robot, task.allow)]
+    rows += _required(outputs, evaluator)
     constraints = [row for row in rows if ca.depends_on(row.expression, unknown)]
     scale = quantity(OBJECTIVE_SCALE, "1", 1.0)
     problem = compile_problem(

@@ -273,7 +273,7 @@ class InverseSolver:
             message = "the target is met by an equilibrium that is not stable only: the real robot buckles away from it"
             return Step(pressure, Status.OUT_OF_REACH, message, residual=step.residual)
         if fit.self_intersecting and SELF_INTERSECTION not in self.task.allow:
-            message = f"{_NO_BODY} only ({fit.warnings[-1]}); [robot] allow = [\"{SELF_INTERSECTION}\"] accepts it"
+            message = f'{_NO_BODY} only ({fit.warnings[-1]}); [robot] allow = ["{SELF_INTERSECTION}"] accepts it'
             return Step(pressure, Status.OUT_OF_REACH, message, residual=step.residual)
         aimed = aim.aimed(step.pose)
         return Reached(pressure, step, solved, aimed, aim.cost(aimed))

@@ -126,19 +126,16 @@ class BlockedLane:
 
     def self_intersecting(self, poses: BlockedPoses, columns: Array) -> Mask:
         """Return which solved poses pass through themselves; columns : of every pose asked."""
-        shot, c = poses.shot, poses.sections.constants
-        radius = self._free.outer_radius(columns[:, poses.numbers], poses.sections)
-        start = self._spatial.start(shot.unknowns)[: shot.state.shape[0]]
-        data = np.vstack([c, shot.unknowns[:3]])
+        shot = poses.shot
         return self_intersecting(
             self._kernels,
             "contact_onward",
-            start,
-            data,
-            shot.curvature * radius,
-            shot.integrals[0],
-            radius,
-            shot.intervals,
+            self._spatial.start(shot.unknowns)[: shot.state.shape[0]],
+            np.vstack([poses.sections.constants, shot.unknowns[:3]]),
+            curvature=shot.curvature,
+            bending=shot.integrals[0],
+            radius=self._free.outer_radius(columns[:, poses.numbers], poses.sections),
+            intervals=shot.intervals,
         )
 
     def _kept(self, free: Poses, found: list[tuple[NDArray[np.intp], BlockedShot, Mask]]) -> BlockedPoses | None:

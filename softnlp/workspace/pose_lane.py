@@ -83,10 +83,15 @@ class PoseLane:
         """Return which solved poses pass through themselves; columns : of every pose asked."""
         own, shot = columns[:, poses.numbers], poses.shot
         data = np.vstack([poses.sections.constants, *self.loads(own, poses.sections)])
-        radius = self.outer_radius(own, poses.sections)
-        start, bending = base_state(shot.base)[:STATE], shot.integrals[-2]
         return self_intersecting(
-            self._kernels, "onward", start, data, shot.curvature * radius, bending, radius, shot.intervals
+            self._kernels,
+            "onward",
+            base_state(shot.base)[:STATE],
+            data,
+            curvature=shot.curvature,
+            bending=shot.integrals[-2],
+            radius=self.outer_radius(own, poses.sections),
+            intervals=shot.intervals,
         )
 
     def solve(self, columns: Array, features: Array) -> Poses:

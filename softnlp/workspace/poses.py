@@ -28,8 +28,9 @@ def row_type(chambers: int, *, wall: bool) -> np.dtype[Any]:
     """Return the type of a row; SI units, world frame, NaN where there is no solution.
 
     pose : number of the pose in the plan. status : position in `STATUSES`. stable : 1, 0, or -1 without a solution.
-    self_intersecting : 1, 0, or -1 without a solution. lane : `Lane`. error : estimated tip position error over L_0. The rest is as in `softnlp.studies.step.Pose`;
-    with a wall the blocked shape's, blocked_force [N] and gap, of the free shape's contact point to the wall [m].
+    self_intersecting : as stable. lane : `Lane`. error : estimated tip position error over L_0. The rest is as in
+    `softnlp.studies.step.Pose`; with a wall the blocked shape's, blocked_force [N] and gap, of the free shape's contact
+    point to the wall [m].
     """
     fields: list[tuple[Any, ...]] = [
         ("pose", "<i8"),

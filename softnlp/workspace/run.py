@@ -55,8 +55,8 @@ class SweepSummary:
     """What a sweep came to.
 
     poses : of the plan. done, failed : confirmed, and of those without a solution. already : that were there before.
-    statuses : confirmed poses by how they ended. self_intersecting : of them, that pass through themselves. seconds : all of this run. stopped : before the end, when asked.
-    written : the files that this run wrote.
+    statuses : confirmed poses by how they ended. self_intersecting : those that pass through themselves. seconds : all
+    of this run. stopped : before the end, when asked. written : the files that this run wrote.
     """
 
     poses: int
