@@ -98,10 +98,8 @@ def identify(
     count = sum(int(np.sum(d.measured[d.root_weight > 0])) for d in data)
     if count < len(free):
         raise InputError(f"{count} numbers measured cannot determine {len(free)} constants", key="free")
-    loads, contact = (
-        checked_loads(loads),
-        checked_contact(contact, [d.robot for d in data if np.any(d.measured[:, -1])]),
-    )
+    loads = checked_loads(loads)
+    contact = checked_contact(contact, [d.robot for d in data if np.any(d.measured[:, -1])])
     if contact.closure == "weighted" and any(np.any(d.measured[:, -1]) for d in data):
         raise InputError("expected a closure that has a definite force; 'weighted' depends on weights", key="closure")
     poses: dict[tuple[int, int], TrialPoses] = {}

@@ -45,7 +45,7 @@ _JUMP = 0.3  # of the bounds: more is a jump along a path
 _SAME_PLACE = 1e-4  # [bar]
 _COMPASS = (0.25, 1e-3)  # first and last step of the search among stable poses, of the bounds
 _MOST_POSES = 150  # that it solves
-_NO_BODY = "the target is met by a shape that passes through itself"
+_NO_BODY = "the target is met only by a shape that no body can take"
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,7 +273,7 @@ class InverseSolver:
             message = "the target is met by an equilibrium that is not stable only: the real robot buckles away from it"
             return Step(pressure, Status.OUT_OF_REACH, message, residual=step.residual)
         if fit.self_intersecting and SELF_INTERSECTION not in self.task.allow:
-            message = f'{_NO_BODY} only ({fit.warnings[-1]}); [robot] allow = ["{SELF_INTERSECTION}"] accepts it'
+            message = f'{_NO_BODY}: {fit.warnings[-1]}; [robot] allow = ["{SELF_INTERSECTION}"] accepts it'
             return Step(pressure, Status.OUT_OF_REACH, message, residual=step.residual)
         aimed = aim.aimed(step.pose)
         return Reached(pressure, step, solved, aimed, aim.cost(aimed))
