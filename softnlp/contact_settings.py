@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from softnlp.errors import InputError
+from softnlp.units import MILLIMETRE
+
+_TOUCHES = 1e-4  # of the length: a tip behind a wall by less is pushed in front of it, a rounded number is no mistake
 CLOSURES = ("free", "compliant", "weighted", "rigid")
 
 Vector = tuple[float, float, float]
@@ -71,7 +75,8 @@ class ContactSettings:
     wall_point
         (3,) a point of a wall anywhere, world frame [m]; given with `wall_normal` or not at all.
     wall_normal
-        (3,) the unit vector in which that wall pushes, world frame [1].
+        (3,) the unit vector in which that wall pushes the robot, world frame [1]: it points from the wall to the side
+        on which the tip is. It is kept as given, so the unbent tip may touch the wall but not start behind it.
     weights
         Of the `weighted` closure.
     """
@@ -87,6 +92,39 @@ class ContactSettings:
     def closure_name(self) -> str:
         """The name of the closure, one of the package's or your own."""
         return self.closure.name if isinstance(self.closure, Closure) else self.closure
+
+
+def require_in_front(contact: ContactSettings, lengths: Iterable[float], offsets: Iterable[float] = ()) -> None:
+    """Refuse a wall given by a point that robots of some lengths [m] start behind, before anything bends them.
+
+    offsets : how far the wall is moved from its point in the direction in which it pushes [m]; where it starts in front
+    at one of them it may be moved in.
+
+    Raises
+    ------
+    InputError
+        With the key "wall_normal": which side the unbent tip is on, how far, and what to change.
+    """
+    point, normal = contact.wall_point, contact.wall_normal
+    if point is None or normal is None:
+        return
+    back = min([0.0, *offsets])
+    for length in lengths:
+        tip = (0.0, 0.0, length + contact.tip_cap)
+        ahead = sum(n * (x - p) for n, x, p in zip(normal, tip, point, strict=True)) - back
+        if ahead < -_TOUCHES * length:
+            at = [x / MILLIMETRE for x in tip]
+            touching = [(p + ahead * n) / MILLIMETRE for p, n in zip(point, normal, strict=True)]
+            raise InputError(
+                f"the unbent tip at {_row(at)} mm starts {-ahead / MILLIMETRE:.4g} mm behind the wall, which pushes "
+                f"along {_row(normal)}; turn the normal to {_row(-n for n in normal)}, or move the point to "
+                f"{_row(touching)} mm, where it touches the tip, from where offsets above 0 press it in",
+                key="wall_normal",
+            )
+
+
+def _row(values: Iterable[float]) -> str:
+    return f"({', '.join(f'{value + 0.0:.6g}' for value in values)})"
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,11 @@ import casadi as ca
 
 from softnlp.errors import RobotError, nearest
 from softnlp.reading import choices, did_you_mean, shown
+from softnlp.rules import ALLOWABLE as ALLOWABLE
 from softnlp.rules import LOWERABLE_RULES as LOWERABLE_RULES
 from softnlp.rules import ROUND_OFF as ROUND_OFF
 from softnlp.rules import RULES, broken, in_mm, neighbours, rules
+from softnlp.rules import SELF_INTERSECTION as SELF_INTERSECTION
 from softnlp.rules import Violation as Violation
 from softnlp.units import DEGREE, MILLIMETRE
 
@@ -238,7 +240,7 @@ def check(robot: Robot, *, allow: Collection[str] = (), minimum_wall: float = MI
     Parameters
     ----------
     robot : every dimension a number.
-    allow : rules among `LOWERABLE_RULES` that become warnings.
+    allow : names of `ALLOWABLE`; rules among `LOWERABLE_RULES` become warnings.
     minimum_wall : delta_s of Eq. (1) [m].
 
     Returns
@@ -251,10 +253,10 @@ def check(robot: Robot, *, allow: Collection[str] = (), minimum_wall: float = MI
         Naming the first rule that is broken and not allowed, with its numbers; or an unknown name in `allow`.
     """
     for rule in allow:
-        if rule not in LOWERABLE_RULES:
+        if rule not in ALLOWABLE:
             reason = "which can never be lowered" if rule in RULES else "no such rule"
-            hint = "" if rule in RULES else did_you_mean(str(rule), LOWERABLE_RULES)
-            raise RobotError(f"expected {choices(LOWERABLE_RULES)}, got {shown(rule)}, {reason}{hint}", key="allow")
+            hint = "" if rule in RULES else did_you_mean(str(rule), ALLOWABLE)
+            raise RobotError(f"expected {choices(ALLOWABLE)}, got {shown(rule)}, {reason}{hint}", key="allow")
     found = violations(robot, minimum_wall)
     refused = [v for v in found if v.rule not in allow]
     if refused:

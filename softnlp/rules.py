@@ -18,6 +18,9 @@ from softnlp.units import MILLIMETRE
 
 RULES = ("wall_thickness", "chamber_overlap", "chambers_inside_wall")
 LOWERABLE_RULES = RULES[:2]
+SELF_INTERSECTION = "self_intersection"
+"""Allowed, answers of inverse kinematics and design may be shapes that no body takes without passing through itself."""
+ALLOWABLE = (*LOWERABLE_RULES, SELF_INTERSECTION)
 ROUND_OFF = 1e-9  # lengths closer than this are equal: published dimensions meet their rules exactly [m]
 
 

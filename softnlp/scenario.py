@@ -199,7 +199,8 @@ def _scenario(text: str, path: Path) -> Scenario:
     steps = made and _attempt(errors, "pressure", lambda: _steps(file, made[0].chamber_sets, path.parent))
     contact = task = None
     if (wall := getattr(file, "contact", None)) is not None:
-        contact = _attempt(errors, "contact", lambda: contact_settings(wall))
+        single = None if made is None or file.study == "design" else made[0]  # a design judges each candidate
+        contact = _attempt(errors, "contact", lambda: contact_settings(wall, single))
     if file.study in TASKS and made is not None and chosen is not None and steps is not None:
         table, read_task = TASKS[file.study]
         given = Read(file, data, made[0], chosen, steps, path.parent)
@@ -334,7 +335,8 @@ def _workspace_task(given: Read) -> Task:
 
 
 def _inverse_task(given: Read) -> Task:
-    return inverse_task(given.file.target, given.file.bounds, given.robot)
+    task = inverse_task(given.file.target, given.file.bounds, given.robot)
+    return replace(task, allow=tuple(given.file.robot.allow))
 
 
 def _identify_task(given: Read) -> Task:

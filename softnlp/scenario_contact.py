@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.contact_settings import ClosureWeights, ContactSettings, ContactTask
+from softnlp.contact_settings import ClosureWeights, ContactSettings, ContactTask, require_in_front
 from softnlp.errors import InputError
+from softnlp.robot import Robot
 from softnlp.scenario_schema import ContactTable
 from softnlp.units import MILLIMETRE, NEWTON_MILLIMETRE
 
@@ -17,13 +18,15 @@ _OFFSETS = ("offset_mm", "offsets_mm", "offset_ramp")
 _WALL = (*_OFFSETS, "wall_point_mm", "wall_normal", "target_force_N", "tip_cap_mm")
 
 
-def contact_settings(table: ContactTable) -> ContactSettings:
+def contact_settings(table: ContactTable, robot: Robot | None = None) -> ContactSettings:
     """Return where the wall stands and how the problem is closed.
+
+    robot : whose unbent tip may not start behind a wall given by a point; None leaves that to the study.
 
     Raises
     ------
     InputError
-        With the key (no table, no source), for keys that do not go together.
+        With the key (no table, no source), for keys that do not go together, and as `require_in_front`.
     """
     if (table.wall_point_mm is None) != (table.wall_normal is None):
         there, absent = "wall_point_mm", "wall_normal"
@@ -43,7 +46,7 @@ def contact_settings(table: ContactTable) -> ContactSettings:
     if table.wall_point_mm is not None:
         x, y, z = (component * MILLIMETRE for component in table.wall_point_mm)
         point = (x, y, z)
-    return ContactSettings(
+    settings = ContactSettings(
         offset=(table.offset_mm or 0.0) * MILLIMETRE,
         tip_cap=table.tip_cap_mm * MILLIMETRE,
         closure=table.closure,
@@ -56,6 +59,18 @@ def contact_settings(table: ContactTable) -> ContactSettings:
             position=_per(table.weight_position_per_mm, MILLIMETRE),
         ),
     )
+    if robot is not None:
+        require_in_front(settings, [float(robot.length)], _offsets(table) or ())
+    return settings
+
+
+def _offsets(table: ContactTable) -> list[float] | None:
+    """Return the offsets of a characteristic curve [m], or None where none is asked for."""
+    offsets = table.offsets_mm
+    if table.offset_ramp is not None:
+        ramp = table.offset_ramp
+        offsets = np.linspace(ramp.from_mm, ramp.to_mm, ramp.steps).tolist()
+    return None if offsets is None else [h * MILLIMETRE for h in offsets]
 
 
 def _per(weight: float | None, unit: float) -> float | None:
@@ -112,10 +127,7 @@ def contact_task(table: ContactTable, pressures: Array) -> ContactTask:
                 key="target_force_N",
             )
         return ContactTask(target_force=table.target_force_N)
-    offsets = table.offsets_mm
-    if table.offset_ramp is not None:
-        ramp = table.offset_ramp
-        offsets = np.linspace(ramp.from_mm, ramp.to_mm, ramp.steps).tolist()
+    offsets = _offsets(table)
     if offsets is None:
         return ContactTask(weight_sensitivity=table.weight_sensitivity)
     if len(pressures) != 1:
@@ -123,4 +135,4 @@ def contact_task(table: ContactTable, pressures: Array) -> ContactTask:
             f"expected one step in [pressure] with several offsets, got {len(pressures)}; give sequence_bar one row",
             key=several[0],
         )
-    return ContactTask(offsets=tuple(h * MILLIMETRE for h in offsets))
+    return ContactTask(offsets=tuple(offsets))

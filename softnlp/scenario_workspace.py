@@ -9,12 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.contact_settings import require_in_front
 from softnlp.errors import InputError, nearest
 from softnlp.materials import Material
 from softnlp.pressures import HIGHEST_BAR, UNIT_HINT
 from softnlp.reading import shown
 from softnlp.robot import DIMENSIONS, Robot
 from softnlp.rod import Vector
+from softnlp.scenario_contact import contact_settings
 from softnlp.schema_workspace import WorkspaceFile, WorkspaceTable
 from softnlp.units import BAR, MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.workspace.manufacture import check_many
@@ -71,6 +73,12 @@ def workspace_task(file: WorkspaceFile, robot: Robot, material: Material, pressu
             key="samples" if table.samples is not None else "levels" if table.levels is not None else "vary",
         )
     _check_varied(task, file, robot, material)
+    if file.contact is not None:
+        lengths = [v for axis in task.vary if axis.quantity == "robot.length" for v in axis.values.tolist()]
+        try:
+            require_in_front(contact_settings(file.contact), lengths)
+        except InputError as error:
+            raise error.located(table="contact") from None
     return task
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 import numpy as np
@@ -289,12 +290,80 @@ def test_a_wall_turned_with_the_pressures_changes_nothing() -> None:
     np.testing.assert_allclose(turned.pose.tip_position, R @ straight.pose.tip_position, atol=1e-10)
 
 
-def test_a_flipped_normal_is_the_same_wall() -> None:
-    forces = [
-        force(one(1.0, ContactSettings(wall_point=(-0.01, 0.0, 0.0), wall_normal=(sign, 0.0, 0.0))))
-        for sign in (1.0, -2.0)
-    ]
-    assert forces[0] == forces[1] == pytest.approx(force(one(1.0, ContactSettings(offset=-0.01))), rel=1e-9)
+def test_a_wall_by_its_normal_is_the_wall_at_its_offset() -> None:
+    placed = one(1.0, ContactSettings(wall_point=(-0.01, 0.0, 0.0), wall_normal=(2.0, 0.0, 0.0)))
+    assert force(placed) == pytest.approx(force(one(1.0, ContactSettings(offset=-0.01))), rel=1e-9)
+    assert placed.contact is not None
+    np.testing.assert_array_equal(placed.contact.normal, [1, 0, 0])
+
+
+@pytest.mark.parametrize(
+    ("point", "normal", "cap", "told"),
+    [
+        ((0, 0, 0.05), (0, 0, -1), 0, "(0, 0, 60) mm starts 10 mm behind"),  # leans over the robot
+        ((-0.01, 0, 0), (-2, 0, 0), 0, "starts 10 mm behind the wall, which pushes along (-1, 0, 0); turn"),
+        ((0.02, 0, 0.06), (3, 0, 4), 0, "turn the normal to (-0.6, 0, -0.8), or move the point to (12.8, 0, 50.4) mm"),
+        ((0, 0, 0.07), (0, 0, 1), 0, "starts 10 mm behind"),
+        ((0, 0, 0.062), (0, 0, -1), 5e-3, "(0, 0, 65) mm starts 3 mm behind"),
+        ((1e-5, 0, 0.06), (1, 0, 0), 0, "starts 0.01 mm behind"),
+    ],
+)
+def test_a_wall_that_the_tip_starts_behind_is_refused(
+    point: tuple[float, float, float], normal: tuple[float, float, float], cap: float, told: str
+) -> None:
+    wall = ContactSettings(wall_point=point, wall_normal=normal, tip_cap=cap)
+    for ask in (
+        lambda: one(1.0, wall),
+        lambda: pressure_for_force(D25L60, ECOFLEX, [0], 0.1, wall),
+        lambda: force_against_offset(D25L60, ECOFLEX, [BAR, 0, 0], [0.0, 1e-3], wall),
+    ):
+        with pytest.raises(InputError, match=f"^wall_normal: .*{re.escape(told)}"):
+            ask()
+
+
+def test_a_wall_that_is_moved_may_start_in_front() -> None:
+    wall = ContactSettings(wall_point=(5e-3, 0.0, 0.0), wall_normal=(1.0, 0.0, 0.0))
+    steps = force_against_offset(D25L60, ECOFLEX, [0.5 * BAR, 0, 0], [-5e-3, 0.0], wall).steps
+    assert [force(s) for s in steps] == pytest.approx([force(one(0.5)), force(one(0.5, ContactSettings(offset=5e-3)))])
+
+
+def test_a_normal_is_kept_where_the_robot_goes_the_other_way() -> None:
+    contact = ContactSettings(wall_point=(0.0, 0.0, 0.0), wall_normal=(1.0, 0.0, 0.0))  # touches the tip at rest
+    step = blocked_force(D25L60, ECOFLEX, [0, BAR, 0], contact).steps[0]
+    assert step.status is Status.NO_CONTACT  # set 2 bends towards +x
+    assert step.contact is not None
+    np.testing.assert_array_equal(step.contact.normal, [1, 0, 0])
+
+
+def test_a_preload_is_the_dead_force_that_moves_the_tip_as_far() -> None:
+    """A wall moved in at zero pressure by d pushes with the force that, as a dead load, moves the tip by d."""
+    normal = np.array([0.6, 0.0, 0.8])
+    contact = ContactSettings(wall_point=(0.0, 0.0, 0.06), wall_normal=(0.6, 0.0, 0.8), closure="free")
+    for step in force_against_offset(D25L60, ECOFLEX, [0, 0, 0], [5e-3, 10e-3], contact).steps:
+        push = force(step) * normal
+        (dead,) = forward(D25L60, ECOFLEX, [0, 0, 0], loads=Loads(tip_force=push)).steps
+        assert step.pose is not None
+        assert dead.pose is not None
+        np.testing.assert_allclose(dead.pose.tip_position, step.pose.tip_position, atol=1e-7)
+
+
+def test_a_tip_just_behind_is_pushed_in_front() -> None:
+    wall = ContactSettings(wall_point=(1e-6, 0.0, 0.0), wall_normal=(1.0, 0.0, 0.0))
+    rest, pressed = blocked_force(D25L60, ECOFLEX, [[0, 0, 0], [BAR, 0, 0]], wall).steps
+    assert rest.contact is not None
+    assert rest.contact.gap == pytest.approx(-1e-6)
+    assert 0 < force(rest) < 1e-4
+    assert force(pressed) == pytest.approx(force(one(1.0)), rel=1e-4)
+
+
+def test_a_load_presses_the_tip_into_the_wall_before_any_pressure() -> None:
+    loads = Loads(tip_force=(-0.3, 0.0, 0.0))
+    contact = ContactSettings(wall_point=(-5e-3, 0.0, 0.0), wall_normal=(1.0, 0.0, 0.0), closure="free")
+    (step,) = blocked_force(D25L60, ECOFLEX, [0, 0, 0], contact, loads=loads).steps
+    left = Loads(tip_force=(force(step) - 0.3, 0.0, 0.0))
+    (dead,) = forward(D25L60, ECOFLEX, [0, 0, 0], loads=left).steps
+    assert dead.pose is not None
+    assert dead.pose.tip_position[0] == pytest.approx(-5e-3, abs=1e-7)
 
 
 def test_in_space_forces_balance() -> None:

@@ -25,6 +25,7 @@ from softnlp import (
     material,
     robot,
 )
+from softnlp.contact_settings import ContactSettings
 from softnlp.materials import Material
 from softnlp.quantities import Model
 from softnlp.status import Status
@@ -472,3 +473,33 @@ def test_a_task_that_cannot_be_meant_names_its_key(changes: dict[str, Any], name
 def test_a_missing_solution_is_unmet_by_its_status() -> None:
     found = Evaluation(MODEL, BAR, Status.DIVERGED, "lost", {})
     assert unmet(found, bending(BAR)) == [f"{Status.DIVERGED.value}: lost"]
+
+
+def test_a_shape_through_itself_is_not_feasible_unless_it_is_allowed() -> None:
+    long = replace(robot("D10L60"), length=0.15)
+    task = DesignTask({"length": [long.length]}, 1.4 * BAR, maximise="bending_angle")
+    ((refused,), (accepted,)) = (
+        design(long, SOFT, replace(task, allow=allow)).candidates for allow in ((), ("self_intersection",))
+    )
+    assert refused.status == "infeasible"
+    assert any("self_intersection of the free shape: the body passes" in reason for reason in refused.reasons)
+    assert accepted.is_feasible
+    assert any("passes through itself" in words for words in accepted.warnings)
+
+
+def test_the_largest_bend_of_an_arc_is_short_of_a_whole_turn() -> None:
+    long = replace(robot("D10L60"), length=0.15)
+    task = DesignTask({"length": [long.length]}, Range(0.1 * BAR, 1.5 * BAR), maximise="bending_angle", starts=1)
+    (candidate,) = design(long, SOFT, task).candidates
+    assert candidate.is_feasible
+    assert candidate.objective == pytest.approx(0.999 * 2 * np.pi, rel=1e-6)
+    assert [limit.name for limit in candidate.active] == ["self_intersection"]
+
+
+def test_a_candidate_that_starts_behind_the_wall_says_so() -> None:
+    wall = ContactSettings(wall_point=(0.0, 0.0, 0.065), wall_normal=(0.0, 0.0, -1.0))
+    task = DesignTask({"length": [0.06, 0.07]}, 0.5 * BAR, maximise="blocked_force")
+    short, long = design(D25, SOFT, task, contact=wall).candidates
+    assert short.is_feasible
+    assert not long.is_feasible
+    assert any("starts 5 mm behind the wall" in reason for reason in long.reasons)

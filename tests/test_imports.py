@@ -32,7 +32,7 @@ LAYERS = (
         "continuation",
         "stability",
     ),
-    "implicit",
+    *("body", "implicit"),
     *("evaluation", "evaluation.statistics"),
     *(
         "studies",

@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from softnlp import BAR, InputError, Loads, Numerics, Run, Status, inverse, load_scenario, material, robot
+from softnlp import BAR, InputError, Loads, Numerics, Run, Status, forward, inverse, load_scenario, material, robot
 from softnlp.cli import main
-from softnlp.conventions import Coefficients
+from softnlp.conventions import COEFFICIENT_SETS, Coefficients
 from softnlp.quantities import Model
 from softnlp.results import load_run, to_json
 from softnlp.robot import Robot
@@ -251,6 +251,23 @@ def test_an_unstable_equilibrium_is_no_answer() -> None:
     if step.aimed.tip_position is not None:  # leaning to a side, where it is stable
         assert step.aimed.distance is not None
         assert step.aimed.distance > 0.1 * tall.length
+
+
+def test_a_shape_through_itself_is_no_answer_unless_it_is_allowed() -> None:
+    body, rubber, loose = robot("D10L60"), material("Ecoflex 00-50"), COEFFICIENT_SETS["calibrated"]
+    (step,) = forward(body, rubber, [2.2 * BAR, 2.2 * BAR, 0], coefficients=loose).steps
+    assert step.pose is not None
+    assert step.pose.fit.self_intersecting
+    asked = {"positions": step.pose.tip_position, "directions": step.pose.tip_rotation[:, 2], "coefficients": loose}
+    bounds = (step.pressure, step.pressure)  # there is no other shape
+    (refused,) = inverse(body, rubber, bounds=bounds, **asked).steps
+    assert refused.status is Status.OUT_OF_REACH
+    assert "a shape that no body can take: the body passes through itself" in refused.message
+    assert 'allow = ["self_intersection"]' in refused.message
+    (accepted,) = inverse(body, rubber, bounds=bounds, allow=["self_intersection"], **asked).steps
+    assert accepted.status is Status.SOLVED
+    np.testing.assert_allclose(accepted.pressure, step.pressure, rtol=1e-4)
+    assert any("passes through itself" in words for words in accepted.warnings)
 
 
 @pytest.mark.parametrize("loaded", [False, True])

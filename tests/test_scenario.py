@@ -423,6 +423,20 @@ def test_closures(closure: str) -> None:
     assert found.closure == closure
 
 
+def test_a_wall_that_the_tip_starts_behind_is_refused() -> None:
+    leaning = "wall_point_mm = [0, 0, 50]\nwall_normal = [0, 0, -1]"
+    told = r"\[contact\] wall_normal: the unbent tip at \(0, 0, 60\) mm starts 10 mm behind the wall"
+    with pytest.raises(InputError, match=told):
+        blocked(leaning)
+    one = "[pressure]\nsequence_bar = [[1.5, 0, 0]]\n"
+    task, _ = blocked_task(f"{leaning}\noffsets_mm = [-12, -10, 2]", one)  # moved in from in front of the tip
+    assert task == ContactTask(offsets=(-0.012, -0.01, 0.002))
+    sweep = "[workspace]\nlevels = 2\nto_bar = 1\nvary = { 'robot.length_mm' = { values = [50, 70] } }\n"
+    wall = "[contact]\nwall_point_mm = [0, 0, 65]\nwall_normal = [0, 0, -1]\n"
+    with pytest.raises(InputError, match=r"the unbent tip at \(0, 0, 70\) mm starts 5 mm behind"):
+        read(scenario(top="study = 'workspace'\n", pressure=sweep, more=wall))
+
+
 def blocked_task(contact: str, pressure: str = PRESSURE) -> tuple[ContactTask | None, int]:
     found = read(scenario(top="study = 'blocked-force'\n", pressure=pressure, more=f"[contact]\n{contact}\n"))
     return found.task, found.step_count

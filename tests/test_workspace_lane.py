@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -14,11 +17,12 @@ from softnlp.batch.newton import Batch, BatchSolver, Shot
 from softnlp.batch.reduced import reduced_rod
 from softnlp.branch import branch_function, stretch_on_branch
 from softnlp.contact_settings import ContactSettings
-from softnlp.conventions import Coefficients
+from softnlp.conventions import COEFFICIENT_SETS, Coefficients
 from softnlp.loadcase import rod_functions
 from softnlp.quantities import Model
 from softnlp.status import Status
 from softnlp.studies.blocked_force import blocked_force
+from softnlp.studies.forward import forward
 from softnlp.studies.statics import PoseSolver
 from softnlp.tip import tip_conditions
 from softnlp.workspace import pose_lane
@@ -219,6 +223,36 @@ def test_blocked_poses_are_those_of_the_study(closure: str, loads: Loads, offset
         assert row["gap"] == pytest.approx(step.contact.gap, abs=1e-7)
         assert row["tip_position"] == pytest.approx(step.pose.tip_position, abs=1e-7)
         assert row["chamber_length"] == pytest.approx(step.pose.chamber_length, abs=2e-7)
+
+
+@pytest.mark.parametrize(
+    ("contact", "loads", "bars"),
+    [
+        (None, Loads(tip_force=(0.002, 0.001, 0.0)), [[2.2, 0, 0], [1.0, 0, 0.2]]),
+        pytest.param(
+            ContactSettings(wall_point=(-3e-3, 0, 0), wall_normal=(1, 0, 0), closure="free"),
+            Loads(),
+            [[1.0, 0, 0], [1.8, 0, 0]],
+            marks=[pytest.mark.slow, needs_compiler],
+        ),
+    ],
+    ids=["free", "blocked"],
+)
+def test_poses_that_pass_through_themselves_are_those_of_the_problem(
+    contact: ContactSettings | None, loads: Loads, bars: list[list[float]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if contact is None:
+        monkeypatch.setattr(pose_lane, "WORTH_COMPILING", 2000)  # two poses
+    pressures, calibrated = BAR * np.array(bars), COEFFICIENT_SETS["calibrated"]
+    model = Model(replace(robot("D10L60"), length=0.08), material("Ecoflex 00-50"), calibrated)
+    order = np.arange(len(bars))
+    rows = ChunkSolver(Plan(model, loads, Numerics(), contact, ("pressure",), pressures, order)).solve(0).rows
+    assert np.all(rows["lane"] == Lane.BATCH)
+    study = forward if contact is None else partial(blocked_force, contact=contact)
+    run = study(model.robot, model.material, pressures, loads=loads, coefficients=calibrated)
+    wanted = [step.pose is not None and step.pose.fit.self_intersecting for step in run.steps]
+    assert rows["self_intersecting"].tolist() == wanted
+    assert {0, 1} == {*wanted}
 
 
 @pytest.mark.slow

@@ -11,9 +11,9 @@ from softnlp.app.document import Document
 from softnlp.errors import RobotError
 from softnlp.reading import shown
 from softnlp.robot import (
+    ALLOWABLE,
     DIMENSIONS,
     LENGTH_LIMITS,
-    LOWERABLE_RULES,
     MINIMUM_WALL,
     ROBOTS,
     Dimension,
@@ -100,7 +100,7 @@ def robot_state(document: Document) -> RobotState:
     """Read the robot of a document; nothing is raised."""
     table = document.table("robot")
     allow = table.get("allow")
-    allowed = frozenset(rule for rule in LOWERABLE_RULES if isinstance(allow, list) and rule in allow)
+    allowed = frozenset(rule for rule in ALLOWABLE if isinstance(allow, list) and rule in allow)
     values = {d.field: effective(table, d) for d in DIMENSIONS}
     said = {d.file_key: problem for d in DIMENSIONS if (problem := _problem(d, values[d.field]))}
     wall = table.get("minimum_wall_mm", MINIMUM_WALL / MILLIMETRE)

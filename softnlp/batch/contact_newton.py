@@ -50,6 +50,7 @@ class BlockedShot:
     """What came of blocked poses; scaled units.
 
     unknowns : N_0, m(0), y. state : [p, R, m, chamber lengths] at the tip. integrals : bending angle and backbone.
+    curvature : the largest at a node.
     determinant : of the tip equations. error : estimated error of the tip's position; worst_error : also of rotation
     and forces, as refinement holds them against the accuracy.
     """
@@ -57,6 +58,7 @@ class BlockedShot:
     unknowns: Array
     state: Array
     integrals: Array
+    curvature: Array
     residual: Array
     determinant: Array
     error: Array
@@ -170,7 +172,7 @@ class ContactBatch:
             groups = np.flatnonzero(active.reshape(-1, WIDTH).any(axis=1))
             chosen = (groups[:, None] * WIDTH + np.arange(WIDTH)).ravel()
             data = np.vstack([here.constants[:, chosen], unknowns[:3, chosen]])
-            reached = self._shooting.run("contact_directions", counts[groups], data, self._start(unknowns[:, chosen]))
+            reached = self._shooting.run("contact_directions", counts[groups], data, self.start(unknowns[:, chosen]))
             off, M = self._tip(reached, data, some(here, chosen), unknowns[6:, chosen])
             every[:, chosen], system[chosen], residual[chosen] = reached, M, np.abs(off).max(axis=0)
             passes[chosen] += active[chosen]
@@ -185,6 +187,7 @@ class ContactBatch:
             unknowns=unknowns,
             state=every[:size],
             integrals=np.zeros((2, width)),
+            curvature=np.full(width, np.nan),
             residual=residual,
             determinant=determinant,
             error=np.full(width, np.nan),
@@ -204,8 +207,8 @@ class ContactBatch:
         """Evaluate the full equations between nodes and at the tip, and estimate the discretisation error."""
         size, width = STATE + self._chambers, shot.residual.size
         data = np.vstack([stage.constants, shot.unknowns[:3]])
-        start = np.zeros((size + 3, width))
-        start[:size] = self._start(shot.unknowns)[:size]
+        start = np.zeros((size + 4, width))
+        start[:size] = self.start(shot.unknowns)[:size]
         checked = self._shooting.run("contact_check", counts, data, start)
         fine = self._shooting.run("contact_value", 2 * counts, data, start[:size])
         moved = every.copy()
@@ -222,7 +225,8 @@ class ContactBatch:
         return BlockedShot(
             unknowns=shot.unknowns,
             state=checked[:size],
-            integrals=checked[size + 1 :],
+            integrals=checked[size + 1 : -1],
+            curvature=checked[-1],
             residual=np.maximum(shot.residual, np.maximum(checked[size], np.abs(off).max(axis=0))),
             determinant=shot.determinant,
             error=position,
@@ -231,7 +235,7 @@ class ContactBatch:
             iterations=shot.iterations,
         )
 
-    def _start(self, unknowns: Array) -> Array:
+    def start(self, unknowns: Array) -> Array:
         """Return the state at the base with its derivatives by N_0 and m(0)."""
         size = STATE + self._chambers
         state = np.zeros((size * (UNKNOWN + 1), unknowns.shape[1]))

@@ -42,15 +42,16 @@ class Batch:
 class Shot:
     """What came of the poses of a batch; scaled units.
 
-    base : m(0) (3, poses). tip : [p, R, n, m] (18,
-    poses). integrals : chamber lengths, bending angle, backbone length. residual : the largest of the tip equations and
-    of the full equations between nodes. error, turn_error : estimated error of the tip's position and rotation.
+    base : m(0) (3, poses). tip : [p, R, n, m] (18, poses). integrals : chamber lengths, bending angle, backbone length.
+    curvature : the largest at a node. residual : the largest of the tip equations and of the full equations between
+    nodes. error, turn_error : estimated error of the tip's position and rotation.
     certain : whether no conjugate point and a positive definite tip show that the pose is stable.
     """
 
     base: Array
     tip: Array
     integrals: Array
+    curvature: Array
     residual: Array
     error: Array
     turn_error: Array
@@ -126,7 +127,7 @@ class BatchSolver:
         for _ in range(_PASSES):
             groups = np.flatnonzero(active.reshape(-1, WIDTH).any(axis=1))
             chosen = (groups[:, None] * WIDTH + np.arange(WIDTH)).ravel()
-            reached = self._shooting.run("directions", counts[groups], data[:, chosen], _start(base[:, chosen]))
+            reached = self._shooting.run("directions", counts[groups], data[:, chosen], base_state(base[:, chosen]))
             off, J = self._tip(reached, data[:, chosen])
             state[:, chosen], system[..., chosen], residual[chosen] = reached, J, np.abs(off).max(axis=0)
             passes[chosen] += active[chosen]
@@ -162,14 +163,14 @@ class BatchSolver:
     ) -> Shot:
         """Evaluate the full equations, the discretisation error and the stability of converged base moments."""
         width = base.shape[1]
-        start = np.zeros((self._chambers + STATE + 3, width))
-        start[:STATE] = _start(base)[:STATE]
+        start = np.zeros((self._chambers + STATE + 4, width))
+        start[:STATE] = base_state(base)[:STATE]
         checked = self._shooting.run("check", counts, data, start)
         ends = self._shooting.apply("ends", np.vstack([checked[:STATE], data]))
         tip, off = ends[:STATE_SIZE], ends[STATE_SIZE:]
         residual = np.maximum(residual, np.maximum(checked[STATE], np.abs(off).max(axis=0)))
 
-        fine = self._shooting.run("value", 2 * counts, data, _start(base)[:STATE])
+        fine = self._shooting.run("value", 2 * counts, data, base_state(base)[:STATE])
         tangents = state[STATE : 4 * STATE].reshape(3, STATE, -1)
         moved = np.zeros((4 * STATE + 1, width))
         moved[:STATE] = fine
@@ -182,7 +183,8 @@ class BatchSolver:
         return Shot(
             base=base,
             tip=tip,
-            integrals=checked[STATE + 1 :],
+            integrals=checked[STATE + 1 : -1],
+            curvature=checked[-1],
             residual=residual,
             error=_RICHARDSON * np.sqrt((change[POSITION] ** 2).sum(axis=0)),
             turn_error=_RICHARDSON * np.sqrt((change[ROTATION] ** 2).sum(axis=0) / 2),
@@ -192,7 +194,7 @@ class BatchSolver:
         )
 
 
-def _start(base: Array) -> Array:
+def base_state(base: Array) -> Array:
     """Return the state at the base for m(0), with its derivatives by m(0)."""
     state = np.zeros((4 * STATE + 1, base.shape[1]))
     state[[3, 7, 11]] = 1.0

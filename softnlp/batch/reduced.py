@@ -30,14 +30,16 @@ class ReducedRod:
 
     value : state [p, R, m] (15). directions : [p, R, m, d/dm(0) of each (15 x 3), certainty] (61); certainty is the
     least leading minor so far of the symmetric part of d(rotation)/dm(0): while it is positive there is no conjugate
-    point. check : [p, R, m, gap, chamber lengths (N), bending angle, backbone length]; gap is the largest so far of the
-    full equations between two nodes.
+    point. check : [p, R, m, gap, chamber lengths (N), bending angle, backbone length, curvature]; gap is the largest so
+    far of the full equations between two nodes, curvature that of the axis at nodes.
+    onward : [state, data, s, h] -> the state a step h further.
     ends : [state, data] -> [the state p, R, n, m at the tip (18), its six residuals].
     """
 
     value: ca.Function
     directions: ca.Function
     check: ca.Function
+    onward: ca.Function
     ends: ca.Function
 
 
@@ -73,6 +75,7 @@ def reduced_rod(functions: RodFunctions) -> ReducedRod:
         value=ca.Function("value", [state, data, s, h], [reached], {"cse": True}),
         directions=_directions(state, reached, [data, s, h]),
         check=_check(functions, full, state, reached, [data, s, h]),
+        onward=ca.Function("onward", [ca.vertcat(state, data, s, h)], [reached], {"cse": True}),
         ends=ca.Function(
             "ends",
             [ca.vertcat(state, data)],
@@ -116,10 +119,19 @@ def _check(functions: RodFunctions, full: Any, state: Any, reached: Any, given: 
     x = full(state, s)
     gap = ca.norm_inf(rk_step(functions.field, RK4)(x, c, h) - full(reached, s + h))
     gained = rk_integral(functions, x, c, h)
-    worst, integrals = ca.SX.sym("gap"), ca.SX.sym("integrals", gained.numel())
-    before = ca.vertcat(state, worst, integrals)
-    after = ca.vertcat(reached, ca.fmax(worst, gap), integrals + gained)
+    worst, integrals, sharpest = ca.SX.sym("gap"), ca.SX.sym("integrals", gained.numel()), ca.SX.sym("curvature")
+    before = ca.vertcat(state, worst, integrals, sharpest)
+    sharper = larger_curvature(sharpest, [x, full(reached, s + h)], c)
+    after = ca.vertcat(reached, ca.fmax(worst, gap), integrals + gained, sharper)
     return ca.Function("check", [before, *given], [after], {"cse": True})
+
+
+def larger_curvature(known: Any, states: list[Any], c: Any) -> Any:
+    """Return the largest of a curvature and those of the axis at states, per its deformed length."""
+    for x in states:
+        v, u = rod.strains(x, unpack_section(c))
+        known = ca.fmax(known, ca.sqrt(u[0] ** 2 + u[1] ** 2) / v[2])
+    return known
 
 
 def rk_integral(functions: RodFunctions, x: Any, c: Any, h: Any) -> Any:

@@ -13,7 +13,7 @@ from typing import Any
 import casadi as ca
 
 from softnlp import rod
-from softnlp.batch.reduced import MOMENT, ROTATION, STATE, rk_integral
+from softnlp.batch.reduced import MOMENT, ROTATION, STATE, larger_curvature, rk_integral
 from softnlp.loadcase import RodFunctions, unpack_section
 from softnlp.transcription import RK4, rk_step
 
@@ -26,7 +26,7 @@ class ReducedContact:
     """Steps and maps for tip conditions with a wall; N chambers, ny forces of the conditions.
 
     value : state (15 + N). directions : [state, its derivatives by N_0 and m(0) ((15 + N) x 6)]. check : [state, gap,
-    bending angle, backbone length]; gap is the largest so far of the full equations between two nodes.
+    bending angle, backbone length, curvature]; gap and curvature are as in `softnlp.batch.reduced`, as is onward.
     tip : [state, derivatives, data, tip force, tip moment, y, a, units] -> [residual (6 + ny), its derivatives by N_0,
     m(0) and y, column by column]; a is what the conditions take (`softnlp.loadcase.RodFunctions`).
     arc : [quantities, stretch] -> the unloaded state.
@@ -35,6 +35,7 @@ class ReducedContact:
     value: ca.Function
     directions: ca.Function
     check: ca.Function
+    onward: ca.Function
     tip: ca.Function
     arc: ca.Function
 
@@ -68,6 +69,8 @@ def reduced_contact(functions: RodFunctions) -> ReducedContact:
     moved = ca.jtimes(reached, ca.vertcat(state, N_0), ca.vertcat(V, along_force))
 
     x, worst, integrals = full(state, N_0, s), ca.SX.sym("gap"), ca.SX.sym("integrals", 2)
+    sharpest = ca.SX.sym("curvature")
+    sharper = larger_curvature(sharpest, [x, full(reached, N_0, s + h)], c)
     gap = ca.norm_inf(rk_step(functions.field, RK4)(x, c, h) - full(reached, N_0, s + h))
     gained = rk_integral(functions, x, c, h)[N:]
 
@@ -91,10 +94,11 @@ def reduced_contact(functions: RodFunctions) -> ReducedContact:
         ),
         check=ca.Function(
             "contact_check",
-            [ca.vertcat(state, worst, integrals), data, s, h],
-            [ca.vertcat(reached, ca.fmax(worst, gap), integrals + gained)],
+            [ca.vertcat(state, worst, integrals, sharpest), data, s, h],
+            [ca.vertcat(reached, ca.fmax(worst, gap), integrals + gained, sharper)],
             options,
         ),
+        onward=ca.Function("contact_onward", [ca.vertcat(state, data, s, h)], [reached], options),
         tip=ca.Function(
             "contact_tip",
             [ca.vertcat(state, ca.vec(V), data, force, moment, y, a, units)],

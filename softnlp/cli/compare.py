@@ -138,12 +138,14 @@ def _text(value: float, digits: int = 4) -> str:
 
 
 def _complain_of_lost(found: Comparison) -> None:
-    """Say for each variant how many rows have no solution, by status."""
+    """Say for each variant how many rows have no solution, by status, or a shape that no body can take."""
     for v, label in enumerate(found.labels):
         lost = [s.value for solved in found.simulated[v] for s in solved.status if s is not None and not s.has_solution]
         if lost:
             counts = ", ".join(f"{lost.count(status)} {status}" for status in dict.fromkeys(lost))
             complain(f"{label}: {len(lost)} of {found.rows} rows have no solution and no errors ({counts})")
+        if through := found.self_intersecting(v):
+            complain(f"{label}: the simulated body passes through itself in {through} of {found.rows} rows")
 
 
 def _write(folder: Path, task: CompareTask, found: Comparison, document: str) -> None:

@@ -140,6 +140,8 @@ def _told(asked: Scenario, folder: Path, summary: SweepSummary) -> int:
     unsolved = {status: n for status, n in summary.statuses.items() if status != "solved"}
     if unsolved:
         say("ended otherwise than solved: " + ", ".join(f"{n} {status}" for status, n in unsolved.items()))
+    if summary.self_intersecting:
+        say(f"warning: {summary.self_intersecting} of the poses pass through themselves, which no body can")
     if summary.stopped:
         again = shlex.join(["softnlp", "sweep", str(asked.path), "--out", str(folder), "--resume"])
         complain(f"stopped after {summary.done} of {summary.poses} poses, which are kept; `{again}` continues")
@@ -168,6 +170,7 @@ def _document(asked: Scenario, folder: Path, summary: SweepSummary, *, kept: boo
         "failed": summary.failed,
         "already": summary.already,
         "statuses": dict(summary.statuses),
+        "self_intersecting": summary.self_intersecting,
         "seconds": summary.seconds,
         "poses_per_s": summary.rate,
         "file": str(folder / WORKSPACE_FILE) if kept and not summary.stopped else None,

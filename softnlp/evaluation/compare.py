@@ -80,7 +80,7 @@ def compare(
         if variant.closure is not None and variant.closure not in CLOSURES:
             raise InputError(f"expected one of {', '.join(CLOSURES)}, got {variant.closure!r}", key="closure")
     robots = tuple(observed(m) for m in given)
-    loads, contact = checked_loads(loads), checked_contact(contact)
+    loads, contact = checked_loads(loads), checked_contact(contact, [o.robot for o in robots])
     solver = (SweepSolver if together else RowSolver)(numerics, loads)
     work = _Work(solver, contact, shape == "blocked", _Count(_solves(robots, asked, shape == "blocked"), progress))
     simulated = tuple(tuple(work.solved(variant, o) for o in robots) for variant in asked)
@@ -116,9 +116,11 @@ class _Work:
         values = np.full((len(o.pressure), len(NUMBERS)), np.nan)
         status: list[Status | None] = [None] * len(values)
         message = [""] * len(values)
+        through: set[int] = set()
 
         def put(rows: NDArray[np.intp], found: Solved, columns: slice | int) -> None:
             values[rows, columns] = found.values[:, columns]
+            through.update(rows[list(found.self_intersecting)].tolist())
             for row, ended, words in zip(rows.tolist(), found.status, found.message, strict=True):
                 known = status[row]
                 if known is None or known.has_solution:  # else what came first is told
@@ -131,7 +133,7 @@ class _Work:
             found = self._solver.solve(model, o.pressure[at_wall], contact, self._tell)
             put(at_wall, found, slice(0, len(NUMBERS)) if self._blocked else FORCE)
         values[~np.isfinite(o.values)] = np.nan
-        return Solved(values, tuple(status), tuple(message))
+        return Solved(values, tuple(status), tuple(message), frozenset(through))
 
     def _free_poses(self, variant: Variant, model: Model, o: Observed, rows: NDArray[np.intp]) -> Solved:
         key = _free_key(variant, o)

@@ -142,6 +142,21 @@ class Comparison:
         """
         return sum(not s.has_solution for solved in self.simulated[variant] for s in solved.status if s is not None)
 
+    def self_intersecting(self, variant: int) -> int:
+        """Return in how many rows of a variant the simulated shape passes through itself.
+
+        Parameters
+        ----------
+        variant
+            Its index in `variants`.
+
+        Returns
+        -------
+        int
+            The number.
+        """
+        return sum(len(solved.self_intersecting) for solved in self.simulated[variant])
+
     @cached_property
     def best(self) -> int | None:
         """The variant with the least error over all that was measured, None where no variant has a number.

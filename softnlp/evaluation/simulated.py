@@ -43,11 +43,14 @@ class Solved:
         Of each row; None of one that nothing was asked of.
     message
         Of each row; "" of one that nothing was asked of.
+    self_intersecting
+        The rows whose shape passes through itself.
     """
 
     values: Array
     status: tuple[Status | None, ...]
     message: tuple[str, ...]
+    self_intersecting: frozenset[int] = frozenset()
 
 
 class RowSolver:
@@ -70,7 +73,8 @@ class RowSolver:
             tell(1)
         length = float(model.robot.length)
         values = np.array([_numbers(step, length) for step in steps]).reshape(-1, len(NUMBERS))
-        return Solved(values, tuple(step.status for step in steps), tuple(step.message for step in steps))
+        through = frozenset(k for k, step in enumerate(steps) if step.pose and step.pose.fit.self_intersecting)
+        return Solved(values, tuple(step.status for step in steps), tuple(step.message for step in steps), through)
 
     def _free_solve(self, model: Model) -> Solve:
         kind = model.kind
@@ -112,9 +116,11 @@ class SweepSolver:
         values = np.full((len(pressure), len(NUMBERS)), np.nan)
         status = [Status.DIVERGED] * len(pressure)
         message = [""] * len(pressure)
+        through: set[int] = set()
         for chunk in range(plan.chunks):
             block = solver.solve(chunk)
             members, rows = plan.members(chunk), block.rows
+            through.update(members[rows["self_intersecting"] == 1].tolist())
             axis = rows["tip_rotation"][:, :, 2]
             tilt = np.arctan2(np.hypot(axis[:, 0], axis[:, 1]), axis[:, 2])
             values[members, :3] = rows["tip_position"]
@@ -130,7 +136,7 @@ class SweepSolver:
             tell(len(members))
         lost = np.array([not s.has_solution for s in status])
         values[lost] = np.nan
-        return Solved(values, tuple(status), tuple(message))
+        return Solved(values, tuple(status), tuple(message), frozenset(through))
 
 
 def closed_by(contact: ContactSettings, closure: str | None) -> ContactSettings:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.body import turns
 from softnlp.results import Body
 from softnlp.robot import Robot
 from softnlp.studies.step import SectionRadii
@@ -56,25 +57,13 @@ def resampled(body: Body, stations: int) -> Body:
     along = np.linspace(0.0, chord[-1], stations)
     k = np.clip(np.searchsorted(chord, along, side="right") - 1, 0, len(p) - 2)
     t = (along - chord[k]) / (chord[k + 1] - chord[k])
-    turn = turns(body)[k]
+    turn = turns(R)[k]
     # The translation of the screw in the frame where it starts: V(turn) rho is the step.
     rho = np.linalg.solve(_exponential(turn)[1], np.einsum("kji,kj->ki", R[k], step[k])[..., None])[..., 0]
     Q, V = _exponential(turn * t[:, None])
     local = np.einsum("kij,kj->ki", V, rho * t[:, None])
     position = p[k] + np.einsum("kij,kj->ki", R[k], local)
     return Body(position, R[k] @ Q, body.radii)
-
-
-def turns(body: Body) -> Array:
-    """Return (M - 1, 3) rotation vectors from each station to the next, in the body frame [rad]; below 180 degrees."""
-    R = body.rotation
-    Q = np.swapaxes(R[:-1], 1, 2) @ R[1:]
-    w = np.stack([Q[:, 2, 1] - Q[:, 1, 2], Q[:, 0, 2] - Q[:, 2, 0], Q[:, 1, 0] - Q[:, 0, 1]], axis=1) / 2
-    sine = np.sqrt((w**2).sum(axis=1))
-    angle = np.arctan2(sine, (np.trace(Q, axis1=1, axis2=2) - 1) / 2)
-    flat = sine < _SMALL_TURN
-    factor: Array = np.where(flat, 1 + sine**2 / 6, angle / np.where(flat, 1.0, sine))
-    return w * factor[:, None]
 
 
 def _exponential(turn: Array) -> tuple[Array, Array]:

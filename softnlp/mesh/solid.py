@@ -6,14 +6,15 @@ a shape passes through itself the solid does too, and `Solid.warnings` says so.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.body import fit_of, turns
 from softnlp.errors import InputError
-from softnlp.mesh.rings import circle, natural_body, placed, resampled, turns
+from softnlp.mesh.rings import circle, natural_body, placed, resampled
 from softnlp.results import Body
 from softnlp.robot import Robot
 from softnlp.units import MILLIMETRE
@@ -75,7 +76,8 @@ def body_solid(robot: Robot, body: Body, facets: int = FACETS) -> Solid:
     InputError
         Without the extra `mesh`, for a number of facets out of range, or where no wall is left beside the bores.
     """
-    return _swept("body", body, _silicone(robot, body, body.radii.bore, facets), facets)
+    made = _swept("body", body, _silicone(robot, body, body.radii.bore, facets), facets)
+    return replace(made, warnings=fit_of(body.position, body.rotation, body.radii.outer).warnings)
 
 
 def mould_body(robot: Robot, facets: int = FACETS, holes: str = "bore") -> Solid:
@@ -155,7 +157,7 @@ def _swept(name: str, body: Body, section: CrossSection, facets: int, chamber: i
     loops = [np.asarray(loop, dtype=float) for loop in section.to_polygons()]
     flat = np.concatenate(loops)
     cap = np.asarray(_manifold3d().triangulate(loops), dtype=np.int64)
-    turned = float(np.sqrt((turns(body) ** 2).sum(axis=1)).sum())
+    turned = float(np.sqrt((turns(body.rotation) ** 2).sum(axis=1)).sum())
     stations = 1 + max(1, int(np.ceil(turned * facets / (2 * np.pi))))
     axis = resampled(body, stations)
     local = flat * MILLIMETRE
@@ -167,22 +169,7 @@ def _swept(name: str, body: Body, section: CrossSection, facets: int, chamber: i
     there = following + n * np.arange(stations - 1)[:, None]
     sides = [np.stack([here, there, there + n], axis=-1), np.stack([here, there + n, here + n], axis=-1)]
     faces = np.concatenate([cap[:, ::-1], *(s.reshape(-1, 3) for s in sides), cap + n * (stations - 1)])
-    return Solid(name, points.reshape(-1, 3), faces, _passes_through_itself(axis, points, local), chamber)
-
-
-def _passes_through_itself(axis: Body, points: Array, local: Array) -> tuple[str, ...]:
-    """Return a warning where sections cross their neighbours, or where far parts of the body meet."""
-    found = []
-    onward = np.einsum("sni,si->sn", np.diff(points, axis=0), axis.rotation[:-1, :, 2] + axis.rotation[1:, :, 2])
-    if (onward <= 0).any():
-        found.append("the body is bent more sharply than its radius allows, so its surface folds over itself")
-    width = 2 * float(np.sqrt((local**2).sum(axis=1)).max())
-    p = axis.position
-    chord = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(p, axis=0), axis=1))])
-    apart = np.linalg.norm(p[:, None] - p[None], axis=2)
-    if (apart[np.abs(chord[:, None] - chord[None]) > np.pi / 2 * width] < 0.95 * width).any():
-        found.append("parts of the body lie inside each other: the model has no contact of the body with itself")
-    return tuple(found)
+    return Solid(name, points.reshape(-1, 3), faces, chamber=chamber)
 
 
 def _manifold3d() -> Any:

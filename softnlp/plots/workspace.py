@@ -57,6 +57,8 @@ def workspace_figure(workspace: Workspace, colour: str = COLOUR) -> Figure:
     ]
     if unstable := int(np.count_nonzero(workspace.stable == 0)):
         parts.append(f"{unstable:,} unstable")
+    if through := int(np.count_nonzero(workspace.self_intersecting == 1)):
+        parts.append(f"{through:,} through themselves")
     parts += gravity_lines(workspace.gravity)
     figure = new_figure(_WIDTH, _HEIGHT, workspace.title, "  ·  ".join(parts))
     if not len(tips):

@@ -68,6 +68,7 @@ def _variant(task: CompareTask, found: Comparison, v: int) -> dict[str, Any]:
         **_named(found, v),
         "coefficient_values": coefficients_table(found.variants[v].coefficients),
         "unsolved": found.lost(v),
+        "self_intersecting": found.self_intersecting(v),
         "statistics": _statistics(found, v, None),
         "by_robot": {o.label: _statistics(found, v, k) for k, o in enumerate(found.observed)},
         "rows": [_row(task, found, v, *place) for place in _places(task)],
@@ -110,6 +111,8 @@ def _row(task: CompareTask, found: Comparison, v: int, row: int, robot: int | No
     if np.isfinite(task.time[row]):
         told["t_s"] = tidy(task.time[row])
     told |= {"status": None if status is None else status.value, "message": solved.message[k]}
+    known = status is not None and status.has_solution
+    told["self_intersecting"] = k in solved.self_intersecting if known else None
     parts: dict[str, dict[str, Any]] = {"measured": {}, "simulated": {}, "error": {}}
     for name, measured, simulated, error in _numbers(found, v, robot, k):
         key = OBSERVABLES[name].key

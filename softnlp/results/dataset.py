@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from softnlp.results.fields import (
     BLOCKED_FORCE,
+    SELF_INTERSECTING,
     STABLE,
     Field,
     closure_of,
@@ -42,6 +43,8 @@ Variable = tuple[tuple[str, ...], Any, dict[str, Any]]
 
 AXES = ("x", "y", "z")
 STABLE_FLAGS = {"not_solved": -1, "unstable": 0, "stable": 1}
+SELF_INTERSECTING_FLAGS = {"not_solved": -1, "no": 0, "self_intersecting": 1}
+FLAGS = {STABLE: STABLE_FLAGS, SELF_INTERSECTING: SELF_INTERSECTING_FLAGS}
 
 
 def to_dataset(run: Run) -> xr.Dataset:
@@ -121,13 +124,10 @@ def _text(values: Sequence[str]) -> NDArray[np.object_]:
 def _variable(field: Field, steps: Sequence[Step], sizes: dict[str, int]) -> Variable:
     """Return a field over the steps; a shape with fewer points than another is filled up with NaN at the tip."""
     dims = ("step", *field.dims)
-    if field.name == STABLE:
-        flags = [STABLE_FLAGS["not_solved"] if (p := solved_pose(s)) is None else int(field.of(s, p)) for s in steps]
+    if (known := FLAGS.get(field.name)) is not None:
+        flags = [known["not_solved"] if (p := solved_pose(s)) is None else int(field.of(s, p)) for s in steps]
         values = np.array(flags, dtype=np.int8)
-        meanings = {
-            "flag_values": np.array(list(STABLE_FLAGS.values()), np.int8),
-            "flag_meanings": " ".join(STABLE_FLAGS),
-        }
+        meanings = {"flag_values": np.array(list(known.values()), np.int8), "flag_meanings": " ".join(known)}
         return dims, values, said(field.unit, field.meaning, **meanings)
     array = np.full((len(steps), *(sizes[d] for d in field.dims)), np.nan)
     for k, step in enumerate(steps):

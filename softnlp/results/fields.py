@@ -35,11 +35,18 @@ def solved_pose(step: Step) -> Pose | None:
     return step.pose if step.status.has_solution else None
 
 
-STABLE = "stable"
+STABLE, SELF_INTERSECTING = "stable", "self_intersecting"
 
 POSE_FIELDS: tuple[Field, ...] = (
     Field("stretch", (), "1", "axial stretch from the pressure balance, Eq. (23)", lambda s, p: p.stretch),
     Field(STABLE, (), "1", "no conjugate point on the rod", lambda s, p: bool(p.stable)),
+    Field(
+        SELF_INTERSECTING,
+        (),
+        "1",
+        "curvature times outer radius reaches 1, or parts of the body lie inside each other",
+        lambda s, p: p.fit.self_intersecting,
+    ),
     Field(
         "tip_position_mm", ("axis",), "mm", "tip position in the world frame", lambda s, p: p.tip_position / MILLIMETRE
     ),

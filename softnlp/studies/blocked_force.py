@@ -73,7 +73,7 @@ def blocked_force(
     """
     warnings = check(robot, allow=LOWERABLE_RULES)
     P = pressure_table(pressures, robot.chamber_sets)
-    loads, contact = checked_loads(loads), checked_contact(contact)
+    loads, contact = checked_loads(loads), checked_contact(contact, [robot])
     if times is not None and len(times) != len(P):
         raise InputError(f"expected one time a step, got {len(times)} times for {len(P)} steps", key="times")
     if branches < 0:
@@ -143,12 +143,12 @@ def force_against_offset(
     """
     warnings = check(robot, allow=LOWERABLE_RULES)
     P = pressure_table(pressure, robot.chamber_sets)
-    loads, contact = checked_loads(loads), checked_contact(contact)
     h = np.asarray(offsets, float)
     if len(P) != 1:
         raise InputError(f"expected one pressure a set, got {len(P)} steps", key="pressure")
     if h.ndim != 1 or h.size == 0 or not np.all(np.isfinite(h)):
         raise InputError("expected a list of finite offsets", key="offsets")
+    loads, contact = checked_loads(loads), checked_contact(contact, [robot], h)
     solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
     given = contact.wall_point is not None
     first = standing_wall(solver.poses, contact if given else replace(contact, offset=0.0), P, loads)

@@ -9,6 +9,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from softnlp.contact_settings import require_in_front
+from softnlp.errors import InputError
 from softnlp.materials import Material
 from softnlp.quantities import Model
 from softnlp.robot import Robot
@@ -113,8 +115,18 @@ class Workshop:
             found = self._at_free_pressure(model, self.task.pressure)
         else:
             found = self._at_pressure(model)
+        found = self._in_front(model, found)
         made = _candidate(number, combination, model, found, self.task)
         return replace(made, solve_time=time.perf_counter() - began)
+
+    def _in_front(self, model: Model, found: Optimised) -> Optimised:
+        """Return what was found, with a reason where the unbent tip starts behind a wall given by a point."""
+        robot = found.found.model.robot if found.found else model.robot
+        try:
+            require_in_front(self.setting.contact, [float(robot.length)] * self.task.needs_force)
+        except InputError as error:
+            return replace(found, reasons=(*found.reasons, error.message))
+        return found
 
     def _at_pressure(self, model: Model) -> Optimised:
         """Judge a candidate of numbers at its pressure, or at the lowest step that meets everything."""

@@ -14,7 +14,7 @@ from softnlp.branch import stretch_on_branch
 from softnlp.errors import RobotError
 from softnlp.loadcase import RodFunctions
 from softnlp.quantities import Model
-from softnlp.robot import Robot, touching_stretch, violations
+from softnlp.robot import SELF_INTERSECTION, Robot, touching_stretch, violations
 from softnlp.rules import neighbours
 from softnlp.status import Status
 from softnlp.studies.blocked import BlockedSolver
@@ -201,7 +201,12 @@ def unmet(found: Evaluation, task: DesignTask) -> list[str]:
     if not found.outputs:
         return [f"{found.status.value}: {found.message}"]
     reasons = [words for words, _ in missed(found.outputs, task.requirements)]
-    free = found.step and (found.step.contact.free if found.step.contact else found.step.pose)
+    contact = found.step and found.step.contact
+    free = found.step and (contact.free if contact else found.step.pose)
     if free and not free.stable:
         reasons.append("the free shape is not stable: it buckles under its load")
+    shapes = {"free": free, "blocked": found.step.pose if found.step and contact else None}
+    for name, pose in shapes.items():
+        if pose and pose.fit.self_intersecting and SELF_INTERSECTION not in task.allow:
+            reasons.append(f"{SELF_INTERSECTION} of the {name} shape: {pose.fit.warnings[-1]}")
     return reasons

@@ -16,7 +16,7 @@ from softnlp.loadcase import LoadCase, load_case
 from softnlp.optimality import Bounds, slopes
 from softnlp.problem import CompiledProblem, Constraint, compile_problem
 from softnlp.quantities import quantity, with_symbols
-from softnlp.robot import Robot
+from softnlp.robot import SELF_INTERSECTION, Robot
 from softnlp.rules import rules
 from softnlp.studies.design_evaluate import Evaluator, chamber_gaps, free_outputs, robot_outputs
 from softnlp.studies.design_task import OUTPUTS, DesignTask, Range
@@ -31,6 +31,7 @@ OBJECTIVE_SCALE = "objective scale"
 FOLD_SCALE = "fold scale"
 FOLD = 0.02  # of the determinant of the robot at rest: below it the branch of the blocked shape is about to turn
 _ITERATIONS = 60
+_TIGHTEST = 0.999  # of what a body can take; an answer at 1 would pass through itself
 _SLOPE = 1e-3  # of the scaled stretch balance: the branch from zero pressure ends where it vanishes
 
 
@@ -162,7 +163,8 @@ def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) ->
     chosen = [f"robot.{name}" for name in task.ranges] + [PRESSURE] * isinstance(task.pressure, Range)
     moved = ca.vertcat(*(q.symbol for q in [*declared.values(), applied] if q.name in chosen))
     unknown = ca.vertcat(moved, *(symbol for case in cases for symbol in case.symbols))
-    rows = [*_rules(robot, task), *_guards(cases, robot), *_required(outputs, evaluator)]
+    rows = [*_rules(robot, task), *_guards(cases), *_bodies(cases[0], robot, task.allow)]
+    rows += _required(outputs, evaluator)
     constraints = [row for row in rows if ca.depends_on(row.expression, unknown)]
     scale = quantity(OBJECTIVE_SCALE, "1", 1.0)
     problem = compile_problem(
@@ -199,7 +201,21 @@ def _rules(robot: Robot, task: DesignTask) -> Iterator[Constraint]:
             yield Constraint(rule.row, ca.MX(rule.value), rule.least, np.inf, "m", MILLIMETRE)
 
 
-def _guards(cases: list[LoadCase], robot: Robot) -> Iterator[Constraint]:
+def _bodies(free: LoadCase, robot: Robot, allow: tuple[str, ...]) -> Iterator[Constraint]:
+    """Yield what keeps a free shape possible as a body: exact for the arc without loads, in the mean for another.
+
+    Its curvature times outer radius (S2) stays below 1, and an arc below a whole turn.
+    """
+    if SELF_INTERSECTION in allow:
+        return
+    angle, stretch = free.outputs["bending_angle"], free.outputs["stretch"]
+    tightness = angle * robot.outer_radius / (robot.length * stretch**1.5)
+    yield Constraint(SELF_INTERSECTION, tightness, -np.inf, _TIGHTEST)
+    if free.transcribed.points.size == 0:
+        yield Constraint(SELF_INTERSECTION, angle / (2 * np.pi), -np.inf, _TIGHTEST)
+
+
+def _guards(cases: list[LoadCase]) -> Iterator[Constraint]:
     """Yield what keeps the program on the branch that begins at zero pressure, as far as inequalities can."""
     free = cases[0]
     slope = ca.jacobian(free.residuals[0], free.symbols[0])

@@ -14,7 +14,7 @@ from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.errors import InputError, nearest
 from softnlp.materials import Material
 from softnlp.numerics import Numerics
-from softnlp.robot import DIMENSIONS, LOWERABLE_RULES, MINIMUM_WALL, Robot, is_number
+from softnlp.robot import ALLOWABLE, DIMENSIONS, MINIMUM_WALL, Robot, is_number
 from softnlp.rod import Loads
 from softnlp.units import BAR, DEGREE, MILLIMETRE
 
@@ -178,7 +178,7 @@ class DesignTask:
     maximise, minimise
         One of them, a name of `OUTPUTS`.
     allow
-        Rules of manufacture that may be broken.
+        Rules of manufacture that may be broken; "self_intersection" for shapes that pass through themselves.
     minimum_wall
         delta_s, the least wall of Eq. (1) and, see `softnlp.rules.rules`, of the outer and of the inner wall each,
         unless `requirements` has a least one of its own [m].
@@ -326,8 +326,8 @@ def check_task(task: DesignTask, setting: Setting) -> None:
     if not task.sets or any(not 0 <= k < fewest for k in task.sets) or len(set(task.sets)) < len(task.sets):
         raise InputError(f"expected different sets of 0 to {fewest - 1}, got {list(task.sets)}", key="sets")
     for rule in task.allow:
-        if rule not in LOWERABLE_RULES:
-            raise InputError(f"expected rules of {', '.join(LOWERABLE_RULES)}, got {rule!r}", key="allow")
+        if rule not in ALLOWABLE:
+            raise InputError(f"expected names of {', '.join(ALLOWABLE)}, got {rule!r}", key="allow")
     for key, value in (("starts", task.starts), ("trials", task.trials)):
         if value is not None and value < 1:
             raise InputError(f"expected a number of at least 1, got {value}", key=key)

@@ -80,7 +80,7 @@ def pressure_for_force(
         For sets that the robot does not have, a force or a pressure that is not above 0.
     """
     check(robot, allow=LOWERABLE_RULES)
-    loads, contact = checked_loads(loads), checked_contact(contact)
+    loads, contact = checked_loads(loads), checked_contact(contact, [robot])
     chosen = sorted(set(sets))
     if not chosen or any(k not in range(robot.chamber_sets) for k in chosen):
         raise InputError(f"expected sets out of 0 to {robot.chamber_sets - 1}, got {list(sets)}", key="sets")

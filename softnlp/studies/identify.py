@@ -8,11 +8,12 @@ with all poses as unknowns.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.body import Fit
 from softnlp.contact_settings import ContactSettings
 from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.errors import InputError, MaterialError
@@ -98,7 +99,8 @@ def identify(
     count = sum(int(np.sum(d.measured[d.root_weight > 0])) for d in data)
     if count < len(free):
         raise InputError(f"{count} numbers measured cannot determine {len(free)} constants", key="free")
-    loads, contact = checked_loads(loads), checked_contact(contact)
+    loads = checked_loads(loads)
+    contact = checked_contact(contact, [d.robot for d in data if np.any(d.measured[:, -1])])
     if contact.closure == "weighted" and any(np.any(d.measured[:, -1]) for d in data):
         raise InputError("expected a closure that has a definite force; 'weighted' depends on weights", key="closure")
     poses: dict[tuple[int, int], TrialPoses] = {}
@@ -121,6 +123,7 @@ class _Predicted:
         self, data: Data, poses: TrialPoses, blocked: TrialBlocked | None, free: FreeConstants, loads: Loads
     ) -> None:
         self._data = data
+        self._solver, self._loads = poses, loads
         unloaded = not np.any([loads.tip_force, loads.tip_moment, loads.gravity])
         self._poses: FreePoses = (
             ArcPoses(poses, data.pressure, free.quantities)
@@ -131,6 +134,11 @@ class _Predicted:
         self._forces: BlockedForces | None = None
         if self._rows.size and blocked is not None:
             self._forces = BlockedForces(blocked.of(data.robot), data.pressure[self._rows], loads, free.quantities)
+
+    def fit(self, constants: Mapping[str, float], row: int) -> Fit | None:
+        """Return how the free shape of a row suits a body, None where it has none."""
+        pose = self._solver.at(constants).solve(self._data.pressure[row], self._loads)[0].pose
+        return None if pose is None else pose.fit
 
     def evaluate(self, constants: Mapping[str, float], anew: bool) -> Prediction:
         """Return the values in the order of `COLUMNS`, and their derivatives."""
@@ -297,7 +305,7 @@ class _Fit:
                 warnings.append(
                     f"{name} ended at its bound {x[k]:.4g}; it was held there for the other standard errors"
                 )
-        warnings += self._stretched(last)
+        warnings += [*self._stretched(last), *self._impossible(x, last)]
         status, message = Status.SOLVED, "the sum of squares is at a minimum"
         if (kkt := misfit_slope(J, r, low, high)) > OPTIMAL:
             status, message = Status.NOT_OPTIMAL, not_optimal(kkt, f"{self.evaluations} evaluations")
@@ -321,6 +329,13 @@ class _Fit:
                     f"{low:g} to {high:g}, where {self.material.name} was fitted"
                 )
         return warnings
+
+    def _impossible(self, x: Array, found: Sequence[Prediction]) -> Iterator[str]:
+        """Yield what is to be said of the shape of each free robot that is bent the most."""
+        for d, model, prediction in zip(self.data, self.models, found, strict=True):
+            row = int(np.argmax(prediction.values[:, POSE_COLUMNS.index("bending_angle")]))
+            if (fit := model.fit(self.free.values(x), row)) is not None:
+                yield from (f"{d.label}, measurement {row + 1}: {words}" for words in fit.warnings)
 
     def _unsolved(self, status: Status, message: str, first: Sequence[Prediction]) -> Identified:
         n = len(self.free.names)

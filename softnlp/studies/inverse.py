@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, Literal
 
 import numpy as np
@@ -35,6 +35,7 @@ def inverse(
     coefficients: Coefficients = Coefficients(),
     conventions: Conventions = REPRODUCTION,
     numerics: Numerics = Numerics(),
+    allow: Collection[str] = (),
     method: Literal["newton", "nlp"] = "newton",
     title: str = "",
     progress: Callable[[int, Step], None] | None = None,
@@ -56,6 +57,8 @@ def inverse(
         L_0 by default.
     loads, coefficients, conventions, numerics
         As `softnlp.forward`; the loads act on every pose.
+    allow
+        "self_intersection" accepts shapes that no body can take without passing through itself.
     method
         "newton": an active-set Gauss-Newton iteration in the pressures. "nlp": the pressures freed in the rod's own
         problem and solved by IPOPT, started from the same places; slower, and a check of the other.
@@ -75,7 +78,7 @@ def inverse(
     InputError
         For targets, bounds or loads of the wrong shape or out of range, or no target.
     """
-    warnings = check(robot, allow=LOWERABLE_RULES)
+    warnings = check(robot, allow={*LOWERABLE_RULES, *allow})
     loads = checked_loads(loads)
     lower, upper = checked_bounds(bounds, robot.chamber_sets)
     weight = float(robot.length) if length_per_radian is None else float(length_per_radian)
@@ -83,7 +86,7 @@ def inverse(
         raise InputError(f"expected a length above 0, got {weight}", key="length_per_radian")
     if method not in ("newton", "nlp"):
         raise InputError(f"expected 'newton' or 'nlp', got {method!r}", key="method")
-    task = InverseTask(checked_targets(positions, directions), lower, upper, weight)
+    task = InverseTask(checked_targets(positions, directions), lower, upper, weight, tuple(allow))
     solver = InverseSolver(Model(robot, material, coefficients, conventions), numerics, loads, task, method)
     steps = follow_targets(solver, progress)
     return Run("inverse", robot, material, coefficients, conventions, loads, steps, title, warnings)

@@ -20,6 +20,7 @@ from softnlp.branch import stretch_on_branch
 from softnlp.numerics import Numerics
 from softnlp.optimality import OPTIMAL, not_optimal
 from softnlp.quantities import Model
+from softnlp.robot import SELF_INTERSECTION
 from softnlp.rod import Loads
 from softnlp.status import Status
 from softnlp.studies.aiming import Aim, Table, aim_of, spread, tabulated
@@ -45,6 +46,7 @@ _JUMP = 0.3  # of the bounds: more is a jump along a path
 _SAME_PLACE = 1e-4  # [bar]
 _COMPASS = (0.25, 1e-3)  # first and last step of the search among stable poses, of the bounds
 _MOST_POSES = 150  # that it solves
+_NO_BODY = "the target is met only by a shape that no body can take"
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,11 +280,15 @@ class InverseSolver:
         return pressure_of(self._nlps[kind], solution, self.limits)
 
     def _judged(self, aim: Aim, pressure: Array, step: Step, solved: Solved | None) -> Reached | Step:
-        """Return a stable pose as an answer, else the step that says why there is none."""
+        """Return a stable pose that a body can take as an answer, else the step that says why there is none."""
         if step.pose is None or solved is None:
             return step
+        fit = step.pose.fit
         if not step.pose.stable:
             message = "the target is met by an equilibrium that is not stable only: the real robot buckles away from it"
+            return Step(pressure, Status.OUT_OF_REACH, message, residual=step.residual)
+        if fit.self_intersecting and SELF_INTERSECTION not in self.task.allow:
+            message = f'{_NO_BODY}: {fit.warnings[-1]}; [robot] allow = ["{SELF_INTERSECTION}"] accepts it'
             return Step(pressure, Status.OUT_OF_REACH, message, residual=step.residual)
         aimed = aim.aimed(step.pose)
         return Reached(pressure, step, solved, aimed, aim.cost(aimed))
@@ -354,6 +360,8 @@ class InverseSolver:
         text = f"{Status.OUT_OF_REACH.advice}; the nearest tip is {' and '.join(left)}, at ({tip}) mm"
         if self.ends is not None and best.pressure.sum() > 0.999 * self.limits.largest_sum * BAR:
             text += f"; pressures end where the stretch does ({self.ends[0].value})"
+        if rejected is not None and rejected.message.startswith(_NO_BODY):
+            return f"{text}; nearer, {rejected.message}"
         return text if rejected is None else f"{text}; nearer equilibria are not stable or not found"
 
     def _map(self, intervals: int) -> GridMap:

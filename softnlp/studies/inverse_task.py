@@ -23,13 +23,15 @@ class InverseTask:
     """A path of targets and the bounds of each set's pressure.
 
     lower, upper : (sets,) [Pa]. length_per_radian : how much of a distance [m] a radian of misfit counts for where
-    position and direction cannot both be met.
+    position and direction cannot both be met. allow : with "self_intersection" in it, shapes that no body can take
+    without passing through itself are answers too.
     """
 
     targets: tuple[Target, ...]
     lower: Array
     upper: Array
     length_per_radian: float
+    allow: tuple[str, ...] = ()
 
     def step_count(self, pressures: int) -> int:
         """Return how many steps the run has: one a target."""

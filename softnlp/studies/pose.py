@@ -137,7 +137,7 @@ def pose_of(
 
 
 def pose_warnings(model: Model, pose: Pose) -> tuple[str, ...]:
-    """Return what a designer should know of a solved pose: fitted range, touching chambers, stability."""
+    """Return what a designer should know of a solved pose: fitted range, touching chambers, stability, its body."""
     found = []
     low, high = model.material.fitted_stretch
     if not low <= pose.stretch <= high:
@@ -151,4 +151,4 @@ def pose_warnings(model: Model, pose: Pose) -> tuple[str, ...]:
         found.append("the load compresses the rod to nothing somewhere (v_z <= 0); the model does not hold there")
     if not pose.stable:
         found.append("this equilibrium is not stable: the real robot buckles away from it")
-    return tuple(found)
+    return (*found, *pose.fit.warnings)

@@ -213,7 +213,7 @@ def _blocked_sensitivities(
     by: Sequence[str],
 ) -> Sensitivities:
     """Return the sensitivities of one blocked force."""
-    contact = checked_contact(contact)
+    contact = checked_contact(contact, [model.robot])
     if contact.closure == "weighted":
         raise InputError(
             "expected 'free', 'compliant' or 'rigid': a blocked force of closure 'weighted' is a compromise that no "

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.body import Fit, fit_of
 from softnlp.contact_settings import ContactSettings
 from softnlp.conventions import Coefficients, Conventions
 from softnlp.materials import Material
@@ -105,6 +107,14 @@ class Pose:
     chamber_length: Array
     radii: SectionRadii
     shape: Shape
+
+    @cached_property
+    def fit(self) -> Fit:
+        """Whether a body can take the shape, found when it is first asked for."""
+        shape = self.shape
+        shortened = np.maximum(shape.shear_extension[:, 2], np.finfo(float).tiny)  # curvature is per reference length
+        curvature = np.hypot(shape.curvature[:, 0], shape.curvature[:, 1]) / shortened
+        return fit_of(shape.position, shape.rotation, self.radii.outer, curvature)
 
 
 @dataclass(frozen=True)

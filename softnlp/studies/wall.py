@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.contact_settings import CLOSURES, Closure, ContactSettings
+from softnlp.contact_settings import CLOSURES, Closure, ContactSettings, require_in_front
 from softnlp.errors import InputError
+from softnlp.robot import Robot
 from softnlp.rod import Loads
 from softnlp.status import Status
 from softnlp.studies.arc import unloaded_arc
@@ -39,29 +41,25 @@ class Wall:
         return across / size if size > 1e-9 else None
 
 
-def wall_of(contact: ContactSettings, rest: Array, furthest: Array) -> Wall:
-    """Return the wall that the settings describe, on the side to which the robot goes.
+def _wall_at(offset: float, rest: Array, furthest: Array) -> Wall:
+    """Return the wall at x = offset [m], which pushes against the way the free shape goes.
 
-    rest, furthest : (3,) the contact point without pressure and of the free shape at the largest pressure [m]. A wall
-    that the robot touches at rest stands where the free shape goes; one given by a normal elsewhere pushes towards the
-    robot at rest, and one at an offset h stands where the free shape goes also where h is on the other side, which
-    preloads the robot.
+    rest, furthest : (3,) the contact point without pressure and of the free shape at the largest pressure [m]. An
+    offset on the other side preloads the robot.
     """
-    small = _SIDEWAYS * float(np.linalg.norm(rest))
-    if contact.wall_point is None or contact.wall_normal is None:
-        moved = float(furthest[0] - rest[0])
-        if abs(moved) <= small:
-            moved = contact.offset - float(rest[0]) or -1.0
-        return Wall(np.array([contact.offset, 0.0, 0.0]), np.array([-np.sign(moved), 0.0, 0.0]))
-    point, normal = np.asarray(contact.wall_point, float), np.asarray(contact.wall_normal, float)
-    ahead = float(normal @ (rest - point))
-    if abs(ahead) <= small:
-        ahead = -float(normal @ (furthest - rest))
-    return Wall(point, -normal if ahead < 0 else normal)
+    moved = float(furthest[0] - rest[0])
+    if abs(moved) <= _SIDEWAYS * float(np.linalg.norm(rest)):
+        moved = offset - float(rest[0]) or -1.0
+    return Wall(np.array([offset, 0.0, 0.0]), np.array([-np.sign(moved), 0.0, 0.0]))
 
 
-def checked_contact(contact: ContactSettings) -> ContactSettings:
-    """Return the settings with a unit normal, or raise `InputError` naming what is not right."""
+def checked_contact(
+    contact: ContactSettings, robots: Iterable[Robot] = (), offsets: Iterable[float] = ()
+) -> ContactSettings:
+    """Return the settings with a unit normal, or raise `InputError` naming what is not right.
+
+    robots, offsets : whose unbent tips may not start behind the wall, and how far that is moved (`require_in_front`).
+    """
     if contact.closure not in CLOSURES and not isinstance(contact.closure, Closure):
         raise InputError(f"expected one of {', '.join(CLOSURES)}, got {contact.closure!r}", key="closure")
     numbers = {"offset": contact.offset, "tip_cap": contact.tip_cap}
@@ -85,7 +83,9 @@ def checked_contact(contact: ContactSettings) -> ContactSettings:
     if not np.isfinite(size) or size == 0:
         raise InputError("expected three numbers that are not all zero", key="wall_normal")
     x, y, z = (float(v) for v in normal / size)
-    return replace(contact, wall_normal=(x, y, z))
+    contact = replace(contact, wall_normal=(x, y, z))
+    require_in_front(contact, [float(robot.length) for robot in robots], offsets)
+    return contact
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,15 +124,20 @@ class Situation:
 
 
 def standing_wall(poses: PoseSolver, contact: ContactSettings, pressures: Array, loads: Loads) -> Wall:
-    """Return the wall that the settings describe, where the free shape goes at the largest pressure."""
+    """Return the wall that the settings describe; one at an offset stands where the free shape goes.
+
+    pressures : (steps, sets) [Pa], of which the largest sum tells the way. A wall that is given is kept as it is.
+    """
+    if contact.wall_point is not None and contact.wall_normal is not None:
+        return Wall(np.asarray(contact.wall_point, float), np.asarray(contact.wall_normal, float))
     largest = pressures[int(np.argmax(np.sum(pressures, axis=1)))]
     rest = np.array([0.0, 0.0, float(poses.model.robot.length) + contact.tip_cap])
     if np.any([loads.tip_force, loads.tip_moment, loads.gravity]):
         pose = poses.solve(largest, loads)[0].pose
         if pose is not None:
-            return wall_of(contact, rest, pose.tip_position + contact.tip_cap * pose.tip_rotation[:, 2])
+            return _wall_at(contact.offset, rest, pose.tip_position + contact.tip_cap * pose.tip_rotation[:, 2])
     for pressure in (largest, 1e-3 * largest):
         branch, arc = unloaded_arc(poses, pressure)
         if branch.status is Status.SOLVED:
-            return wall_of(contact, rest, arc.position + contact.tip_cap * arc.axis)
-    return wall_of(contact, rest, rest)
+            return _wall_at(contact.offset, rest, arc.position + contact.tip_cap * arc.axis)
+    return _wall_at(contact.offset, rest, rest)

@@ -100,7 +100,8 @@ def weight_sensitivity(
         When the closure is not `weighted`, or no weight is given; for a pressure or loads of the wrong shape.
     """
     check(robot, allow=LOWERABLE_RULES)
-    contact, P, loads = checked_contact(contact), pressure_table(pressure, robot.chamber_sets), checked_loads(loads)
+    contact, loads = checked_contact(contact, [robot]), checked_loads(loads)
+    P = pressure_table(pressure, robot.chamber_sets)
     given_weights(contact)
     if len(P) != 1:
         raise InputError(f"expected one pressure a set, got {len(P)} steps", key="pressure")

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.batch.arrays import joined, some, spread
+from softnlp.batch.bodies import self_intersecting
 from softnlp.batch.contact_newton import PATH, BlockedShot, ContactBatch, Stage
 from softnlp.batch.csource import Kernels
 from softnlp.batch.reduced import POSITION
@@ -65,7 +66,7 @@ class BlockedLane:
                 "contact_directions": reduced.directions,
                 "contact_check": reduced.check,
             },
-            {"contact_tip": reduced.tip, "arc": reduced.arc},
+            {"contact_tip": reduced.tip, "contact_onward": reduced.onward, "arc": reduced.arc},
         )
         self._kernels = shooting(kernels, build=plan.poses >= WORTH_COMPILING)
         self._flat = ContactBatch(functions, self._kernels, wall.plane)
@@ -122,6 +123,20 @@ class BlockedLane:
                 target = self._plan.numerics.accuracy / 3
                 found.append((chosen, *batch.follow(stage_at, first[chosen], target)))
         return self._kept(free, found)
+
+    def self_intersecting(self, poses: BlockedPoses, columns: Array) -> Mask:
+        """Return which solved poses pass through themselves; columns : of every pose asked."""
+        shot = poses.shot
+        return self_intersecting(
+            self._kernels,
+            "contact_onward",
+            self._spatial.start(shot.unknowns)[: shot.state.shape[0]],
+            np.vstack([poses.sections.constants, shot.unknowns[:3]]),
+            curvature=shot.curvature,
+            bending=shot.integrals[0],
+            radius=self._free.outer_radius(columns[:, poses.numbers], poses.sections),
+            intervals=shot.intervals,
+        )
 
     def _kept(self, free: Poses, found: list[tuple[NDArray[np.intp], BlockedShot, Mask]]) -> BlockedPoses | None:
         """Return the poses that hold every equation within the tolerance and push."""

@@ -23,6 +23,7 @@ from softnlp.workspace.pose_lane import PoseLane, Poses
 from softnlp.workspace.poses import STATUSES, Block, Lane, Rows, unsolved_rows
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 class ChunkSolver:
@@ -61,12 +62,12 @@ class ChunkSolver:
         """Fill the rows of poses that are solved, accurate and stable for certain; the others stay as they are."""
         free = lane.solve(columns, features)
         if self._blocked is None:
-            _fill_free(rows, free)
+            _fill_free(rows, free, lane.self_intersecting(free, columns))
             return
         gap, touch = self._blocked.gaps(free), self._blocked.touching(free)
         beyond = gap <= -touch
         apart = some_poses(free, ~beyond)
-        _fill_free(rows, apart)
+        _fill_free(rows, apart, lane.self_intersecting(apart, columns))
         rows["blocked_force"][apart.numbers] = 0.0
         rows["gap"][apart.numbers] = gap[~beyond]
         rows["status"][apart.numbers[(gap > touch)[~beyond]]] = STATUSES.index(Status.NO_CONTACT)
@@ -75,7 +76,7 @@ class ChunkSolver:
             if found is not None:
                 gaps = np.full(len(rows), np.nan)
                 gaps[free.numbers] = gap
-                _fill_blocked(rows, found, gaps[found.numbers])
+                _fill_blocked(rows, found, gaps[found.numbers], self._blocked.self_intersecting(found, columns))
 
     def _solve_alone(self, column: Array, near: Any) -> tuple[Step, Solved | Blocked | None]:
         """Solve one pose by the problem itself, from a neighbour where there is one."""
@@ -105,16 +106,18 @@ def some_poses(poses: Poses, mask: NDArray[np.bool_]) -> Poses:
     return Poses(poses.numbers[mask], some(poses.sections, mask), some(poses.shot, mask), poses.residual[mask])
 
 
-def _fill_free(rows: Rows, poses: Poses) -> None:
+def _fill_free(rows: Rows, poses: Poses, through: Mask) -> None:
     """Put solved poses without a wall into their rows."""
     lengths, angle, backbone = poses.shot.integrals[:-2], poses.shot.integrals[-2], poses.shot.integrals[-1]
     _fill_together(rows, poses, poses.shot.tip, lengths, angle, backbone)
+    rows["self_intersecting"][poses.numbers] = through
 
 
-def _fill_blocked(rows: Rows, poses: BlockedPoses, gap: Array) -> None:
+def _fill_blocked(rows: Rows, poses: BlockedPoses, gap: Array, through: Mask) -> None:
     """Put solved blocked poses into their rows."""
     angle, backbone = poses.shot.integrals
     _fill_together(rows, poses, poses.shot.state, poses.shot.state[STATE:], angle, backbone)
+    rows["self_intersecting"][poses.numbers] = through
     rows["blocked_force"][poses.numbers] = poses.force
     rows["gap"][poses.numbers] = gap
 
@@ -150,6 +153,7 @@ def _fill(rows: Rows, k: int, step: Step) -> None:
     if pose is None or not step.status.has_solution:
         return
     rows["stable"][k] = pose.stable
+    rows["self_intersecting"][k] = pose.fit.self_intersecting
     rows["error"][k] = step.discretisation_error
     for name in ("stretch", "tip_position", "tip_rotation", "bending_angle", "backbone_length", "chamber_length"):
         rows[name][k] = getattr(pose, name)

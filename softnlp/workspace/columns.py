@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.gravity import gravity_words
+from softnlp.results.dataset import SELF_INTERSECTING_FLAGS
+from softnlp.results.fields import SELF_INTERSECTING
 from softnlp.robot import DIMENSIONS
 from softnlp.units import BAR, DEGREE, MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.workspace.plan import Plan
@@ -94,6 +96,13 @@ _WALL = (
 )
 _SOLVE = (
     _whole("stable", "stable", "i1", "no conjugate point on the rod", **_flags(_STABLE_FLAGS)),
+    _whole(
+        SELF_INTERSECTING,
+        SELF_INTERSECTING,
+        "i1",
+        "curvature times outer radius reaches 1, or parts of the body lie inside each other",
+        **_flags(SELF_INTERSECTING_FLAGS),
+    ),
     _number("residual", "1", "largest equation error: force by EI/L^2, moment by EI/L, length by L", "residual"),
     _number("discretisation_error", "1", "estimated error of the tip position, of the robot's length L_0", "error"),
     _whole("intervals", "intervals", "i4", "intervals on the rod, 0 where there is no grid"),

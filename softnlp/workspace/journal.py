@@ -54,6 +54,7 @@ class Journal:
 
     path : of the file. done : (chunks,) whether a chunk is confirmed. counts : (statuses,) confirmed poses by how they
     ended, in the order of `STATUSES`. earlier : versions of other packages with which it was written before this time.
+    self_intersecting : how many of the confirmed poses pass through themselves.
     """
 
     def __init__(
@@ -75,6 +76,7 @@ class Journal:
         self.done: NDArray[np.bool_] = np.zeros(plan.chunks, bool)
         self.counts: NDArray[np.int64] = np.zeros(len(STATUSES), np.int64)
         self.earlier: list[dict[str, str]] = []
+        self.self_intersecting = 0
         with self._named():
             self._file = sqlite3.connect(path, timeout=0.0, isolation_level=None)
         try:
@@ -245,6 +247,7 @@ class Journal:
     def _confirm(self, block: Block) -> None:
         self.done[block.chunk] = True
         self.counts += np.bincount(block.rows["status"], minlength=len(STATUSES))
+        self.self_intersecting += int(np.count_nonzero(block.rows["self_intersecting"] == 1))
 
     def _block(self, record: tuple[Any, ...]) -> Block:
         """Return a chunk of a record."""

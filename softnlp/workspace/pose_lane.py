@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.batch.arrays import some
+from softnlp.batch.bodies import self_intersecting
 from softnlp.batch.csource import Kernels
-from softnlp.batch.newton import Batch, BatchSolver, Shot
-from softnlp.batch.reduced import reduced_rod
+from softnlp.batch.newton import Batch, BatchSolver, Shot, base_state
+from softnlp.batch.reduced import STATE, reduced_rod
 from softnlp.batch.shooting import shooting
 from softnlp.batch.stretches import Stretches, stretch_maps
 from softnlp.loadcase import rod_functions
@@ -53,12 +54,13 @@ class PoseLane:
         reduced = reduced_rod(functions)
         kernels = Kernels(
             {"value": reduced.value, "directions": reduced.directions, "check": reduced.check},
-            {"ends": reduced.ends, **stretch_maps(functions)},
+            {"ends": reduced.ends, "onward": reduced.onward, **stretch_maps(functions)},
         )
         self._kernels = shooting(kernels, build=plan.poses >= WORTH_COMPILING)
         self._batch = BatchSolver(functions, self._kernels, plan.numerics.accuracy / 3, plan.numerics.intervals)
         self._stretches = Stretches(functions, self._kernels, shared=not set(plan.varied) - {"pressure", *LOADS})
         self._force, self._moment = (entries(plan, name) for name in ("tip_force", "tip_moment"))
+        self._diameter = entries(plan, "robot.outer_diameter").start
 
     def sections(self, columns: Array) -> tuple[Sections, NDArray[np.intp]]:
         """Return the sections of the poses whose stretch is found, and their numbers; columns of every quantity, SI."""
@@ -71,6 +73,26 @@ class PoseLane:
         """Return the scaled tip forces and moments."""
         force, moment = columns[self._force], columns[self._moment]
         return force / sections.force_unit, moment / (sections.force_unit * sections.length_unit)
+
+    def outer_radius(self, columns: Array, sections: Sections) -> Array:
+        """Return the scaled outer radii at the stretch, (S2)."""
+        radius: Array = columns[self._diameter] / (2 * np.sqrt(sections.stretch) * sections.length_unit)
+        return radius
+
+    def self_intersecting(self, poses: Poses, columns: Array) -> Mask:
+        """Return which solved poses pass through themselves; columns : of every pose asked."""
+        own, shot = columns[:, poses.numbers], poses.shot
+        data = np.vstack([poses.sections.constants, *self.loads(own, poses.sections)])
+        return self_intersecting(
+            self._kernels,
+            "onward",
+            base_state(shot.base)[:STATE],
+            data,
+            curvature=shot.curvature,
+            bending=shot.integrals[-2],
+            radius=self.outer_radius(own, poses.sections),
+            intervals=shot.intervals,
+        )
 
     def solve(self, columns: Array, features: Array) -> Poses:
         """Solve poses; those that are not solved, accurate and stable for certain are left out.

@@ -28,13 +28,15 @@ def row_type(chambers: int, *, wall: bool) -> np.dtype[Any]:
     """Return the type of a row; SI units, world frame, NaN where there is no solution.
 
     pose : number of the pose in the plan. status : position in `STATUSES`. stable : 1, 0, or -1 without a solution.
-    lane : `Lane`. error : estimated tip position error over L_0. The rest is as in `softnlp.studies.step.Pose`;
-    with a wall the blocked shape's, blocked_force [N] and gap, of the free shape's contact point to the wall [m].
+    self_intersecting : as stable. lane : `Lane`. error : estimated tip position error over L_0. The rest is as in
+    `softnlp.studies.step.Pose`; with a wall the blocked shape's, blocked_force [N] and gap, of the free shape's contact
+    point to the wall [m].
     """
     fields: list[tuple[Any, ...]] = [
         ("pose", "<i8"),
         ("status", "i1"),
         ("stable", "i1"),
+        ("self_intersecting", "i1"),
         ("lane", "i1"),
         ("intervals", "<i2"),
         ("iterations", "<i4"),
@@ -61,6 +63,7 @@ def unsolved_rows(numbers: NDArray[np.int64], kind: np.dtype[Any]) -> Rows:
     rows["pose"] = numbers
     rows["status"] = STATUSES.index(Status.DIVERGED)
     rows["stable"] = -1
+    rows["self_intersecting"] = -1
     rows["lane"] = Lane.PROBLEM
     return rows
 

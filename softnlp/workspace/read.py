@@ -34,7 +34,7 @@ class Workspace:
     file : where it was read from. material : its name and law. attributes : global ones of the file, tables parsed.
     pressure : (N, sets) [Pa]. status : (N,) positions in `STATUSES`. tip_position : (N, 3) [m].
     tip_axis : (N, 3) third column of the tip's rotation. bending_angle : (N,) [rad].
-    stable : (N,) 1, 0, or -1 without a solution. residual : (N,), known of failed poses too.
+    stable, self_intersecting : (N,) 1, 0, or -1 without a solution. residual : (N,), known of failed poses too.
     time : (N,) [s] or None.
     """
 
@@ -49,6 +49,7 @@ class Workspace:
     tip_axis: Array
     bending_angle: Array
     stable: NDArray[np.int8]
+    self_intersecting: NDArray[np.int8]
     residual: Array
     time: Array | None
 
@@ -110,15 +111,18 @@ def load_workspace(path: str | PathLike[str]) -> Workspace:
         tip = _numbers(data, "tip_position_mm", (N, 3)) * MILLIMETRE
         axis = _third_columns(data, N)
         bending = _numbers(data, "bending_angle_deg", (N,)) * DEGREE
-        stable = np.array(data["stable"][:], dtype=np.int8) if "stable" in data else np.full(N, -1, np.int8)
+        stable, through = (
+            np.array(data[name][:], dtype=np.int8) if name in data else np.full(N, -1, np.int8)
+            for name in ("stable", "self_intersecting")
+        )
         residual = _numbers(data, "residual", (N,))
         time = _numbers(data, "t_s", (N,)) if "t_s" in data else None
-    stable[~solved] = -1
+    stable[~solved] = through[~solved] = -1
     for known in (tip, axis, bending):
         known[~solved] = np.nan
         if np.isnan(known[solved]).any():
             raise InputError("a pose is solved but its numbers are missing", source=str(file))
-    arrays = (pressure, status, tip, axis, bending, stable, residual, *(() if time is None else (time,)))
+    arrays = (pressure, status, tip, axis, bending, stable, through, residual, *(() if time is None else (time,)))
     for array in arrays:
         array.setflags(write=False)
     material = attributes["material"]
@@ -134,6 +138,7 @@ def load_workspace(path: str | PathLike[str]) -> Workspace:
         tip_axis=axis,
         bending_angle=bending,
         stable=stable,
+        self_intersecting=through,
         residual=residual,
         time=time,
     )
@@ -214,7 +219,7 @@ def read_block(workspace: Workspace, names: Sequence[str], rows: slice) -> list[
 
 _POSE_NUMBERS = (
     *("tip_position_mm", "tip_rotation", "bending_angle_deg", "tilt_deg", "stretch", "backbone_length_mm"),
-    *("chamber_length_mm", "discretisation_error", "blocked_force_N", "gap_mm", "stable"),
+    *("chamber_length_mm", "discretisation_error", "blocked_force_N", "gap_mm", "stable", "self_intersecting"),
 )
 """What a pose without a solution does not have, whatever the file says; the rest is what was asked, or how it went."""
 

@@ -68,6 +68,8 @@ class SweepSummary:
         That were there before.
     statuses
         Confirmed poses by how they ended.
+    self_intersecting
+        Confirmed poses that pass through themselves.
     seconds
         Of all of this run [s].
     stopped
@@ -83,6 +85,7 @@ class SweepSummary:
     failed: int
     already: int
     statuses: Mapping[str, int]
+    self_intersecting: int
     seconds: float
     stopped: bool
     written: tuple[Path, ...]
@@ -175,8 +178,8 @@ def run_sweep(
         def summary(stopped: bool, *written: Path) -> SweepSummary:
             seconds = time.monotonic() - began
             counts = {status.value: int(n) for status, n in zip(STATUSES, journal.counts, strict=True) if n}
-            poses, failed = journal.poses, journal.failed
-            return SweepSummary(plan.poses, poses, failed, already, counts, seconds, stopped, written, notes)
+            poses, failed, through = journal.poses, journal.failed, journal.self_intersecting
+            return SweepSummary(plan.poses, poses, failed, already, counts, through, seconds, stopped, written, notes)
 
         todo = [int(chunk) for chunk in np.flatnonzero(~journal.done)]
         finished = not todo and fingerprint_of(result) == plan.fingerprint()

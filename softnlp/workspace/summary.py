@@ -24,6 +24,7 @@ class Summary:
     poses: int
     solved: int
     unstable: int
+    self_intersecting: int
     failed: dict[Status, int]
     parameters: int
     reach: Reach
@@ -49,6 +50,7 @@ def summarise(workspace: Workspace, *, radius: float | None = None, voxel: float
         poses=workspace.poses,
         solved=len(tips),
         unstable=int(np.count_nonzero(workspace.stable == 0)),
+        self_intersecting=int(np.count_nonzero(workspace.self_intersecting == 1)),
         failed={s: n for s in Status if not s.has_solution and (n := workspace.count(s))},
         parameters=count,
         reach=reach(tips),

@@ -23,7 +23,7 @@ from softnlp.app.section_svg import section_svg
 from softnlp.app.session import Session
 from softnlp.app.stretch import PoseStretch
 from softnlp.errors import InputError
-from softnlp.robot import DIMENSIONS, LOWERABLE_RULES, MINIMUM_WALL, ROBOTS, Dimension
+from softnlp.robot import ALLOWABLE, DIMENSIONS, MINIMUM_WALL, ROBOTS, Dimension
 from softnlp.units import MILLIMETRE
 
 _LABELS = {
@@ -39,7 +39,11 @@ _LABELS = {
 }
 """Label and step of each dimension."""
 _WALL = "minimum_wall_mm"
-_RULES = {"wall_thickness": "Allow thin walls", "chamber_overlap": "Allow chambers that overlap"}
+_RULES = {
+    "wall_thickness": "Allow thin walls",
+    "chamber_overlap": "Allow chambers that overlap",
+    "self_intersection": "Allow answers that pass through themselves",
+}
 _STRETCHED = "At the stretch of the pose"
 _RESTING = 1.0 + 1e-9  # below it a section looks as made
 
@@ -153,7 +157,7 @@ class _RobotPanel:
 
     def _allowed(self) -> None:
         self.rules = {}
-        for rule in LOWERABLE_RULES:
+        for rule in ALLOWABLE:
             switch = ui.switch(_RULES[rule], on_change=lambda event, rule=rule: self._allow(rule, event.value))
             switch.props(f"dense size=sm data-testid=robot-allow-{rule}").classes("text-xs")
             self.rules[rule] = switch.mark(f"robot.allow.{rule}")
@@ -187,7 +191,7 @@ class _RobotPanel:
     def _allow(self, rule: str, wanted: bool) -> None:
         allowed = robot_state(self.session.document).allowed
         if wanted != (rule in allowed):
-            kept = [r for r in LOWERABLE_RULES if (r in allowed or r == rule) and (wanted or r != rule)]
+            kept = [r for r in ALLOWABLE if (r in allowed or r == rule) and (wanted or r != rule)]
             self.session.change("robot", "allow", kept or None)
 
     # --- what is shown ------------------------------------------------------------------------------------------------

@@ -46,12 +46,15 @@ def with_mode(table: Table, mode: str) -> Table:
 
 
 def with_wall(table: Table, anywhere: bool) -> Table:
-    """Return the table with a wall by point and normal, at first where the offset had it, or with an offset."""
+    """Return the table with a wall by point and normal, at first where the offset had it, or with an offset.
+
+    The normal is that of a wall which the unbent tip, at x = 0, is not behind.
+    """
     plain = {key: v for key, v in table.items() if key not in ("offset_mm", "wall_point_mm", "wall_normal")}
     if not anywhere:
         return plain
     offset = table.get("offset_mm", 0.0)
-    return {**plain, "wall_point_mm": [offset, 0.0, 0.0], "wall_normal": [1.0, 0.0, 0.0]}
+    return {**plain, "wall_point_mm": [offset, 0.0, 0.0], "wall_normal": [-1.0 if offset > 0 else 1.0, 0.0, 0.0]}
 
 
 def of_a_curve(table: Table) -> Table:

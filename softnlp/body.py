@@ -1,0 +1,194 @@
+"""Whether a shape is possible as a body: a bend no sharper than the radius, and no part of the body inside another.
+
+The body of outer radius r is the union of discs about the axis. Where curvature times r reaches 1 neighbouring discs
+meet: the inside of the bend has no length left. Below that discs may only meet where the axis has turned by pi or more
+in between (curve and point unrolled into a plane: the distance from a point of both discs has two minima below r), at
+least pi r along the axis from each other. Then there is a pair of points nearest to each other, closer than 2 r, or the
+face of an end lies in another part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+TURN = 3.0
+"""Axes that turn by less [rad] never lead one part of a body into another; pi, less what shear and grids may take."""
+WARNED = 0.9
+"""Curvature times outer radius from which a bend is told of."""
+
+_SMALL_TURN = 1e-4  # below it a series is more accurate than the quotient [rad]
+_STEP = 0.3  # of the radius: how far apart stations are looked at
+_FINEST = 32  # parts that an interval between stations is cut into at most
+_ENTRIES = 4_000_000  # of distances held at once
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How a shape suits a body.
+
+    Attributes
+    ----------
+    tightness
+        Largest curvature of the axis times the outer radius [1].
+    overlaps
+        Whether parts that are no neighbours lie inside each other.
+    """
+
+    tightness: float
+    overlaps: bool
+
+    @property
+    def self_intersecting(self) -> bool:
+        """Whether no body can take the shape without passing through itself."""
+        return self.tightness >= 1 or self.overlaps
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to know of it."""
+        found = []
+        if self.tightness >= 1:
+            found.append(
+                f"curvature times outer radius is {self.tightness:.2f}: from 1 on the inside of the bend has negative "
+                "length, so no body can take this shape"
+            )
+        elif self.tightness >= WARNED:
+            found.append(
+                f"curvature times outer radius is {self.tightness:.2f}: near 1 the inside of the bend has no length "
+                "left, and the model does not hold"
+            )
+        if self.overlaps:
+            found.append(
+                "the body passes through itself: parts of it lie inside each other, and the model has no contact of "
+                "the body with itself"
+            )
+        return tuple(found)
+
+
+def fit_of(position: Array, rotation: Array, radius: float, curvature: Array | None = None) -> Fit:
+    """Return how a shape suits a body.
+
+    position : (M, 3) of the axis [m]. rotation : (M, 3, 3), columns are the body axes. radius : outer, deformed [m].
+    curvature : (M,) of the axis per its deformed length [1/m]; by default that of the screws between stations.
+    """
+    if curvature is None:
+        chord = np.linalg.norm(np.diff(position, axis=0), axis=1)
+        turn = np.linalg.norm(turns(rotation)[:, :2], axis=1)
+        curvature = 2 * np.sin(turn / 2) / chord  # of a circular arc over this chord
+    tightness = float(np.max(curvature)) * radius
+    return Fit(tightness, bool(overlapping(position[None], rotation[None, :, :, 2], np.array([radius]))[0]))
+
+
+def turns(rotation: Array) -> Array:
+    """Return (M - 1, 3) rotation vectors from each station to the next, in the body frame [rad]; below 180 degrees."""
+    Q = np.swapaxes(rotation[:-1], 1, 2) @ rotation[1:]
+    w = np.stack([Q[:, 2, 1] - Q[:, 1, 2], Q[:, 0, 2] - Q[:, 2, 0], Q[:, 1, 0] - Q[:, 0, 1]], axis=1) / 2
+    sine = np.sqrt((w**2).sum(axis=1))
+    angle = np.arctan2(sine, (np.trace(Q, axis1=1, axis2=2) - 1) / 2)
+    flat = sine < _SMALL_TURN
+    factor: Array = np.where(flat, 1 + sine**2 / 6, angle / np.where(flat, 1.0, sine))
+    return w * factor[:, None]
+
+
+def overlapping(position: Array, axis: Array, radius: Array) -> Mask:
+    """Return which of n bodies, bent less sharply than their radius allows, have parts inside each other.
+
+    position, axis : (n, M, 3), of the axis and its unit direction R e3. radius : (n,), in the unit of the positions.
+    """
+    found = np.zeros(len(position), bool)
+    cosine = np.clip((axis[:, 1:] * axis[:, :-1]).sum(axis=2), -1, 1)
+    curled = np.flatnonzero(np.arccos(cosine).sum(axis=1) > TURN)
+    step = np.linalg.norm(np.diff(position, axis=1), axis=2).max(axis=1)
+    for some in _blocks(curled, position.shape[1]):
+        near = _near(_apart(position[some]), _along(position[some]), radius[some], step[some])
+        found[some] = near.any(axis=(1, 2))
+    close = np.flatnonzero(found)
+    parts = int(np.clip(np.ceil((step / radius)[close].max(initial=0.0) / _STEP), 1, _FINEST))
+    for some in _blocks(close, parts * position.shape[1]):
+        found[some] = _meeting(*_finer(position[some], axis[some], parts), radius[some])
+    return found
+
+
+def _blocks(bodies: NDArray[np.intp], stations: int) -> Iterator[NDArray[np.intp]]:
+    """Yield some bodies at a time, as many as distances between their stations are held at once."""
+    most = max(1, _ENTRIES // stations**2)
+    for start in range(0, bodies.size, most):
+        yield bodies[start : start + most]
+
+
+def _along(p: Array) -> Array:
+    """Return the lengths along the axis (n, M)."""
+    return np.pad(np.linalg.norm(np.diff(p, axis=1), axis=2).cumsum(axis=1), ((0, 0), (1, 0)))
+
+
+def _apart(p: Array) -> Array:
+    """Return the squared distances between the stations (n, M, M)."""
+    square = (p**2).sum(axis=2)
+    apart: Array = np.maximum(square[:, :, None] + square[:, None] - 2 * p @ p.swapaxes(1, 2), 0.0)
+    return apart
+
+
+def _near(apart: Array, s: Array, radius: Array, slack: Array) -> Mask:
+    """Return which stations (n, M, M), the first before the second, may be parts that lie inside each other.
+
+    slack : (n,) how far from a station a point between stations may be, both ends taken together.
+    """
+    far = s[:, None] - s[:, :, None] >= (np.pi * radius - slack)[:, None, None]
+    near: Mask = far & (apart < ((2 * radius + slack) ** 2)[:, None, None])
+    return near
+
+
+def _finer(position: Array, axis: Array, parts: int) -> tuple[Array, Array, Array]:
+    """Return positions, directions and lengths along the axis with intervals cut by the cubic through their ends."""
+    step = np.diff(position, axis=1)
+    chord = np.linalg.norm(step, axis=2)
+    t = (np.arange(parts) / parts)[:, None]
+    before, after = (chord[:, :, None, None] * end[:, :, None] for end in (axis[:, :-1], axis[:, 1:]))
+    curve = position[:, :-1, None] + step[:, :, None] * (3 * t**2 - 2 * t**3)
+    curve = curve + before * (t - 2 * t**2 + t**3) + after * (t**3 - t**2)
+    straight = axis[:, :-1, None] * (1 - t) + axis[:, 1:, None] * t
+
+    def joined(inside: Array, last: Array) -> Array:
+        return np.concatenate([inside.reshape(len(position), -1, 3), last[:, None]], axis=1)
+
+    p, a = joined(curve, position[:, -1]), joined(straight, axis[:, -1])
+    return p, a / np.linalg.norm(a, axis=2, keepdims=True), _along(p)
+
+
+def _meeting(p: Array, a: Array, s: Array, radius: Array) -> Mask:
+    """Return which of n bodies meet themselves; stations as of `_finer`, radius (n,)."""
+    apart = _apart(p)
+    near = _near(apart, s, radius, -_ROUNDING * radius)
+    found = np.zeros(len(p), bool)
+    for k in np.flatnonzero(near.any(axis=(1, 2))):
+        i, j = np.nonzero(near[k, 1:-1, 1:-1])
+        around = [apart[k, i + m, j + n] for m in range(3) for n in range(3)]
+        least = around[4] <= np.min(around, axis=0) * (1 + _ROUNDING)
+        found[k] = bool(least.any()) or _ends_inside(p[k], a[k], s[k], float(radius[k]))
+    return found
+
+
+def _ends_inside(p: Array, a: Array, s: Array, radius: float) -> bool:
+    """Return whether a point of the face of an end lies in a part of the body that is no neighbour of it."""
+    angle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+    disc = np.concatenate([r * np.column_stack([np.cos(angle), np.sin(angle)]) for r in (0.0, 0.4, 0.7, 1.0)])
+    for end in (0, -1):
+        close = (np.abs(s - s[end]) >= np.pi * radius) & (np.linalg.norm(p - p[end], axis=1) < 2.5 * radius)
+        k = np.flatnonzero(close[:-1] & close[1:])
+        x = np.cross(a[end], np.eye(3)[np.argmin(np.abs(a[end]))])
+        x /= np.linalg.norm(x)
+        points = p[end] + radius * (disc @ np.array([x, np.cross(a[end], x)]))
+        ahead, behind = (points @ a[j].T - (p[j] * a[j]).sum(axis=1) for j in (k, k + 1))
+        point, at = np.nonzero((ahead >= 0) & (behind < 0))
+        part = ahead[point, at] / (ahead[point, at] - behind[point, at])
+        centre = p[k[at]] + part[:, None] * (p[k[at] + 1] - p[k[at]])
+        if (np.linalg.norm(points[point] - centre, axis=1) < (1 - _ROUNDING) * radius).any():
+            return True
+    return False
