@@ -7,19 +7,22 @@ import json
 import os
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import pytest
+from arc_runs import blocked_run
 from matplotlib.text import Text
 
 from softnlp.cli import main
 from softnlp.cli.console import say_rows
 from softnlp.cli.sweep import _bar
-from softnlp.plots.canvas import OwnFigure
+from softnlp.plots import run_figure
+from softnlp.plots.canvas import MissingGlyphs, OwnFigure
 from softnlp.plots.style import user_text
+from softnlp.results import view_of_run
 from softnlp.workspace.run import SweepProgress
 
 MARKS = r"$a^{ $b_ %# & ~ \alpha <b>&lt; [red]{x}[/bold]"
@@ -68,7 +71,6 @@ constants = {{ a = 0.03 }}
     "others.csv": f'p1_bar,p2_bar,p3_bar,bending_angle_deg,robot\n0.5,0,0,20,"{OTHER}"\n1,0,0,60,"{OTHER}"\n',
     "test.csv": "stretch,stress_MPa\n" + "".join(f"{x},{0.03 * (x - x**-2)}\n" for x in STRETCHES),
     "run.toml": scenario("forward", PRESSURE),
-    "blocked.toml": scenario("blocked-force", PRESSURE),
     "inverse.toml": scenario("inverse", "[target]\ntip_position_mm = [[-18, 0, 60]]\n"),
     "identify.toml": scenario(
         "identify",
@@ -78,7 +80,7 @@ constants = {{ a = 0.03 }}
     "tensile.toml": scenario("identify", '[tensile]\nfile = "test.csv"\nlaws = ["neo-hookean"]\n', RUBBER),
     "design.toml": scenario(
         "design",
-        f'[choices]\nmaterial.model = [{quoted(LAW)}, "neo-hookean"]\n[actuation]\nsets = [1]\npressure_bar = 0.5\n'
+        f"[choices]\nmaterial.model = [{quoted(LAW)}]\n[actuation]\nsets = [1]\npressure_bar = 0.5\n"
         '[objective]\nmaximise = "bending_angle_deg"\n',
     ),
     "sweep.toml": scenario("workspace", "[workspace]\nlevels = 2\nto_bar = 1.0\n"),
@@ -95,7 +97,6 @@ SWEPT = "a sweep $^{"
 # the words of each command, its results, the figures it draws, and what people named that is to be read in them
 COMMANDS: tuple[tuple[tuple[str, ...], set[str], tuple[str, ...], tuple[str, ...]], ...] = (
     (("run", "run.toml", "--out", "run"), NUMBERS["run"], ("figure.png",), (TITLE, ROBOT)),
-    (("run", "blocked.toml", "--out", "blocked"), NUMBERS["run"], ("figure.png",), (TITLE, ROBOT)),
     (("run", "inverse.toml", "--out", "inverse"), NUMBERS["run"], ("figure.png",), (TITLE, ROBOT)),
     (("run", "identify.toml", "--out", "fit"), NUMBERS["identify"], ("figure.png",), (TITLE,)),
     (("run", "tensile.toml", "--out", "test"), NUMBERS["identify"], ("figure.png",), (SILICONE,)),
@@ -202,10 +203,24 @@ def test_names_are_drawn_as_they_are_and_a_figure_that_fails_costs_no_numbers(
             assert any(name[:20] in text.replace("\n", " ") for text in texts), (name, texts)
 
 
-@pytest.mark.parametrize("command", ["run run.toml", "design design.toml", "compare run.toml", "sweep sweep.toml"])
-def test_tables_and_headings_print_names_as_they_are(command: str, told: dict[str, Told]) -> None:
+def test_a_blocked_force_shows_names_as_they_are() -> None:
+    run = blocked_run()
+    named = replace(run, title=TITLE, robot=replace(run.robot, name=ROBOT))
+    with mpl.rc_context({"text.usetex": True}):
+        figure = run_figure(view_of_run(named))
+        with pytest.warns(MissingGlyphs):
+            figure.canvas.draw()
+    shown = [text.get_text() for text in figure.texts]
+    assert shown[0] == TITLE
+    assert ROBOT in shown[1]
+
+
+@pytest.mark.parametrize(
+    ("command", "count"), [("run run.toml", 4), ("design design.toml", 3), ("compare run.toml", 3), ("sweep", 4)]
+)
+def test_tables_and_headings_print_names_as_they_are(command: str, count: int, told: dict[str, Told]) -> None:
     (found,) = (t for words, t in told.items() if words.startswith(command))
-    assert "".join(LAW.split()) in "".join(found.out.split())
+    assert "".join(found.out.split()).count("".join(MARKS.split())) >= count
 
 
 def test_a_label_is_one_printable_line_of_a_few_words() -> None:
