@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
 
 from softnlp.contact_settings import ContactSettings
+from softnlp.errors import InputError
+from softnlp.evaluation.statistics import NOTHING
 from softnlp.scenario import Scenario
 from softnlp.studies.identified import Identified
 from softnlp.studies.identify import identify
 from softnlp.studies.identify_task import RobotTask, TensileTask
-from softnlp.studies.tensile import TensileFit, fit_tensile
+from softnlp.studies.tensile import LawFit, TensileFit, fit_tensile, tensile_misfit
 
 Progress = Callable[[int, float], None]
 
@@ -53,4 +58,18 @@ def run_tensile(scenario: Scenario) -> TensileFit:
     """
     task = scenario.task
     assert isinstance(task, TensileTask)
-    return fit_tensile(task.stretch, task.stress, task.laws, name=task.name, density=task.density, start=task.start)
+    try:
+        fit = fit_tensile(task.stretch, task.stress, task.laws, name=task.name, density=task.density, start=task.start)
+    except InputError as error:
+        raise error.located(source=str(scenario.path), table="tensile") from None
+    fits = {name: replace(law, warnings=(*law.warnings, *_further(task, law))) for name, law in fit.fits.items()}
+    return replace(fit, fits=fits, checks=(*task.checks, *fit.checks))
+
+
+def _further(task: TensileTask, fit: LawFit) -> tuple[str, ...]:
+    """Say whether a fitted law is further from the data than the material before."""
+    before = task.before
+    was = np.inf if before is None else tensile_misfit(before, task.stretch, task.stress).rmse
+    if before is None or not fit.misfit.rmse > was * (1 + NOTHING):
+        return ()
+    return (f"it is further from the data than {before.name} ({before.law.name}) before, by the rms error",)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -23,7 +23,8 @@ from softnlp.schema_identify import IdentifyFile, MeasurementsTable, SigmaTable,
 from softnlp.studies.free_constants import free_constants
 from softnlp.studies.identify_task import RobotTask, TensileTask
 from softnlp.studies.measurements import Measurements, checked_measurements
-from softnlp.units import MEGAPASCAL, MILLIMETRE
+from softnlp.studies.plausibility import Check, area_check
+from softnlp.units import KILOPASCAL, MEGAPASCAL, MILLIMETRE
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -34,6 +35,13 @@ FILE_KEYS: Mapping[str, tuple[str, float]] = {"tip_position": ("tip_position_mm"
 
 UNUSED_BY_TENSILE = ("robots", "sigma", "contact", "gravity", "tip_load", "stiffening", "corrections", "solver")
 _UNUSED_CONTACT = ("offsets_mm", "offset_ramp", "target_force_N")
+_STRETCHES: Mapping[str, tuple[float, float]] = {"stretch": (1, 0), "strain": (1, 1), "strain_percent": (0.01, 1)}
+_STRESSES: Mapping[str, float] = {"stress_MPa": MEGAPASCAL, "stress_kPa": KILOPASCAL, "stress_Pa": 1.0}
+_SIZES: Mapping[str, tuple[float, float]] = {
+    "gauge_length_mm": (0.5, 2000.0),
+    **{"width_mm": (0.1, 500.0), "thickness_mm": (0.02, 500.0), "diameter_mm": (0.1, 500.0)},
+}
+_ROUNDED = 1e-9  # of a stretch; a point on an end of the range stays
 
 
 class Given(NamedTuple):
@@ -101,17 +109,44 @@ def _tensile(given: Given, table: TensileTable) -> TensileTask:
     files = _files(table)
     parts = [_curve(read_columns(given.folder, file), table) for file in files]
     before = given.material if "material" in given.written else None
+    laws = _laws(table, before)
+    stretch, stress = (np.concatenate(column) for column in zip(*(part[:2] for part in parts), strict=True))
+    kept = _kept(table, stretch, laws)
     return TensileTask(
-        stretch=np.concatenate([stretch for stretch, _ in parts]),
-        stress=np.concatenate([stress for _, stress in parts]),
-        file_of_point=np.repeat(np.arange(len(files)), [len(stretch) for stretch, _ in parts]),
+        stretch=stretch[kept],
+        stress=stress[kept],
+        file_of_point=np.repeat(np.arange(len(files)), [len(part[0]) for part in parts])[kept],
         files=files,
-        laws=_laws(table, before),
+        laws=laws,
         name=table.name or (before.name if before is not None else "My silicone"),
         density=table.density_kg_m3 or float(given.material.density),
         start=None if before is None else {k: float(v) for k, v in before.constants.items()},
         before=before,
+        stretch_range=None if table.stretch is None else (table.stretch[0], table.stretch[1]),
+        dropped=int(np.sum(~kept)),
+        checks=tuple(dict.fromkeys(check for part in parts for check in part[2])),
     )
+
+
+def _kept(table: TensileTable, stretch: Array, laws: Sequence[Law]) -> NDArray[np.bool_]:
+    """Return which points the laws are fitted to: those within the key stretch."""
+    kept = np.ones(stretch.size, bool)
+    if table.stretch is None:
+        return kept
+    low, high = table.stretch
+    if not high > max(low, 1):
+        raise InputError(
+            f"expected [lowest, highest], the highest above the lowest and 1, got {table.stretch}", key="stretch"
+        )
+    kept = (stretch >= low - _ROUNDED) & (stretch <= high + _ROUNDED)
+    need = max(laws, key=lambda law: len(law.constants))
+    if np.sum(kept) < len(need.constants) or not np.any(stretch[kept] > 1 + 1e-6):
+        raise InputError(
+            f"leaves {np.sum(kept)} of {stretch.size} points, too few for law {need.name!r} with {len(need.constants)} "
+            f"constants; the data go from {np.min(stretch):.4g} to {np.max(stretch):.4g}",
+            key="stretch",
+        )
+    return kept
 
 
 def _laws(table: TensileTable, before: Material | None) -> tuple[Law, ...]:
@@ -125,20 +160,21 @@ def _laws(table: TensileTable, before: Material | None) -> tuple[Law, ...]:
     return tuple(known[name] for name in dict.fromkeys(table.laws or known))
 
 
-def _curve(columns: Columns, table: TensileTable) -> tuple[Array, Array]:
-    """Return stretch and engineering stress [Pa] of one file."""
-    if "stretch" in columns or "stress_MPa" in columns:
-        for name in ("stretch", "stress_MPa"):
-            if name not in columns:
-                raise InputError(f"{columns.file}: missing column {name!r}", key="file")
-        stretch, stress = columns.numbers("stretch"), columns.numbers("stress_MPa") * MEGAPASCAL
-    elif "displacement_mm" in columns and "force_N" in columns:
-        if table.gauge_length_mm is None:
-            raise InputError("missing; displacement_mm needs the length that was stretched", key="gauge_length_mm")
-        stretch = 1 + columns.numbers("displacement_mm") / table.gauge_length_mm
-        stress = columns.numbers("force_N") / _area(table)
+def _curve(columns: Columns, table: TensileTable) -> tuple[Array, Array, tuple[Check, ...]]:
+    """Return stretch and engineering stress [Pa] of one file, with the checks of its specimen."""
+    checks: tuple[Check, ...] = ()
+    named = "stretch" in columns or "stress_MPa" in columns
+    if not named and "displacement_mm" in columns and "force_N" in columns:
+        name = "displacement_mm"
+        stretch = 1 + columns.numbers(name) / _size(table, "gauge_length_mm")
+        area = _area(table)
+        stress, checks = columns.numbers("force_N") / (area * MILLIMETRE**2), (area_check(area),)
         if table.stress == "true":
             raise InputError("expected 'engineering': force over the specimen's size is no true stress", key="stress")
+    elif named or any(name in columns for name in (*_STRETCHES, *_STRESSES)):
+        name, of_stress = _first(columns, _STRETCHES), _first(columns, _STRESSES)
+        factor, zero = _STRETCHES[name]
+        stretch, stress = zero + factor * columns.numbers(name), columns.numbers(of_stress) * _STRESSES[of_stress]
     else:
         raise InputError(
             f"{columns.file}: expected columns stretch, stress_MPa or displacement_mm, force_N; it has "
@@ -146,23 +182,39 @@ def _curve(columns: Columns, table: TensileTable) -> tuple[Array, Array]:
             key="file",
         )
     for row in np.flatnonzero(~(stretch > 0))[:1]:
-        raise columns.wrong(int(row), columns.header[0], f"expected a stretch above 0, got {stretch[row]:g}")
-    return stretch, stress / stretch if table.stress == "true" else stress
+        strain = "; strain goes in a column strain or strain_percent" if name == "stretch" else ""
+        raise columns.wrong(int(row), name, f"expected a stretch above 0, got {stretch[row]:g}{strain}")
+    return stretch, stress / stretch if table.stress == "true" else stress, checks
+
+
+def _first(columns: Columns, known: Mapping[str, object]) -> str:
+    """Return the first known column that the file has."""
+    for name in known:
+        if name in columns:
+            return name
+    first, *others = known
+    raise InputError(f"{columns.file}: missing column {first!r} (or {', '.join(others)})", key="file")
 
 
 def _area(table: TensileTable) -> float:
-    """Return the specimen's cross-section before the test [m^2]."""
-    flat = [table.width_mm, table.thickness_mm]
-    if (table.diameter_mm is None) == (flat == [None, None]):
+    """Return the specimen's cross-section before the test [mm^2]."""
+    if (table.diameter_mm is None) == (table.width_mm is None and table.thickness_mm is None):
         raise InputError("expected either diameter_mm, or width_mm and thickness_mm", key="diameter_mm")
     if table.diameter_mm is not None:
-        return float(np.pi / 4 * (table.diameter_mm * MILLIMETRE) ** 2)
-    for key, value in (("width_mm", table.width_mm), ("thickness_mm", table.thickness_mm)):
-        if value is None:
-            raise InputError("missing; expected width_mm and thickness_mm", key=key)
-    assert table.width_mm is not None
-    assert table.thickness_mm is not None
-    return table.width_mm * table.thickness_mm * MILLIMETRE**2
+        return float(np.pi / 4 * _size(table, "diameter_mm") ** 2)
+    return _size(table, "width_mm") * _size(table, "thickness_mm")
+
+
+def _size(table: TensileTable, key: str) -> float:
+    """Return a size of the specimen [mm]."""
+    value, (low, high) = getattr(table, key), _SIZES[key]
+    if value is None:
+        what = "displacement_mm needs the length that was stretched" if key == "gauge_length_mm" else "force_N needs it"
+        raise InputError(f"missing; {what}", key=key)
+    if not low <= value <= high:
+        unit = "m" if value < low else "micrometres"
+        raise InputError(f"expected {low:g} to {high:g} mm, got {value:g}; it looks like {unit}", key=key)
+    return float(value)
 
 
 # --- measurements of robots -------------------------------------------------------------------------------------------

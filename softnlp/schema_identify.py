@@ -32,6 +32,7 @@ class TensileTable(Table):
     width_mm: Positive | None = None
     thickness_mm: Positive | None = None
     diameter_mm: Positive | None = None
+    stretch: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None
     density_kg_m3: Positive | None = None
 
 

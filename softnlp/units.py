@@ -8,6 +8,8 @@ MILLIMETRE = 1e-3
 """One millimetre in [m]."""
 BAR = 1e5
 """One bar in [Pa]."""
+KILOPASCAL = 1e3
+"""One kilopascal in [Pa]."""
 MEGAPASCAL = 1e6
 """One megapascal in [Pa]."""
 NEWTON_MILLIMETRE = 1e-3

@@ -140,6 +140,14 @@ async def _tensile() -> None:
             enter(user, f"tensile.{key}", size)
         assert field(user, "tensile.problem").text == ""
         await ran(user, "tensile", "best: ")
+        # data of another quantity leave no law to use, and the page says what they look like
+        lines = [f"{x},{31 * (x - x**-2)}" for x in np.linspace(1, 2, 21)]
+        await drop(user, "tensile.drop", "kPa.csv", "\n".join(["stretch,stress_MPa", *lines]).encode())
+        session.change("tensile", "laws", ["neo-hookean", "yeoh"])
+        await ran(user, "tensile", "no law is a material to use")
+        assert "looks like stress in kPa (name its column stress_kPa)" in field(user, "tensile.told").text
+        assert {row["c5"].partition(":")[0] for row in field(user, "tensile.laws").rows} == {"implausible"}
+        assert not field(user, "tensile.law").options
 
 
 def test_a_tensile_test_gives_a_silicone() -> None:

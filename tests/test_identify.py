@@ -33,8 +33,10 @@ from softnlp import (
 from softnlp.cli import main
 from softnlp.contact_settings import ContactSettings
 from softnlp.materials import Material
+from softnlp.plots import identified_figure
 from softnlp.quantities import Model
 from softnlp.robot import Robot
+from softnlp.runner_identify import run_robots
 from softnlp.scenario import load_scenario, scenario_from_text
 from softnlp.studies import predicted_force, predicted_pose
 from softnlp.studies.blocked_force import blocked_force
@@ -620,6 +622,56 @@ def test_no_pose_ends_with_3(tmp_path: Path) -> None:
     assert document["status"] in ("no_equilibrium", "unstable_material")
     assert document["constants"][0]["value"] is None
     assert not (tmp_path / "o" / "identified.toml").exists()
+
+
+def test_open_constants_and_grown_errors_are_said_everywhere(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By default each number counts by its size: the weighted misfit falls, and the error in degrees grows."""
+    csv = (ROOT / "scenarios" / "files" / "measured_angles.csv").read_text()
+    path = scenario(tmp_path, csv, 'free = ["k_e", "k_b"]', "")
+    assert main(["identify", str(path), "--out", str(tmp_path / "o")]) == 0
+    shown = capsys.readouterr().out
+    document = json.loads((tmp_path / "o" / "identified.json").read_text())
+    k_e, k_b = document["constants"]
+    assert k_e["standard_error"] > k_e["value"] > 0
+    assert (k_e["determined"], k_e["at_bound"], document["status"]) == (False, False, "solved")
+    assert k_b["determined"] is (k_b["standard_error"] <= k_b["value"])
+    before, after = (document["errors"][when]["bending_angle_deg"]["rmse"] for when in ("before", "after"))
+    assert after > 1.05 * before
+    assert document["weighted_rms"]["after"] < document["weighted_rms"]["before"]
+    for words in ("k_e is not determined", f"bending angle rose by {100 * (after / before - 1):.3g} %"):
+        assert any(words in warning for warning in document["warnings"])
+        assert words in shown
+    assert any(line.startswith("k_e") and line.endswith("not determined") for line in shown.splitlines())
+    assert ", not determined" in (tmp_path / "o" / "identified.toml").read_text()
+    found = run_robots(load_scenario(path))
+    assert identified_figure(found, "x").texts
+    assert any("k_e = 0.2028 (not determined)" in text.get_text() for text in identified_figure(found, "x").texts)
+
+
+def test_an_end_that_is_worse_than_the_start_is_no_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_Fit, "_minimise", lambda self, start: start + 5.0)
+    found = identify(seen(robot("D25L60"), POSES), SILICONE, ["k_b"], coefficients=TRUE)
+    assert found.status is Status.DIVERGED
+    assert "ended at k_b = 12, further from the measurements than its start" in found.message
+    assert np.isnan(found.constants).all()
+
+
+def test_the_start_is_never_left_for_a_worse_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A point at the bound that the sum of squares is pushed against is taken only where it is not larger there."""
+    search = _Fit._search
+
+    def worse(self: _Fit, start: Any, moving: Any, tolerance: float) -> Any:
+        found = search(self, start, moving, tolerance)
+        self._cost *= 1.0 if np.all(moving) else 2.0
+        return found
+
+    data = seen(robot("D25L60"), POSES, bending=0.0)
+    off = replace(data, bending_angle=np.array(data.bending_angle) * 1.1, tip_position=None)
+    monkeypatch.setattr(_Fit, "_search", worse)
+    found = identify(off, SILICONE, ["k_b", "k_e"], coefficients=started(["k_b", "k_e"]))
+    assert 0 <= found.constants[0] < 1e-4
 
 
 def test_another_study_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

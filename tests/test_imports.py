@@ -48,6 +48,8 @@ LAYERS = (
     ),
     *(
         "studies.fit_statistics",
+        "studies.plausibility",
+        "studies.law_curve",
         "studies.tensile",
         "studies.measurements",
         "studies.free_constants",

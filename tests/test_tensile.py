@@ -14,7 +14,8 @@ from softnlp.cli import main
 from softnlp.laws import LAWS
 from softnlp.scenario import load_scenario, scenario_from_text
 from softnlp.studies.identify_task import TensileTask
-from softnlp.studies.tensile import LawFit, _Curve
+from softnlp.studies.law_curve import LawCurve
+from softnlp.studies.tensile import LawFit
 
 ROOT = Path(__file__).parents[1]
 SCENARIOS = ROOT / "scenarios" / "identify"
@@ -84,7 +85,7 @@ def test_a_law_without_any_linear_constant_is_fitted() -> None:
     law = formula_law(
         "curved", "a * b * (stretch - 1 / stretch) + a**3 * (stretch - 1)**2 + b**2 * (stretch - 1)", ("a", "b")
     )
-    assert not _Curve(law).linear.any()
+    assert not LawCurve(law).linear.any()
     a, b, x = 0.4, 0.15, STRETCH
     stress = 1e6 * (a * b * (x - 1 / x) + a**3 * (x - 1) ** 2 + b**2 * (x - 1))
     fit = fit_tensile(x, stress, law, start={"a": 0.3, "b": 0.2}).fits["curved"]
@@ -152,6 +153,8 @@ def test_a_law_that_softens_within_the_range_says_so() -> None:
         ([1.0, 1.5], [0.0, 0.0], "not 0 everywhere"),
         ([1.0, 1.5], [0.0, np.nan], "finite"),
         ([1.0, 1.5], ["a", "b"], "list of numbers"),
+        ([1.0, 1e300], [0.0, 1.0], "expected 0.0001 to 10000, got 1e[+]300"),
+        ([1.0, 1.5], [0.0, -1e300], "expected -1e[+]15 to 1e[+]15, got -1e[+]300"),
         ([1.0, 1.5], [0.0, 1.0], "3 constants"),
     ],
 )

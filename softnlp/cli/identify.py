@@ -31,7 +31,8 @@ def identify(scenario: Path, /, *, out: Path | None = None, json: bool = False) 
 
     Prints the constants with their standard errors and what is left of the data; writes identified.json, table.csv,
     tables to paste into a scenario (material.toml of a tensile test, else identified.toml), figure.png, versions.json
-    and a copy of the scenario. The exit status is 0, 3 when nothing was found, 2 for bad input, 130 when stopped.
+    and a copy of the scenario. The exit status is 0, 3 when nothing was found or a constant is
+    not plausible, 2 for bad input, 130 when stopped.
 
     Parameters
     ----------
@@ -93,13 +94,15 @@ def _tensile(asked: Scenario, folder: Path | None, json: bool) -> int:
         _say_tensile(task, fit)
         if folder is not None:
             say(f"results in {folder}")
-    return SOLVED if all(f.material is not None for f in fit.fits.values()) else SOME_UNSOLVED
+    for problem in fit.problems:
+        complain(f"{asked.path.name}: [tensile] {problem}")
+    return SOME_UNSOLVED if fit.problems else SOLVED
 
 
 def _say_tensile(task: TensileTask, fit: TensileFit) -> None:
     """Print the constants of every law."""
     low, high = next(iter(fit.fits.values())).fitted_stretch
-    say(f"{task.name}: {task.stretch.size} points, stretch {low:.4g} to {high:.4g}")
+    say(f"{task.name}: {task.stretch.size} points, stretch {low:.4g} to {high:.4g}{task.left_out}")
     if task.before is not None:
         from softnlp.studies.tensile import tensile_misfit
 
@@ -111,13 +114,16 @@ def _say_tensile(task: TensileTask, fit: TensileFit) -> None:
     for f in fit.fits.values():
         constants = ", ".join(
             f"{c.file_key} = {f.constants[c.name] / c.scale:.6g} +- {f.standard_errors[c.name] / c.scale:.2g}"
+            + (f.notes[c.name] and f" ({f.notes[c.name]})")
             for c in f.law.constants
         )
-        rows.append([f.law.name, f"{f.r_squared:.6f}", f"{f.misfit.rmse / 1e3:.4g}", f"{f.misfit.mape:.3g}", constants])
-    say_rows(["law", "R^2", "rmse_kPa", "mape_percent", "constants"], rows)
-    for f in fit.fits.values():
-        for warning in f.warnings:
-            say(f"{f.law.name}: {warning}")
+        numbers = f"{f.r_squared:.6f}", f"{f.misfit.rmse / 1e3:.4g}", f"{f.misfit.mape:.3g}"
+        rows.append([f.law.name, f.status, *numbers, constants])
+    say_rows(["law", "status", "R^2", "rmse_kPa", "mape_percent", "constants"], rows)
+    if fit.best is not None:
+        say(f"best: {fit.best.law.name}")
+    for warning in fit.warnings:
+        say(f"warning: {warning}")
 
 
 def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
@@ -171,7 +177,8 @@ _GUESS = 40
 
 def _say_robots(asked: Scenario, found: Identified) -> None:
     """Print constants and misfits."""
-    from softnlp.results.identify_document import UNITS, file_name
+    from softnlp.results.identify_document import UNITS
+    from softnlp.studies.free_constants import file_name
 
     say(f"{asked.title}: {', '.join(d.label for d in found.data)}; {asked.material.name} ({asked.material.law.name})")
     for line in gravity_lines(asked.loads.gravity):
@@ -184,8 +191,8 @@ def _say_robots(asked: Scenario, found: Identified) -> None:
         key, scale = file_name(name, found.material)
         error = found.uncertainty.standard_errors[k] / scale
         values = (found.constants[k] / scale, error, found.free.start[k] / scale)
-        rows.append([key, *(f"{v:.6g}" for v in values)])
-    say_rows(["constant", "value", "standard_error", "start"], rows)
+        rows.append([key, *(f"{v:.6g}" for v in values), found.notes[name]])
+    say_rows(["constant", "value", "standard_error", "start", "note"], rows)
     before, after = found.errors(False), found.errors()
     say_rows(
         ["observable", "numbers", "rmse_before", "rmse_after", "mape_before_percent", "mape_after_percent", "sigma"],

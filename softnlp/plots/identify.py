@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from softnlp.plots.style import GREY, INK, PALE, SMALL, TEXT, colour, in_own_style, new_figure, plain, user_text
 from softnlp.results.identify_document import UNITS
 from softnlp.studies.measurements import column_slice
+from softnlp.units import KILOPASCAL
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -16,7 +18,6 @@ if TYPE_CHECKING:
     from softnlp.studies.identified import Identified
     from softnlp.studies.tensile import TensileFit
 
-KILOPASCAL = 1e3
 _LABELS = {
     "tip_position": "tip position [mm]",
     "bending_angle": "bending angle [deg]",
@@ -55,13 +56,22 @@ def tensile_figure(fit: TensileFit, name: str, before: Any = None) -> Figure:
     styles = ("-", "--", "-.", (0, (4, 1, 1, 1, 1, 1)), (0, (8, 2)))
     for k, f in enumerate(fit.fits.values()):
         look: dict[str, Any] = {"color": colour(k), "linestyle": styles[k % len(styles)], "linewidth": 1.5}
-        left.plot(
-            stretch, f.stress(stretch) / KILOPASCAL, label=f"{user_text(f.law.name)}, R² = {f.r_squared:.5f}", **look
+        words = (
+            user_text(f.law.name),
+            f"R² = {f.r_squared:.5f}",
+            *([f.status] if f.material is None else ()),
+            *_unsure(f.notes),
         )
+        left.plot(stretch, f.stress(stretch) / KILOPASCAL, label=", ".join(words), **look)
         right.plot(fit.stretch[order], (f.stress(fit.stretch) - fit.stress)[order] / KILOPASCAL, **look)
     right.axhline(0.0, color=GREY, linewidth=0.8, zorder=1)
     left.legend(fontsize=SMALL, frameon=False, labelcolor=INK)
     return figure
+
+
+def _unsure(notes: Mapping[str, str]) -> list[str]:
+    """Return a legend's words on the constants that have a note."""
+    return [f"{name} {note}" for name, note in notes.items() if note]
 
 
 @in_own_style
@@ -69,7 +79,8 @@ def identified_figure(found: Identified, title: str) -> Figure:
     """Draw the model before and after against what was measured, a panel an observable and a marker a robot."""
     shown = [key for key in UNITS if key in found.errors()]
     width = 0.9 + 4.1 * len(shown)
-    constants = ", ".join(f"{n} = {v:.4g}" for n, v in zip(found.free.names, found.constants, strict=True))
+    pairs = zip(found.free.names, found.constants, strict=True)
+    constants = ", ".join(f"{n} = {v:.4g}" + (found.notes[n] and f" ({found.notes[n]})") for n, v in pairs)
     figure = new_figure(max(width, 6.5), 5.0, title, constants)
     step = 1.0 / len(shown)
     robots = [sum(bool(np.any(np.isfinite(d.of(key)))) for d in found.data) for key in shown]

@@ -14,7 +14,7 @@ import numpy as np
 from softnlp.evaluation.statistics import Statistics
 from softnlp.materials import Material
 from softnlp.results.inputs import loads_table, package_version, tidy
-from softnlp.studies.free_constants import COEFFICIENTS
+from softnlp.studies.free_constants import COEFFICIENTS, file_name
 from softnlp.studies.measurements import OBSERVABLES, column_slice
 from softnlp.units import BAR, DEGREE, MEGAPASCAL, MILLIMETRE
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from softnlp.scenario import Scenario
     from softnlp.studies.identified import Identified
     from softnlp.studies.identify_task import RobotTask, TensileTask
+    from softnlp.studies.plausibility import Check
     from softnlp.studies.tensile import LawFit, TensileFit
 
 UNITS: Mapping[str, tuple[str, float]] = {
@@ -72,12 +73,28 @@ def tensile_document(asked: Scenario, task: TensileTask, fit: TensileFit) -> dic
         "material": task.name,
         "files": list(task.files),
         "points": int(task.stretch.size),
+        "stretch_range": None if task.stretch_range is None else list(task.stretch_range),
+        "dropped": task.dropped,
         "fitted_stretch": [float(v) for v in next(iter(fit.fits.values())).fitted_stretch],
         "before": None
         if before is None
         else {"rmse_MPa": number(before.rmse / MEGAPASCAL), "mape_percent": number(before.mape)},
         "best": None if best is None else best.law.name,
+        "checks": [_check(check) for check in fit.checks],
         "laws": [_law(f) for f in fit.fits.values()],
+    }
+
+
+def _check(check: Check) -> dict[str, Any]:
+    """Return a check of plausibility; an open end of a range is null."""
+    return {
+        "name": check.name,
+        "value": number(check.value),
+        "unit": check.unit or None,
+        "usual": [number(v) for v in check.usual],
+        "possible": [number(v) for v in check.possible],
+        "verdict": check.verdict,
+        "message": check.message,
     }
 
 
@@ -85,16 +102,19 @@ def _law(fit: LawFit) -> dict[str, Any]:
     constants = fit.law.constants
     return {
         "model": fit.law.name,
-        "status": "solved" if fit.material is not None else "unstable_material",
+        "status": fit.status,
         "message": fit.problem or "the sum of squares is at a minimum",
         "constants": {c.file_key: number(fit.constants[c.name] / c.scale) for c in constants},
         "standard_errors": {c.file_key: number(fit.standard_errors[c.name] / c.scale) for c in constants},
+        "determined": {c.file_key: fit.determined[c.name] for c in constants},
+        "at_bound": [c.file_key for c in constants if c.name in fit.at_bound],
         "correlation": _matrix(fit.correlation),
         "condition": number(fit.condition),
         "r_squared": number(fit.r_squared),
         "rmse_MPa": number(fit.misfit.rmse / MEGAPASCAL),
         "mape_percent": number(fit.misfit.mape),
         "unstable_from_stretch": fit.unstable_from,
+        "checks": [_check(check) for check in fit.checks],
         "warnings": list(fit.warnings),
     }
 
@@ -120,9 +140,10 @@ def material_file_text(task: TensileTask, fit: TensileFit) -> str:
             block.append(f"[{name}.{_quoted(f.law.name)}.constants]")
         for c in f.law.constants:
             value, error = f.constants[c.name] / c.scale, f.standard_errors[c.name] / c.scale
-            block.append(f"{c.file_key} = {value!r}  # +- {error:.2g}")
+            block.append(f"{c.file_key} = {value!r}  # +- {error:.2g}{f.notes[c.name] and f', {f.notes[c.name]}'}")
         note = f"# R^2 = {f.r_squared:.6f}, rmse {f.misfit.rmse / MEGAPASCAL:.3g} MPa"
-        lines += ["", note, *(f"# {_plain(w)}" for w in f.warnings)]
+        problem = [f"{f.status}: {f.problem}"] if f.problem else []
+        lines += ["", note, *(f"# {_plain(w)}" for w in (*problem, *f.warnings))]
         lines += block if f.material is not None else [f"# {line}" for line in block]
     return "\n".join(lines) + "\n"
 
@@ -163,6 +184,7 @@ def robot_document(asked: Scenario, task: RobotTask, found: Identified) -> dict[
                 "start": number(found.free.start[k] / scale),
                 "bounds": [number(found.free.lower[k] / scale), number(found.free.upper[k] / scale)],
                 "at_bound": name in found.at_bound,
+                "determined": found.determined[name],
             }
         )
     return {
@@ -173,6 +195,7 @@ def robot_document(asked: Scenario, task: RobotTask, found: Identified) -> dict[
         "constants": constants,
         "correlation": _matrix(found.uncertainty.correlation),
         "condition": number(found.uncertainty.condition),
+        "weighted_rms": {"before": number(found.weighted_rms(False)), "after": number(found.weighted_rms())},
         "errors": {
             when: {UNITS[key][0]: _misfit(m, UNITS[key][1]) for key, m in found.errors(after).items()}
             for when, after in (("before", False), ("after", True))
@@ -183,15 +206,6 @@ def robot_document(asked: Scenario, task: RobotTask, found: Identified) -> dict[
         "evaluations": found.evaluations,
         "warnings": list(found.warnings),
     }
-
-
-def file_name(name: str, material: Material) -> tuple[str, float]:
-    """Return the key that files have for a constant, and its unit there in SI."""
-    plain = name.removeprefix("material.")
-    for c in material.law.constants:
-        if c.name == plain and name not in COEFFICIENTS:
-            return c.file_key, c.scale
-    return name, 1.0
 
 
 def _sigma(data: Any) -> dict[str, float]:
@@ -258,8 +272,8 @@ def identified_text(asked: Scenario, found: Identified) -> str:
         key = COEFFICIENTS[name].field if name in COEFFICIENTS else key
         error = found.uncertainty.standard_errors[k] / scale
         errors[key] = f"  # identified, +- {error:.2g}" if isfinite(error) else "  # identified, without standard error"
-        if name in found.at_bound:
-            errors[key] = "  # identified, at its bound"
+        if note := found.notes[name]:
+            errors[key] = "  # identified, at its bound" if name in found.at_bound else f"{errors[key]}, {note}"
     lines = [f"# Identified from {_plain(asked.title)}; tables to paste into a scenario."]
     for table, values in scenario_tables(found).items():
         if table == "contact":

@@ -40,6 +40,30 @@ class Uncertainty:
     warnings: tuple[str, ...]
 
 
+def determined(value: float, error: float) -> bool | None:
+    """Whether a constant's standard error is within its value; None where there is no error, as of one at a bound."""
+    return None if np.isnan(error) else bool(error <= abs(value))
+
+
+def constant_note(known: bool | None, at_bound: bool) -> str:
+    """Return what a table says of a constant: at its bound or not determined, else ""."""
+    return "at its bound" if at_bound else "not determined" if known is False else ""
+
+
+def open_constants(names: Sequence[str], values: Array, errors: Array, at_bound: Sequence[bool]) -> list[str]:
+    """Say of each constant (n,) whether it ended at a bound, or with a standard error beyond its value."""
+    notes = []
+    for name, value, error, held in zip(names, values, errors, at_bound, strict=True):
+        if held:
+            notes.append(f"{name} ended at its bound {value:.4g}; it was held there for the other standard errors")
+        elif determined(value, error) is False:
+            notes.append(
+                f"{name} is not determined, for its standard error {error:.3g} exceeds its value {value:.3g}: fix it, "
+                "or add measurements that depend on it"
+            )
+    return notes
+
+
 def uncertainty(names: Sequence[str], J: Array, residuals: Array, held: Sequence[bool] | None = None) -> Uncertainty:
     """Return the uncertainty of constants at a least-squares solution.
 

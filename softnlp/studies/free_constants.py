@@ -108,6 +108,15 @@ def free_constants(
     )
 
 
+def file_name(name: str, material: Material) -> tuple[str, float]:
+    """Return the key that files have for a constant, and its unit there in SI."""
+    plain = name.removeprefix("material.")
+    for c in material.law.constants:
+        if c.name == plain and name not in COEFFICIENTS:
+            return c.file_key, c.scale
+    return name, 1.0
+
+
 def _bounds(name: str, quantity: str) -> tuple[float, float]:
     if quantity.startswith("material."):
         return -np.inf, np.inf

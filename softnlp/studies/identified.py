@@ -12,11 +12,13 @@ from softnlp.conventions import Coefficients
 from softnlp.evaluation.statistics import Statistics, statistics
 from softnlp.materials import Material
 from softnlp.status import Status
-from softnlp.studies.fit_statistics import Uncertainty
+from softnlp.studies.fit_statistics import Uncertainty, constant_note, determined
 from softnlp.studies.free_constants import FreeConstants
 from softnlp.studies.measurements import OBSERVABLES, Data, column_slice
 
 Array = NDArray[np.float64]
+
+GROWN = 1e-3  # relative; an error that grew by less is the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +65,36 @@ class Identified:
     evaluations: int
     warnings: tuple[str, ...]
 
+    @property
+    def determined(self) -> dict[str, bool | None]:
+        """By name: whether a constant's standard error is within its value, None where it has none."""
+        pairs = zip(self.constants, self.uncertainty.standard_errors, strict=True)
+        return dict(zip(self.free.names, (determined(*pair) for pair in pairs), strict=True))
+
+    @property
+    def notes(self) -> dict[str, str]:
+        """By name: whether a constant is at its bound or not determined, else ""."""
+        return {name: constant_note(known, name in self.at_bound) for name, known in self.determined.items()}
+
+    def weighted_rms(self, after: bool = True) -> float:
+        """Return the root mean square of what is minimised, (model - measured) / sigma with the weights of rows [1].
+
+        Parameters
+        ----------
+        after
+            With the constants found, or else with those at the start.
+
+        Returns
+        -------
+        float
+            The root mean square, nan where a pose was not found [1].
+        """
+        parts = []
+        for d, values in zip(self.data, self.after if after else self.before, strict=True):
+            fitted = d.measured & (d.root_weight[:, None] > 0)
+            parts.append(((values - d.values) / d.sigma * d.root_weight[:, None])[fitted])
+        return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+
     def errors(self, after: bool = True) -> dict[str, Statistics]:
         """Return the misfit by observable over all robots [m, rad, N].
 
@@ -80,6 +112,23 @@ class Identified:
             `Misfit` by observable, in m, rad or N.
         """
         return observable_misfits(self.data, self.after if after else self.before)
+
+
+def grown_errors(found: Identified) -> list[str]:
+    """Say which observables are further from what was measured than at the start, and why."""
+    before, after = found.errors(False), found.errors()
+    grown = [
+        f"{key.replace('_', ' ')} rose by {100 * (after[key].rmse / before[key].rmse - 1):.3g} %"
+        for key in after
+        if after[key].rmse > before[key].rmse * (1 + GROWN)
+    ]
+    if not grown:
+        return []
+    weighted = f"from {found.weighted_rms(False):.4g} to {found.weighted_rms():.4g}"
+    return [
+        f"the rms error of the {' and of the '.join(grown)} from the start on, while what is minimised, the rms of the "
+        f"errors divided by sigma, went {weighted}: say in [sigma] what each observable is worth"
+    ]
 
 
 def observable_misfits(data: Sequence[Data], predicted: Sequence[Array]) -> dict[str, Statistics]:

@@ -9,6 +9,7 @@ with all poses as unknowns.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +24,10 @@ from softnlp.optimality import OPTIMAL, misfit_slope, not_optimal
 from softnlp.quantities import Model
 from softnlp.rod import Loads
 from softnlp.status import Status
-from softnlp.studies.fit_statistics import Uncertainty, uncertainty
+from softnlp.studies.fit_statistics import Uncertainty, open_constants, uncertainty
 from softnlp.studies.forward import checked_loads
-from softnlp.studies.free_constants import FreeConstants, free_constants
-from softnlp.studies.identified import Identified
+from softnlp.studies.free_constants import FreeConstants, file_name, free_constants
+from softnlp.studies.identified import Identified, grown_errors
 from softnlp.studies.measurements import (
     COLUMNS,
     POSE_COLUMNS,
@@ -46,6 +47,7 @@ _MOVED = 1e-4  # relative; constants that move more are followed once more from 
 _TIGHT = 1e-13
 _NEARLY = 1e-2  # of a constant or its scale: a rough search that ends nearer to a bound is about to reach it
 _AT_BOUND = 1e-6  # of a constant or its scale
+_SMALL = 1e-6  # root mean square of residuals with nothing left in them [sigma]
 
 
 def identify(
@@ -172,12 +174,14 @@ class _Fit:
         self.models = models
         self.free = free
         self.material = material
+        self.keys = [file_name(name, material) for name in free.names]
         self.coefficients = coefficients
         self.progress = progress
         self.evaluations = 0
         self.measured = [d.measured for d in data]
         self.fitted = [d.measured & (d.root_weight[:, None] > 0) for d in data]
         self._last: tuple[Array, list[Prediction]] | None = None
+        self._cost = np.inf  # half the sum of squares at the end of the last search
 
     def solve(self) -> Identified:
         """Minimise from the start; then follow every pose again from zero pressure, to be sure of its branch."""
@@ -193,9 +197,22 @@ class _Fit:
         last = self.predictions(
             again, anew=bool(np.any(np.abs(again - x) > _MOVED * np.maximum(np.abs(x), self.free.scale)))
         )
-        if (lost := self._lost(last)) is not None:
+        if (lost := self._lost(last) or self._worse(again, first, last)) is not None:
             return self._unsolved(*lost, first)
         return self._found(again, first, last)
+
+    def _worse(self, x: Array, first: Sequence[Prediction], last: Sequence[Prediction]) -> tuple[Status, str] | None:
+        """Say where the end is further from the measurements than the start, which no minimum near the start is."""
+        before, after = self.residuals(first), self.residuals(last)
+        if after @ after <= before @ before + after.size * _SMALL**2:
+            return None
+        return Status.DIVERGED, (
+            f"the search ended at {self._text(x)}, further from the measurements than its start; give bounds or "
+            "another start"
+        )
+
+    def _text(self, x: Array) -> str:
+        return ", ".join(f"{key} = {value / unit:.4g}" for (key, unit), value in zip(self.keys, x, strict=True))
 
     def predictions(self, x: Array, anew: bool = False) -> list[Prediction]:
         """Return what the model says of every robot; the last result is kept."""
@@ -233,6 +250,7 @@ class _Fit:
         free = self.free
         every = np.ones(start.size, bool)
         x = self._search(start, every, 1e-7)
+        rough = self._cost
         near = _NEARLY * np.maximum(free.scale, np.abs(x))
         low, high = x - free.lower < near, free.upper - x < near
         bound = np.where(low, free.lower, np.where(high, free.upper, x))
@@ -243,7 +261,7 @@ class _Fit:
         found = self.predictions(held)
         if self._lost(found) is None:
             slope = self.jacobian(found).T @ self.residuals(found)
-            if np.all(slope[low] >= 0) and np.all(slope[high] <= 0):
+            if np.all(slope[low] >= 0) and np.all(slope[high] <= 0) and self._cost <= rough:
                 return held
         return self._search(x, every, _TIGHT)
 
@@ -269,6 +287,7 @@ class _Fit:
             gtol=_TIGHT,
             max_nfev=_MOST_EVALUATIONS,
         )
+        self._cost = float(done.cost)
         x = start.copy()
         x[moving] = done.x * scale[moving]
         return x
@@ -299,13 +318,13 @@ class _Fit:
         at_bound = tuple(name for name, h in zip(self.free.names, held, strict=True) if h)
         J, r = self.jacobian(last), self.residuals(last)
         known = uncertainty(self.free.names, J, r, held)
-        warnings = list(known.warnings)
-        for k, name in enumerate(self.free.names):
-            if held[k]:
-                warnings.append(
-                    f"{name} ended at its bound {x[k]:.4g}; it was held there for the other standard errors"
-                )
-        warnings += [*self._stretched(last), *self._impossible(x, last)]
+        units = np.array([unit for _, unit in self.keys])
+        warnings = [
+            *known.warnings,
+            *open_constants([key for key, _ in self.keys], x / units, known.standard_errors / units, held),
+            *self._stretched(last),
+            *self._impossible(x, last),
+        ]
         status, message = Status.SOLVED, "the sum of squares is at a minimum"
         if (kkt := misfit_slope(J, r, low, high)) > OPTIMAL:
             status, message = Status.NOT_OPTIMAL, not_optimal(kkt, f"{self.evaluations} evaluations")
@@ -361,7 +380,7 @@ class _Fit:
             tuple(np.where(m, p.values, np.nan) for p, m in zip(every, self.measured, strict=True))
             for every in (first, last)
         )
-        return Identified(
+        found = Identified(
             status=status,
             message=message,
             free=self.free,
@@ -376,3 +395,4 @@ class _Fit:
             evaluations=self.evaluations,
             warnings=tuple(warnings),
         )
+        return replace(found, warnings=(*found.warnings, *grown_errors(found)))

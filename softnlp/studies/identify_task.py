@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from softnlp.laws import Law
 from softnlp.materials import Material
 from softnlp.studies.measurements import Measurements
+from softnlp.studies.plausibility import Check
 
 Array = NDArray[np.float64]
 
@@ -21,6 +22,7 @@ class TensileTask:
 
     stretch, stress : (points,), [-] and engineering [Pa], of every file. file_of_point : (points,) from 0. files : as
     they were named. name, density : of the silicone. start : of a person's law, SI. before : to compare with, or None.
+    stretch_range : (2,) as asked for, or None. dropped : how many points lay outside of it. checks : of the specimen.
     """
 
     stretch: Array
@@ -32,6 +34,15 @@ class TensileTask:
     density: float
     start: Mapping[str, float] | None
     before: Material | None
+    stretch_range: tuple[float, float] | None = None
+    dropped: int = 0
+    checks: tuple[Check, ...] = ()
+
+    @property
+    def left_out(self) -> str:
+        """What is said of points that the range asked for leaves out, "" where there is none."""
+        asked = self.stretch_range
+        return "" if asked is None else f"; {self.dropped} points outside stretch = {list(asked)}"
 
     def step_count(self, pressures: int) -> int:
         """Return one: it is solved as a whole."""

@@ -11,8 +11,8 @@ import numpy as np
 from softnlp.conventions import Coefficients
 from softnlp.materials import Material
 from softnlp.plots.style import colour
-from softnlp.results.identify_document import UNITS, file_name
-from softnlp.studies.free_constants import COEFFICIENTS, free_constants
+from softnlp.results.identify_document import UNITS
+from softnlp.studies.free_constants import COEFFICIENTS, file_name, free_constants
 from softnlp.studies.identified import Identified
 from softnlp.studies.measurements import column_slice
 from softnlp.studies.tensile import TensileFit
@@ -96,8 +96,8 @@ def constant_rows(found: Identified) -> tuple[list[str], Rows]:
     for k, name in enumerate(found.free.names):
         key, scale = file_name(name, found.material)
         error = float(found.uncertainty.standard_errors[k] / scale)
-        note = "at its bound" if name in found.at_bound else "open" if error == float("inf") else ""
-        rows.append([key, float(found.free.start[k] / scale), float(found.constants[k] / scale), error, note])
+        row = [float(found.free.start[k] / scale), float(found.constants[k] / scale), error]
+        rows.append([key, *row, found.notes[name]])
     return ["constant", "start", "found", "standard error", "note"], rows
 
 
@@ -154,9 +154,11 @@ def law_rows(fit: TensileFit) -> tuple[list[str], Rows]:
     for f in fit.fits.values():
         constants = ", ".join(
             f"{c.file_key} = {f.constants[c.name] / c.scale:.5g} ± {f.standard_errors[c.name] / c.scale:.2g}"
+            + (f.notes[c.name] and f" ({f.notes[c.name]})")
             for c in f.law.constants
         )
-        rows.append([f.law.name, f.r_squared, f.misfit.rmse / 1e3, f.misfit.mape, constants, f.problem])
+        problem = f.problem and f"{f.status}: {f.problem}"
+        rows.append([f.law.name, f.r_squared, f.misfit.rmse / 1e3, f.misfit.mape, constants, problem])
     header = ["law", "R²", "rms [kPa]", "mean [%]", "constants ± standard error", "problem"]
     return (header, rows) if any(row[-1] for row in rows) else (header[:-1], [row[:-1] for row in rows])
 

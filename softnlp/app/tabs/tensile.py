@@ -97,6 +97,8 @@ class _Fit:
                 ):
                     button = ui.button(label, icon="download", on_click=act).mark(mark)
                     button.props(f"dense flat no-caps size=sm data-testid={mark}")
+            self._told = ui.label("").classes("text-sm whitespace-pre-line break-words").mark("tensile.told")
+            self._told.props("data-testid=tensile.told")
         self._box.set_visibility(False)
 
     async def _begin(self) -> None:
@@ -114,7 +116,9 @@ class _Fit:
         self._fit, self._asked = fit, asked
         best = fit.best
         usable = [law for law, found in fit.fits.items() if found.material is not None]
-        self._row.say(f"{fit.stretch.size} points; best: {best.law.name}." if best else "No law is a material.")
+        points = f"{fit.stretch.size} points{asked.task.left_out}"
+        self._row.say(f"{points}; best: {best.law.name}." if best else f"{points}; no law is a material to use.")
+        self._told.set_text("\n".join((*fit.problems, *fit.warnings)))
         self._law.set_options(usable, value=best.law.name if best else None)
         self._table.show(*law_rows(fit), "laws.csv")
         self._chart.show(law_traces(fit))

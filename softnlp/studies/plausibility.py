@@ -1,0 +1,251 @@
+"""Whether a tensile test and the laws fitted to it can be true: numbers, their ranges, and what is likely wrong.
+
+The reduced stress sigma / (stretch - stretch^-2) (Mooney 1940) of a rubber is its shear modulus at a stretch near 1 and
+falls or stays from there on; a quantity that was read for another one shows in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf, isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.units import MEGAPASCAL
+
+Array = NDArray[np.float64]
+Range = tuple[float, float]
+
+LARGEST_STRETCH: tuple[Range, Range] = (1.1, 10.0), (1.01, 10.0)
+SMALLEST_STRETCH: tuple[Range, Range] = (0.3, inf), (0.3, inf)
+STRESS_AT_1: tuple[Range, Range] = (-0.03, 0.03), (-0.3, 0.05)  # a slack specimen is common and pardoned for longer
+SHEAR_MODULUS: tuple[Range, Range] = (0.002, 2.0), (0.001, 10.0)  # [MPa]
+FIRST: tuple[Range, Range] = (0.3, 5.0), (0.15, inf)
+GROWTH: tuple[Range, Range] = (-1.5, 0.5), (-inf, inf)
+UNLOADINGS: tuple[Range, Range] = (0, 0), (0, inf)
+R_SQUARED: tuple[Range, Range] = (0.9, 1.0), (0.5, 1.0)
+AREA: tuple[Range, Range] = (1.5, 2000.0), (0.0, inf)  # [mm^2]
+
+_ERRORS = 3.0  # standard errors of a number by which its range is widened
+_FEWEST = 5  # points that a line is laid through
+_NEAR, _NEARER = 0.08, 0.1  # of extension, and of the largest: a test that begins within both tells of stretch 1
+_NOTHING = 1e-30  # [Pa], in place of a stress of 0
+_TURN, _RESTART = 0.2, 0.1  # of the range of the stretch: the least fall; how near to its end another test starts
+_READINGS = (
+    (1e6, "stress in Pa (name its column stress_Pa), or a specimen's width and thickness in m"),
+    (1e3, "stress in kPa (name its column stress_kPa), or force in mN"),
+    (145.0, "stress in psi"),
+    (1e-3, "stress in GPa, or force in kN"),
+)  # the modulus is this many times the true one
+
+_BEGINS_LATER = (
+    "the stress begins at a larger stretch than 1: looks like a slack specimen, like the distance between the grips in "
+    "displacement_mm, or like stretch in a column strain; take off what it begins at"
+)
+
+
+@dataclass(frozen=True)
+class Check:
+    """A number that has to be plausible.
+
+    Attributes
+    ----------
+    name
+        Of the number.
+    value
+        The number [1] or in `unit`.
+    usual, possible
+        (2,) lowest and highest: beyond the first it is warned of, beyond the second it fails [1] or in `unit`.
+    likely
+        What is wrong where it does.
+    unit
+        Of the number, "" for 1.
+    """
+
+    name: str
+    value: float
+    usual: Range
+    possible: Range
+    likely: str
+    unit: str = ""
+
+    @property
+    def verdict(self) -> str:
+        """Of "passed", "warned" and "failed"; no number fails."""
+        for verdict, (low, high) in (("passed", self.usual), ("warned", self.possible)):
+            if low <= self.value <= high:
+                return verdict
+        return "failed"
+
+    @property
+    def message(self) -> str:
+        """What is wrong in one sentence, "" where nothing is."""
+        if self.verdict == "passed":
+            return ""
+        low, high = self.possible if self.verdict == "failed" else self.usual
+        between = f"{low:.4g} to {high:.4g}" if low < high < inf else f"{low:.4g}"
+        expected = between if isfinite(low) and isfinite(high) else f"at least {low:.4g}"
+        unit = self.unit and f" {self.unit}"
+        return f"the {self.name} is {self.value:.4g}{unit}, expected {expected}{unit}: {self.likely}"
+
+
+def messages(checks: tuple[Check, ...], verdict: str) -> tuple[str, ...]:
+    """Return what the checks of one verdict say."""
+    return tuple(check.message for check in checks if check.verdict == verdict)
+
+
+def curve_checks(stretch: Array, stress: Array) -> tuple[Check, ...]:
+    """Return the checks of a tensile test (points,) [1], [Pa]; those that need an earlier one end at its failure."""
+    reach = float(np.max(stretch))
+    checks = [
+        Check("largest stretch", reach, *LARGEST_STRETCH, _largest(stretch)),
+        Check(
+            "smallest stretch",
+            float(np.min(stretch)),
+            *SMALLEST_STRETCH,
+            "looks like strain; name its column strain, or strain_percent where it is in percent",
+        ),
+        Check(
+            "number of unloadings",
+            _unloadings(stretch),
+            *UNLOADINGS,
+            "looks like several load cycles, whose loading and unloading differ; keep one loading of each specimen",
+        ),
+    ]
+    for more in (_beginning, _shear_modulus, _growth):
+        if messages(tuple(checks), "failed"):
+            break
+        with np.errstate(all="ignore"):  # a number that cannot be represented fails
+            checks += more(stretch, stress)
+    return tuple(checks)
+
+
+def law_checks(modulus: float, r_squared: float, stretch: Array, stress: Array) -> tuple[Check, ...]:
+    """Return the checks of a law: E_t at stretch 1 [Pa], nan where there is none, and R^2 of the test fitted to."""
+    likely = "the law does not follow the data; cut their range, such as with stretch = [1, 2], or take another law"
+    found = [Check("R^2", r_squared, *R_SQUARED, likely)]
+    if isfinite(modulus):
+        size = modulus / 3 / MEGAPASCAL
+        likely = "the data near stretch 1 do not hold the law there; leave it out, or add points"
+        if messages(tuple(_shear_modulus(stretch, stress)), "passed") != ("",):
+            likely = _unit_of(size)
+        found.append(Check("shear modulus at stretch 1", size, *(SHEAR_MODULUS[1],) * 2, likely, "MPa"))
+    return tuple(found)
+
+
+def area_check(area: float) -> Check:
+    """Return the check of a specimen's cross-section [mm^2]."""
+    return Check("cross-section", area, *AREA, "looks like a size that was left at 1 or is not in mm", "mm^2")
+
+
+def _largest(stretch: Array) -> str:
+    """Return what a largest stretch out of range looks like."""
+    if np.max(stretch) < 2:
+        return "looks like displacement_mm in m or cm, or strain in a column strain_percent"
+    if np.min(stretch) > LARGEST_STRETCH[1][1]:
+        return "looks like stretch in percent, or a length in mm; divide by 100, or by the length before the test"
+    return (
+        "looks like strain in percent (name its column strain_percent) or, with displacement_mm, a gauge_length_mm in "
+        "m or cm; where it was so large cut it with stretch = [1, 2]"
+    )
+
+
+def _reduced(stretch: Array) -> Array:
+    """Return stretch - stretch^-2, the neo-Hookean stress of a shear modulus of 1."""
+    reduced: Array = stretch - stretch**-2
+    return reduced
+
+
+def _from_1(stretch: Array) -> bool:
+    """Whether a test begins so near to 1 that its first points tell of there."""
+    return bool(np.min(stretch) - 1 <= min(_NEAR, _NEARER * (np.max(stretch) - 1)))
+
+
+def _line(A: Array, y: Array) -> tuple[Array, Array]:
+    """Return the least-squares coefficients of the columns of A and their standard errors."""
+    found = np.linalg.lstsq(A, y, rcond=None)[0]
+    r = y - A @ found
+    covariance = np.linalg.pinv(A.T @ A) * float(r @ r) / (len(y) - A.shape[1])
+    errors: Array = np.sqrt(np.abs(np.diag(covariance)))
+    return np.asarray(found, float), errors
+
+
+def _beginning(stretch: Array, stress: Array) -> list[Check]:
+    """Return the check of the stress at stretch 1, as a part of the largest, by the points next to it.
+
+    Where a test begins further from 1, it is the check of the reduced stress there, which is then not near 0.
+    """
+    away = np.abs(stretch - 1)
+    if away.size < _FEWEST:
+        return []
+    if not _from_1(stretch):
+        first = np.argsort(stretch, kind="stable")[: max(_FEWEST, stretch.size // 10)]
+        later = stretch[first] - stretch[first[0]]
+        begins = _line(np.column_stack([np.ones(later.size), later]), stress[first])[0][0]
+        reduced = _reduced(stretch)
+        size = float(np.median(stress / reduced) * reduced[first[0]]) or _NOTHING
+        noise = np.sqrt(np.mean(np.diff(stress[np.argsort(stretch, kind="stable")], 2) ** 2) / 6)
+        usual, (low, high) = FIRST
+        possible = low - 2 * float(noise) / abs(size), high
+        name = "reduced stress at the smallest stretch, relative to its median,"
+        return [Check(name, float(begins / size), usual, possible, _BEGINS_LATER)]
+    near = away <= max(0.5 * np.max(away), np.partition(away, _FEWEST - 1)[_FEWEST - 1])
+    reduced = _reduced(stretch[near])
+    (offset, slope), (error, _) = _line(np.column_stack([np.ones(reduced.size), reduced]), stress[near])
+    size = float(np.max(np.abs(stress)))
+    more = _ERRORS * error / size
+    usual, possible = ((low - more, high + more) for low, high in STRESS_AT_1)
+    likely = "looks like a preload that was not tared; take its stress or force off every row"
+    if np.min(stretch) < 0.9 and np.all(stress[stretch < 0.9] >= 0):
+        likely = "looks like strain; name its column strain, or strain_percent where it is in percent"
+    elif offset < 0 and slope > 0:
+        likely = _BEGINS_LATER
+    return [Check("stress at stretch 1, relative to the largest,", offset / size, usual, possible, likely)]
+
+
+def _shear_modulus(stretch: Array, stress: Array) -> list[Check]:
+    """Return the check of the modulus that fits all points."""
+    reduced = _reduced(stretch)
+    size = float(reduced @ stress / (reduced @ reduced)) / MEGAPASCAL
+    return [Check("shear modulus of the data", size, *SHEAR_MODULUS, _unit_of(size), "MPa")]
+
+
+def _unit_of(modulus: float) -> str:
+    """Return what a modulus [MPa] out of range looks like: the readings that would make it a usual one."""
+    if modulus <= 0:
+        return "looks like a force or stress with its sign turned, or no tensile test"
+    low, high = SHEAR_MODULUS[0]
+    likely = [what for factor, what in _READINGS if low <= modulus / factor <= high]
+    return f"looks like {'; or '.join(likely)}" if likely else "check the units of stress, force, lengths and specimen"
+
+
+def _growth(stretch: Array, stress: Array) -> list[Check]:
+    """Return the check of how the reduced stress grows with the stretch up to 2; true stress makes it grow as that."""
+    low = (stretch > 0.8) & (stretch <= 2)
+    if np.sum(low) < _FEWEST or np.max(stretch) < 1.05 or not _from_1(stretch):
+        return []
+    reduced = _reduced(stretch[low])
+    A = np.column_stack([np.ones(reduced.size), reduced, reduced * (stretch[low] - 1)])
+    (_, first, growth), (_, _, error) = _line(A, stress[low])
+    value, more = (growth / first, _ERRORS * error / first) if first > 0 else (inf, 0.0)
+    likely = 'looks like true stress; write stress = "true" where it is'
+    if value < 0:
+        likely = "looks like a stretch too near to 1, of displacement_mm in cm or strain in a column strain_percent"
+    usual = GROWTH[0][0] - more, GROWTH[0][1] + more
+    return [Check("growth of the reduced stress with the stretch", value, usual, GROWTH[1], likely)]
+
+
+def _unloadings(stretch: Array) -> int:
+    """Return how often the stretch falls point by point; a jump back to the start is another test."""
+    span, lowest = float(np.ptp(stretch)), float(np.min(stretch))
+    count, falling, turn = 0, False, 0
+    for k, now in enumerate(stretch):
+        change = now - stretch[turn]
+        if change * (-1 if falling else 1) >= 0:
+            turn = k
+        elif abs(change) > _TURN * span:
+            restart = k == turn + 1 and now <= lowest + _RESTART * span
+            falling, count = not falling and not restart, count + (not falling and not restart)
+            turn = k
+    return count
