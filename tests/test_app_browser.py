@@ -239,7 +239,10 @@ def test_a_server_that_was_started_again_is_found_again(
         address, _ = first.enter_context(served())
         opened: Watched = opener(address)
         opened.press("tab-blocked")
+        force = "[data-testid='value-blocked_force_N']"
+        before = opened.page.locator(force).text_content()
         opened.type("pressure-number-1", "0.41")
+        opened.page.wait_for_function(f"document.querySelector({force!r}).textContent !== {before!r}")
         opened.type("robot-length_mm", "-60")  # which the picture does not follow
         opened.page.wait_for_selector("[data-testid=message]:has-text('Not used')")
         opened.settled()

@@ -85,6 +85,9 @@ def build_page(session: Session) -> None:
             results.details()
 
     def say(words: str) -> None:
+        """Show a line below the view; while something makes no sense, that is said where there is nothing else."""
+        if not words and session.problem is not None and not awaits_data(session):
+            words = f"{_NOT_USED} {session.problem}"
         message.set_text(words)
         message.set_visibility(bool(words))
 
@@ -93,15 +96,14 @@ def build_page(session: Session) -> None:
         mesh_menu(session, lambda: None if results.run is None else results.run.steps[0].pose)
 
     def read_again() -> None:
-        if session.problem is not None and not awaits_data(session):
-            say(f"{_NOT_USED} {session.problem}")
-        elif message.text.startswith(_NOT_USED):
+        if session.problem is not None or message.text.startswith(_NOT_USED):
             say("")
         opened = _TAB_OF.get(session.document.study, SCENARIO)
         if tabs.value != opened and tabs.value != SCENARIO:
             tabs.set_value(opened)
 
     session.on_scenario(read_again)
+    say("")
     live.request()
 
 
