@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.continuation import Path, around_folds, follow, straight_path
+from softnlp.continuation import Followed, Path, around_folds, follow, straight_path
 from softnlp.rod import STATE_SIZE
 from softnlp.solver import Solution
 from softnlp.studies.pose_grid import Grid, pose_distance, pose_weight
+from softnlp.turning import change, moved
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Any]
@@ -125,9 +126,8 @@ def _from_near(grid: Grid, near: Neighbour, p: Array, work: Work) -> Attempt:
     def path(t: float) -> Array:
         return p if t >= 1.0 else near.p + t * (p - near.p)
 
-    followed = follow(
-        grid.stepper, path, near.x, distance=pose_distance, most_iterations=work.iterations_left(grid), first_step=0.5
-    )
+    most = work.iterations_left(grid) // 3  # the other attempts shall have their turn
+    followed = _follow(grid, path, near.x, most, first_step=0.5)
     spent = followed.iterations
     if not followed.arrived:
         return Attempt(replace(followed.solution, iterations=spent), followed.fraction)
@@ -150,7 +150,7 @@ def _along(goal: Goal, waypoints: list[Values], work: Work) -> Iterator[Attempt]
     for k in range(legs):
         path = straight_path(problem, waypoints[k], waypoints[k + 1])
         left = work.iterations_left(grid) - spent
-        followed = follow(grid.stepper, path, x, distance=pose_distance, most_iterations=left)
+        followed = _follow(grid, path, x, left)
         spent += followed.iterations
         x = followed.solution.x
         if not followed.arrived:
@@ -160,6 +160,20 @@ def _along(goal: Goal, waypoints: list[Values], work: Work) -> Iterator[Attempt]
             return
     final = grid.engine.solve(p_end, x)
     yield Attempt(replace(final, iterations=spent + final.iterations), on_path=True)
+
+
+def _follow(grid: Grid, path: Path, start: Array, most: int, first_step: float = 0.125) -> Followed:
+    """Follow a solution along a path within a number of iterations."""
+    return follow(
+        grid.stepper,
+        path,
+        start,
+        distance=pose_distance,
+        most_iterations=most,
+        first_step=first_step,
+        moved=moved,
+        change=change,
+    )
 
 
 def _snapped(grid: Grid, path: Path, start: Solution, fraction: float, work: Work) -> Iterator[Attempt]:

@@ -33,6 +33,7 @@ from softnlp.studies.pose import (
 from softnlp.studies.pose_grid import Grid, Solved, next_size
 from softnlp.studies.step import Step
 from softnlp.transcription import MultipleShooting, method_named
+from softnlp.turning import carried, moved
 
 Array = NDArray[np.float64]
 
@@ -87,8 +88,8 @@ class PoseSolver:
                 linear, cost = SparseSolver(problem), _COLLOCATION_COST
             self._grids[intervals] = Grid(
                 case=case,
-                engine=Engine(problem, linear=linear, newton_only=True),
-                stepper=Engine(problem, linear=linear, newton_only=True, tolerance=1e-7),
+                engine=Engine(problem, linear=linear, newton_only=True, moved=moved),
+                stepper=Engine(problem, linear=linear, newton_only=True, tolerance=1e-7, moved=moved),
                 reference=Engine(problem),
                 transition=self._transition.map(intervals),
                 iteration_cost=_OVERHEAD + cost * intervals,
@@ -264,8 +265,8 @@ class PoseSolver:
             states = between_nodes(self.shape, solved.nodes, solved.constants, s)[:STATE_SIZE].T.ravel()
         x_old, p_old = solved.solution.x, solved.solution.p
         x = np.concatenate([[x_old[0]], states])
-        moves = self.arc_guess(grid, p, stretch) - self.arc_guess(grid, p_old, x_old[0])
-        return Neighbour(x=x, p=p_old, moved=x + moves, stable=solved.stable)
+        arcs = self.arc_guess(grid, p_old, x_old[0]), self.arc_guess(grid, p, stretch)
+        return Neighbour(x=x, p=p_old, moved=carried(x, *arcs), stable=solved.stable)
 
     def _examine(self, grid: Grid, solution: Solution) -> Solved:
         """Estimate the discretisation error of a solution and test its stability.
