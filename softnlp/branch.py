@@ -88,7 +88,8 @@ def stretch_on_branch(function: ca.Function, column: Array, pressures: Array) ->
         return t, np.vstack([own + np.minimum(t, 1.0) * (rows[_PRESSURISED] - own), own])
 
     def is_lost(stretch: Array) -> NDArray[np.bool_]:
-        return ~np.all(sample(stretch)[1] > 0, axis=0)
+        lost: NDArray[np.bool_] = ~np.all(sample(stretch)[1] > 0, axis=0)
+        return lost
 
     grid = np.linspace(1.0, _LARGEST_STRETCH, _GRID)
     for size in (_FIRST_PART, _GRID):  # most branches arrive early

@@ -53,7 +53,8 @@ def follow(
 
     The step is halved when a solve fails or lands further than `largest_jump` (scaled) from its prediction, which is
     how another branch shows, and grows again after success. The predictor is the secant, moved(x, part of the last
-    change), or predict(x, p) of a solution x and the values p of the next one; same_way(predicted change, change) may refuse a step that went another way.
+    change), or predict(x, p) of a solution x and the values p of the next one; same_way(predicted change, change) may
+    refuse a step that went another way.
     `distance` measures a change of x. A solve counts when it meets ten times the engine's own tolerance, so an engine
     for a path may be a loose one. `most_iterations` bounds what is spent.
     `same_branch(t, solution)` may refuse a solution that the distance does not tell from the branch.

@@ -79,7 +79,8 @@ def _transposed(R: Array) -> Array:
 
 
 def _times(R: Array, v: Array) -> Array:
-    return np.einsum("kij,kj->ki", R, v)
+    product: Array = np.einsum("kij,kj->ki", R, v)
+    return product
 
 
 def _skew(A: Array) -> Array:
@@ -90,4 +91,5 @@ def _skew(A: Array) -> Array:
 def _exp(W: Array) -> Array:
     """Return the rotations of skew matrices, by Rodrigues' formula."""
     turns = np.sqrt(np.sum(W**2, axis=(1, 2)) / 2)[:, None, None] / np.pi
-    return np.eye(3) + np.sinc(turns) * W + np.sinc(turns / 2) ** 2 / 2 * (W @ W)
+    rotations: Array = np.eye(3) + np.sinc(turns) * W + np.sinc(turns / 2) ** 2 / 2 * (W @ W)
+    return rotations

@@ -98,15 +98,24 @@ class Attempt:
     on_path: bool = False
 
 
+def from_near(goal: Goal, work: Work) -> Iterator[Attempt]:
+    """Make the attempts from the neighbour that cost the least: Newton's method, where there is one."""
+    grid, near = goal.grid, goal.near
+    if near is None:
+        return
+    p = grid.problem.pack(goal.values)
+    yield Attempt(grid.engine.solve(p, near.moved))
+    if goal.is_loaded and np.any(near.p != p):
+        yield Attempt(grid.engine.solve(p, near.x))
+
+
 def attempts(goal: Goal, work: Work) -> Iterator[Attempt]:
     """Make one attempt after another; whoever asks for them takes their iterations off `work`."""
     grid, values, near = goal.grid, goal.values, goal.near
     p = grid.problem.pack(values)
-    if near is not None:
-        yield Attempt(grid.engine.solve(p, near.moved))
-        if goal.is_loaded and np.any(near.p != p):
-            yield Attempt(grid.engine.solve(p, near.x))
-            yield _from_near(grid, near, p, work)
+    yield from from_near(goal, work)
+    if near is not None and goal.is_loaded and np.any(near.p != p):
+        yield _along_from_near(grid, near, p, work)
     arc = goal.arc(values)
     yield Attempt(grid.engine.solve(p, arc))
     if not goal.is_loaded:
@@ -120,7 +129,7 @@ def attempts(goal: Goal, work: Work) -> Iterator[Attempt]:
         yield Attempt(grid.reference.solve(p, arc if near is None else near.moved))
 
 
-def _from_near(grid: Grid, near: Neighbour, p: Array, work: Work) -> Attempt:
+def _along_from_near(grid: Grid, near: Neighbour, p: Array, work: Work) -> Attempt:
     """Follow the neighbour's solution along the straight line between its values and these."""
 
     def path(t: float) -> Array:

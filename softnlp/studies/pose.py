@@ -21,6 +21,7 @@ SHAPE_POINTS = 61
 _SUBSTEPS = 4
 _LENGTH = len(RodSection._fields)  # where the constants of a load case hold the length of the stretched rod
 _SAMPLES, _ZOOMS, _GRADES, _GAUSS = 6, 12, 16, 4  # of the bending angle's quadrature
+_MOST_PARTS = 225
 
 
 def shape_function(field: ca.Function) -> ca.Function:
@@ -45,10 +46,10 @@ def bending_angle(function: ca.Function, nodes: Array, constants: Array) -> floa
     """Return the integral of sqrt(u_x^2 + u_y^2) over s [rad], to 1e-7 also where the curvature vanishes on the way.
 
     function : of `shape_function`. The curvature is smooth, its norm has a kink where it crosses zero, or nearly so. In
-    every interval the curvature is the polynomial through `_SAMPLES` points, and the quadrature of its norm is graded
-    towards the point where that is smallest.
+    every interval, or part of the rod where those are many, the curvature is the polynomial through `_SAMPLES` points,
+    and the quadrature of its norm is graded towards the point where that is smallest.
     """
-    K = nodes.shape[1] - 1
+    K = min(nodes.shape[1] - 1, _MOST_PARTS)
     length = float(constants[_LENGTH])  # in L_0
     ends = (1 - np.cos(np.pi * np.arange(_SAMPLES) / (_SAMPLES - 1))) / 2  # Chebyshev points, 0 and 1 among them
     s = ((np.arange(K)[:, None] + ends[:-1]) / K).ravel()
