@@ -166,7 +166,8 @@ def _summary_rows(found: Workspace, s: Summary) -> Iterator[tuple[str, str]]:
     mm, deg = MILLIMETRE, DEGREE
     yield "workspace", f"{found.title}: {found.robot.name}, {found.material}"
     yield "poses", f"{s.poses:,}"
-    yield "solved", f"{s.solved:,}" + (f" ({s.unstable:,} unstable)" if s.unstable else "")
+    unsure = [f"{n:,} {what}" for n, what in ((s.unstable, "unstable"), (s.undefined, "of undefined stability")) if n]
+    yield "solved", f"{s.solved:,}" + (f" ({', '.join(unsure)})" if unsure else "")
     yield "failed", ", ".join(f"{n:,} {status}" for status, n in s.failed.items()) or "0"
     if s.dexterity is None:
         return

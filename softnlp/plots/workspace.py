@@ -11,6 +11,7 @@ from softnlp.plots.body import disc
 from softnlp.plots.cloud import VIEWS, Outline, mark_size, outline, seen, shown
 from softnlp.plots.space import space_axes
 from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, new_figure, plain
+from softnlp.studies.step import STABLE_FLAGS
 from softnlp.units import MILLIMETRE
 from softnlp.workspace.read import Column, Workspace, read_column
 from softnlp.workspace.summary import parameters
@@ -53,8 +54,9 @@ def workspace_figure(workspace: Workspace, colour: str = COLOUR) -> Figure:
         workspace.material,
         f"{workspace.poses - failed:,} of {workspace.poses:,} poses solved",
     ]
-    if unstable := int(np.count_nonzero(workspace.stable == 0)):
-        parts.append(f"{unstable:,} unstable")
+    for what, words in (("unstable", "unstable"), ("undefined", "of undefined stability")):
+        if count := int(np.count_nonzero(workspace.stable[workspace.solved] == STABLE_FLAGS[what])):
+            parts.append(f"{count:,} {words}")
     figure = new_figure(_WIDTH, _HEIGHT, workspace.title, "  ·  ".join(parts))
     if not len(tips):
         figure.text(0.5, 0.5, "No pose has a solution with this number", size=TEXT, color=WRONG, ha="center")

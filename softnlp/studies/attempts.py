@@ -25,7 +25,7 @@ Values = Mapping[str, Any]
 LOADS = ("tip_force", "tip_moment", "gravity")
 _PRESSURE_PARTS = (0.0, 0.5, 0.25, 0.75)
 _ROUNDING = 1e-12  # of the length or of a load
-_LARGEST_REFERENCE = 8000  # unknowns up to which IPOPT is tried: MUMPS has taken minutes over more
+_REFERENCE = 150  # what a try of IPOPT costs, in iterations of Newton's method
 
 
 class Work:
@@ -125,7 +125,8 @@ def attempts(goal: Goal, work: Work) -> Iterator[Attempt]:
     for part in () if goal.is_a_column else _PRESSURE_PARTS:  # every path keeps a column straight
         partly = {**values, "pressure": part * values["pressure"]}
         yield from _along(goal, [{**partly, **no_loads}, partly, values], work)
-    if arc.size <= _LARGEST_REFERENCE:
+    if work.iterations_left(grid) >= _REFERENCE:
+        work.spend(grid, _REFERENCE)
         yield Attempt(grid.reference.solve(p, arc if near is None else near.moved))
 
 

@@ -211,6 +211,6 @@ def unmet(found: Evaluation, task: DesignTask) -> list[str]:
         return [f"{found.status.value}: {found.message}"]
     reasons = [words for words, _ in missed(found.outputs, task.requirements)]
     free = found.step and (found.step.contact.free if found.step.contact else found.step.pose)
-    if free and not free.stable:
+    if free and free.stable is False:
         reasons.append("the free shape is not stable: it buckles under its load")
     return reasons

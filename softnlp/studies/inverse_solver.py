@@ -266,7 +266,7 @@ class InverseSolver:
         """Return a stable pose as an answer, else the step that says why there is none."""
         if step.pose is None or solved is None:
             return step
-        if not step.pose.stable:
+        if step.pose.stable is False:
             message = "the target is met by an equilibrium that is not stable only: the real robot buckles away from it"
             return Step(pressure, Status.OUT_OF_REACH, message, residual=step.residual)
         aimed = aim.aimed(step.pose)

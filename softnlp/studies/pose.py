@@ -10,7 +10,7 @@ from softnlp import rod
 from softnlp.loadcase import unpack_section
 from softnlp.quantities import Model
 from softnlp.robot import touching_stretch
-from softnlp.rod import RodSection
+from softnlp.rod import Loads, RodSection
 from softnlp.section import deform
 from softnlp.studies.step import Pose, SectionRadii, Shape
 from softnlp.transcription import RK4, rk_step
@@ -111,8 +111,13 @@ def section_radii(model: Model, stretch: float) -> SectionRadii:
     )
 
 
+def stability(loads: Loads, is_minimum: bool | None) -> bool | None:
+    """Return whether a pose is stable, undefined (None) under a dead tip moment: in space that has no potential."""
+    return None if np.any(loads.tip_moment) else is_minimum
+
+
 def pose_of(
-    model: Model, outputs: dict[str, Array], shape: Shape, bending: float, unloaded_tip: Array, stable: bool
+    model: Model, outputs: dict[str, Array], shape: Shape, bending: float, unloaded_tip: Array, stable: bool | None
 ) -> Pose:
     """Assemble a pose. outputs : of the load case, SI. unloaded_tip : tip at this pressure without loads [m].
 
@@ -150,6 +155,10 @@ def pose_warnings(model: Model, pose: Pose) -> tuple[str, ...]:
         found.append(f"stretch {pose.stretch:.3f} is above {limit:.3f}, where neighbouring reinforced chambers touch")
     if np.min(pose.shape.shear_extension[:, 2]) <= 0:
         found.append("the load compresses the rod to nothing somewhere (v_z <= 0); the model does not hold there")
-    if not pose.stable:
+    if pose.stable is None:
+        found.append(
+            "stability is undefined: a dead tip moment in space has no potential, so there is no energy to be least"
+        )
+    elif not pose.stable:
         found.append("this equilibrium is not stable: the real robot buckles away from it")
     return tuple(found)

@@ -15,6 +15,8 @@ from softnlp.solver import Engine, Solution
 
 Array = NDArray[np.float64]
 
+_ROUGH = 1e-2  # error of a grid whose word on stability does not count
+
 
 @dataclass(frozen=True, eq=False)
 class Grid:
@@ -75,6 +77,11 @@ class Solved:
     def intervals(self) -> int:
         """The number of intervals."""
         return self.grid.intervals
+
+    @property
+    def is_rough(self) -> bool:
+        """Whether the pose is not stable on its grid, which is so coarse that it may be on another."""
+        return not self.stable and self.refinement_error > _ROUGH
 
     @property
     def refinement_error(self) -> float:

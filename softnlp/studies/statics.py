@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from softnlp.branch import BranchPoint, branch_function, stretch_on_branch
 from softnlp.condensed import CondensedSolver
-from softnlp.loadcase import load_case, rod_functions
+from softnlp.loadcase import load_case, rod_functions, unpack_section
 from softnlp.numerics import Numerics
 from softnlp.problem import compile_problem
 from softnlp.quantities import Model, quantities
@@ -30,6 +30,7 @@ from softnlp.studies.pose import (
     pose_warnings,
     shape_function,
     shape_of,
+    stability,
 )
 from softnlp.studies.pose_grid import Grid, Solved, next_size
 from softnlp.studies.step import Step
@@ -45,8 +46,8 @@ _TURN = 0.25  # largest angle [rad] of the unloaded arc within one RK4 interval 
 _SEARCHED_BY = "multiple-shooting"
 _DEARER = 3  # an iteration on a neighbour's grid than on a coarse one, where the neighbour's is still tried first
 _FINER = 4  # how much finer a grid is tried where a coarse one finds no solution
-_MOST_WORK = 12_000  # Runge-Kutta intervals of Newton iterations that one pose may cost beside its first answer
-_OVERHEAD, _COLLOCATION_COST = 30, 20  # time of an iteration: beside its intervals, and of a collocation interval
+_MOST_WORK = 8_000  # Runge-Kutta intervals of Newton iterations to find one pose, which is some 0.6 seconds
+_OVERHEAD, _COLLOCATION_COST = 15, 15  # time of an iteration: beside its intervals, and of a collocation interval
 # Without loads the exact answer is a circular arc; a solution is good enough to show it.
 UNLOADED_ACCURACY = 5e-9
 
@@ -170,15 +171,15 @@ class PoseSolver:
             grid = self.grid(max(near.intervals, first))
             if grid.iteration_cost <= _DEARER * coarse.iteration_cost:
                 found, spent, _ = self._solve_on(grid, values, branch, near, work, from_near)
-                if found is not None:
+                if found is not None and found.stable:
                     return found, spent, ""
         finest = min(_FINER * size, self.most_intervals)
         while True:
             found, more, how_far = self._solve_on(self.grid(size, name), values, branch, near, work)
             spent += more
-            if found is not None or given is not None or size >= finest or work.used_up:
+            if (found and not found.is_rough) or given is not None or size >= finest or work.used_up:
                 return found, spent, how_far
-            size, near = min(_FINER * size, self.most_intervals), None
+            size, near = min(_FINER * size, self.most_intervals), found
 
     def first_intervals(
         self, column: Array, stretch: float, arc_target: float | None = None, transcription: str | None = None
@@ -192,11 +193,20 @@ class PoseSolver:
         first = FIRST_INTERVALS[name]
         straight = np.asarray(self.functions.arc(column, stretch, 0.01)).ravel()
         curl = 100 * float(np.hypot(straight[9], straight[10]))  # of the axis, R e3, over the first hundredth
+        curl = max(curl, self._turn_of_moment(column, stretch))
         turn = _TURN * FIRST_INTERVALS["multiple-shooting"] / first
         wanted = max(first, curl / turn)
         if arc_target is not None and name == "multiple-shooting":
             wanted = max(wanted, curl * (0.6 * curl / (120 * arc_target)) ** 0.25)
         return min(next_size(wanted), self.most_intervals)
+
+    def _turn_of_moment(self, column: Array, stretch: float) -> float:
+        """Return how far the dead tip moment alone would bend or twist the rod [rad]."""
+        constants, _, units = (np.asarray(part).ravel() for part in self.functions.section(column, stretch))
+        after = self.model.robot.chamber_sets + 3  # the pressures and the tip force
+        section, scaled = unpack_section(constants), column[after : after + 3] / np.prod(units)
+        length = constants[len(section)]
+        return float(np.linalg.norm(scaled) * length / min(section.bending_x, section.bending_y, section.torsion))
 
     def target_accuracy(self, loads: Loads) -> float:
         """Return the estimate to aim for: a third of the accuracy, since estimates are good to a factor of 3."""
@@ -225,11 +235,12 @@ class PoseSolver:
         """Make the attempts in turn; the first stable solution wins, an unstable one is kept if there is no other.
 
         Of several unstable ones that is the first along a load path, which is where the robot buckles or snaps from;
-        what a guess led to comes after. near : a neighbour, or this pose on another grid, whose like is the answer.
-        Returns the solution, the iterations spent and what to say where there is none.
+        what a guess led to comes after. One on too coarse a grid to be judged is for a finer one to judge.
+        near : a neighbour, or this pose on another grid, whose like is the answer. Returns the solution, the iterations
+        spent and what to say where there is none.
         """
         p = grid.problem.pack(values)
-        refining = near is not None and np.array_equal(near.solution.p, p)
+        refining = near is not None and not near.is_rough and np.array_equal(near.solution.p, p)
 
         def arc(at: Mapping[str, Any]) -> Array:
             return self.arc_guess(grid, grid.problem.pack(at), self._stretch(at))
@@ -249,7 +260,7 @@ class PoseSolver:
                 except np.linalg.LinAlgError as error:
                     note = f"; a solution found on {grid.intervals} intervals cannot be judged: {error}"
                     continue
-                if solved.stable or refining:
+                if solved.stable or refining or (solved.is_rough and self.numerics.intervals is None):
                     return solved, spent, ""
                 if kept is None or (attempt.on_path and not kept_from_path):
                     kept, kept_from_path = solved, attempt.on_path
@@ -323,7 +334,7 @@ class PoseSolver:
         shape = shape_of(between_nodes(self.shape, solved.nodes, solved.constants, s), s, L_0, F_0)
         unloaded_tip = np.asarray(self.functions.arc(solution.p, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
         bending = bending_angle(self.shape, solved.nodes, solved.constants)
-        pose = pose_of(self.model, result, shape, bending, unloaded_tip, solved.stable)
+        pose = pose_of(self.model, result, shape, bending, unloaded_tip, stability(loads, solved.stable))
         warnings = list(pose_warnings(self.model, pose))
         if solved.error > self.numerics.accuracy:
             warnings.append(

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.robot import DIMENSIONS
+from softnlp.studies.step import STABLE_FLAGS, STABLE_MEANING
 from softnlp.units import BAR, DEGREE, MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.workspace.plan import Plan
 from softnlp.workspace.poses import STATUSES, Lane, Rows
@@ -19,7 +20,6 @@ Array = NDArray[Any]
 
 TEXT = "text"
 _STATUS_NAMES = np.array([status.value for status in STATUSES], dtype=object)
-_STABLE_FLAGS = {"not_solved": -1, "unstable": 0, "stable": 1}
 _DECIMALS = 12
 
 
@@ -91,7 +91,7 @@ _WALL = (
     _number("gap_mm", "mm", "from the wall to the free shape's contact point; negative beyond it", "gap", MILLIMETRE),
 )
 _SOLVE = (
-    _whole("stable", "stable", "i1", "no conjugate point on the rod", **_flags(_STABLE_FLAGS)),
+    _whole("stable", "stable", "i1", STABLE_MEANING, **_flags(STABLE_FLAGS)),
     _number("residual", "1", "largest equation error: force by EI/L^2, moment by EI/L, length by L", "residual"),
     _number("discretisation_error", "1", "estimated error of the tip position, of the robot's length L_0", "error"),
     _whole("intervals", "intervals", "i4", "intervals on the rod, 0 where there is no grid"),

@@ -202,6 +202,8 @@ def lines(swept: Swept) -> list[Line]:
         return found
     if summary.unstable:
         found.append(Line("Not stable", str(summary.unstable), ""))
+    if summary.undefined:
+        found.append(Line("Stability undefined", str(summary.undefined), ""))
     reach, boundary, hull = summary.reach, summary.boundary, summary.hull
     found += [
         Line("Distance from the axis", _range(reach.nearest_to_axis, reach.farthest_from_axis), "mm"),
