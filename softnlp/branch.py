@@ -16,17 +16,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.quantities import Model, section_function
-from softnlp.section import deform, stretch_balance
+from softnlp.section import STIFFNESSES, deform, stiffnesses, stretch_balance
 from softnlp.status import Status
 from softnlp.units import BAR
 
 Array = NDArray[np.float64]
+
+SILICONE = slice(2, 2 + len(STIFFNESSES))
+"""Rows of `branch_function` that the silicone gives alone; pressure adds to them and cannot make up for their sign."""
+_PRESSURISED = slice(SILICONE.stop, SILICONE.stop + len(STIFFNESSES))
 
 _LARGEST_STRETCH = 10.0
 _GRID = 1500
 _FIRST_PART = 150  # of the grid, up to a stretch of 1.9
 _SECANTS, _ROUNDING = 300, 1e-15
 _STUCK, _AT_ROOT = 4, 1e-6  # times that one end moves before the other is halved; excess of what may be a root
+_A_HAIR = 1e-9
 _ZOOMS, _ZOOM_GRID = 10, 42  # an interval of the first grid is cut 41-fold ten times, which is past round-off
 
 
@@ -47,18 +52,16 @@ class BranchPoint:
 def branch_function(model: Model) -> ca.Function:
     """Return (quantities, stretch) -> rows that `stretch_on_branch` needs, for symbols in place of the model's numbers.
 
-    Rows: A_0 sigma_e; what balances it at full pressure; E_t, EA, EI_x, EI_y without pressure, then at full pressure.
+    Rows: A_0 sigma_e; what balances it at full pressure; the `STIFFNESSES` without pressure, then at full pressure.
     """
 
-    def stiffnesses(m: Model, pressures: Any, stretch: Any) -> tuple[Any, list[Any]]:
+    def at(m: Model, pressures: Any, stretch: Any) -> tuple[Any, list[Any]]:
         section = deform(m.robot, m.material, pressures, stretch, m.coefficients, m.conventions)
-        moduli = [section.tangent_modulus, section.axial_stiffness, *section.bending_stiffness]
-        return stretch_balance(section, m.coefficients, m.conventions), moduli
+        return stretch_balance(section, m.coefficients, m.conventions), stiffnesses(section)
 
     def build(m: Model, pressures: Any, gravity: Any, stretch: Any) -> Sequence[Any]:
-        zero = [0.0] * m.robot.chamber_sets
-        resistance, at_rest = stiffnesses(m, zero, stretch)
-        imbalance, at_pressure = stiffnesses(m, pressures, stretch)
+        resistance, at_rest = at(m, [0.0] * m.robot.chamber_sets, stretch)
+        imbalance, at_pressure = at(m, pressures, stretch)
         return [ca.vertcat(resistance, resistance - imbalance, *at_rest, *at_pressure)]
 
     return section_function(model, build)
@@ -69,24 +72,31 @@ def stretch_on_branch(function: ca.Function, column: Array, pressures: Array) ->
 
     function : of `branch_function`. column : every quantity in its order, SI, with `pressures` [Pa] in it.
     """
+    rest = np.asarray(function(column, 1.0))[SILICONE]
+    if not np.all(rest > 0):
+        message = f"{Status.UNSTABLE_MATERIAL.advice}: the section has no {_lost(rest)} even without any pressure"
+        return BranchPoint(Status.UNSTABLE_MATERIAL, 1.0, 0.0, message)
     if not np.any(pressures):
         return BranchPoint(Status.SOLVED, 1.0, 1.0, "no pressure")
 
     def sample(stretch: Array) -> tuple[Array, Array]:
-        """Return the pressure fraction and the smallest stiffness, relative to rest, at each stretch."""
+        """Return the pressure fraction at each stretch, and the stiffnesses there: with pressure, of the silicone."""
         rows = np.asarray(function(column, stretch[None, :]))
         with np.errstate(divide="ignore", invalid="ignore"):
             t = np.where(rows[1] > 0, rows[0] / rows[1], np.inf)
-        capped = np.minimum(t, 1.0)
-        k = rows[2:6] + capped * (rows[6:10] - rows[2:6])
-        return t, np.min(k / reference[:, None], axis=0)
+        own = rows[SILICONE]
+        return t, np.vstack([own + np.minimum(t, 1.0) * (rows[_PRESSURISED] - own), own])
 
-    reference = np.asarray(function(column, 1.0)).ravel()[2:6]
+    def is_lost(stretch: Array) -> NDArray[np.bool_]:
+        lost: NDArray[np.bool_] = ~np.all(sample(stretch)[1] > 0, axis=0)
+        return lost
+
     grid = np.linspace(1.0, _LARGEST_STRETCH, _GRID)
     for size in (_FIRST_PART, _GRID):  # most branches arrive early
         t, k = sample(grid[:size])
+        lost = ~np.all(k > 0, axis=0)
         falls = np.append(t[1:] < t[:-1] - 1e-13, False)
-        events = np.flatnonzero((t >= 1.0) | ~(k > 0) | falls)
+        events = np.flatnonzero((t >= 1.0) | lost | falls)
         if events.size and events[0] < size - 1:  # the last point does not know whether it falls
             break
     if events.size == 0:
@@ -102,7 +112,7 @@ def stretch_on_branch(function: ca.Function, column: Array, pressures: Array) ->
             a, b = float(inside[k - 1]), float(inside[k])
         return b
 
-    if falls[j] and t[j] < 1.0 and k[j] > 0:
+    if falls[j] and t[j] < 1.0 and not lost[j]:
         for _ in range(12):
             fine = np.linspace(low, high, 41)
             values = sample(fine)[0]
@@ -115,16 +125,18 @@ def stretch_on_branch(function: ca.Function, column: Array, pressures: Array) ->
     else:
         high = grid[j]
 
-    def at(stretch: float) -> tuple[float, float]:
-        values = sample(np.array([stretch]))
-        return float(values[0][0]), float(values[1][0])
+    def fraction(stretch: float) -> float:
+        return float(sample(np.array([stretch]))[0][0])
 
-    root = _crossing(lambda s: at(s)[0] - 1.0, low, high) if at(high)[0] >= 1.0 else high
-    if at(root)[1] > 0:
+    root = _crossing(lambda s: fraction(s) - 1.0, low, high) if fraction(high) >= 1.0 else high
+    if not is_lost(np.array([root]))[0]:
         return BranchPoint(Status.SOLVED, root, 1.0, "on the branch from zero pressure")
-    lost = first_beyond(lambda s: ~(sample(s)[1] > 0), low, root)
-    how = "meets a tangent stiffness that loses its sign"
-    return _ended(Status.UNSTABLE_MATERIAL, lost, at(lost)[0], pressures, how)
+    end = first_beyond(is_lost, low, root)
+    beyond = sample(np.array([end * (1 + _A_HAIR)]))[
+        1
+    ]  # where each that vanishes there is negative, not just the first
+    how = f"meets a section whose {_lost(beyond)} loses its sign"
+    return _ended(Status.UNSTABLE_MATERIAL, end, fraction(end), pressures, how)
 
 
 def _crossing(excess: Callable[[float], float], a: float, b: float) -> float:
@@ -147,6 +159,12 @@ def _crossing(excess: Callable[[float], float], a: float, b: float) -> float:
         else:
             a, f_a, f_b, side = middle, f, f_b / 2 if side < 0 else f_b, -1
     return b
+
+
+def _lost(found: Array) -> str:
+    """Name the first stiffness that is not positive, of those with pressure and then of those of the silicone alone."""
+    which = int(np.argmin(np.ravel(found) > 0))
+    return STIFFNESSES[which % len(STIFFNESSES)] + " without the pressure's part" * (which >= len(STIFFNESSES))
 
 
 def _ended(status: Status, stretch: float, fraction: float, pressures: Array, how: str) -> BranchPoint:

@@ -197,7 +197,8 @@ def _sweep_function(
     nodes = ca.reshape(x[1 : 1 + nx * (K + 1)], nx, K + 1)
     base = g[1 : 1 + nx - 6, :]
     last_gap = x.numel() - 6 - ny
-    gaps = ca.horzcat(*(g[k : k + nx, :] for k in range(1 + nx - 6, last_gap, nx)))
+    by_side = [ca.reshape(g[1 + nx - 6 : last_gap, side], nx, K) for side in range(r)]
+    gaps = ca.horzcat(*by_side)[:, np.arange(r * K).reshape(r, K).T.ravel().tolist()]  # sides of one interval together
     free = ca.DM.zeros(nx, columns - r)
     free[_FORCE, :] = ca.DM(base_directions)
     held = ca.vertcat(-base[:12, :], ca.DM.zeros(6, r), -base[12:, :])

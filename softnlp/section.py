@@ -139,6 +139,21 @@ def deform(
     )
 
 
+STIFFNESSES = ("E_t", "EA", "EI_x", "EI_y", "GA", "GJ")
+"""What the section gives the rod; where one of them is not positive there is no pose."""
+
+
+def stiffnesses(section: Section) -> list[Any]:
+    """Return the stiffnesses of a section in the order of `STIFFNESSES`."""
+    return [
+        section.tangent_modulus,
+        section.axial_stiffness,
+        *section.bending_stiffness,
+        section.shear_stiffness,
+        section.torsional_stiffness,
+    ]
+
+
 def stretch_balance(section: Section, coefficients: Coefficients, conventions: Conventions = REPRODUCTION) -> Any:
     """Return the axial imbalance A_0 sigma_e - F_P +- k_e F_P (lambda - 1) [N], Eqs. (10), (19), (21), (23).
 

@@ -22,6 +22,8 @@ from softnlp.transcription import RK4, rk_step
 Array = NDArray[np.float64]
 
 _SUBSTEPS = 2
+MOST_INTERVALS = 225
+"""Intervals of a finer grid are taken together: the index is a whole number, which needs no finer ones."""
 
 
 def _perturbed(x: Any, delta: Any) -> Any:
@@ -64,10 +66,13 @@ def transition_functions(field: ca.Function) -> tuple[ca.Function, ca.Function]:
 def conjugate_points(transition: ca.Function, tip_variation: ca.Function, nodes: Array, constants: Array) -> int:
     """Count the directions in which the energy falls, from tip to base; 0 means stable.
 
-    transition : of `transition_functions`, mapped over the intervals. nodes : (18, K + 1) states of a solution.
+    transition : of `transition_functions`, mapped over the intervals, at most `MOST_INTERVALS`. nodes : (18, K + 1)
+    states of a solution.
     """
-    K = nodes.shape[1] - 1
-    Phi = np.asarray(transition(nodes[:, :K], constants, 1 / K)).reshape(12, K, 12).transpose(1, 0, 2)
+    K = min(nodes.shape[1] - 1, MOST_INTERVALS)
+    chosen = np.linspace(0, nodes.shape[1] - 1, K + 1).round().astype(int)
+    nodes, h = nodes[:, chosen], np.diff(chosen) / chosen[-1]
+    Phi = np.asarray(transition(nodes[:, :K], constants, h[None, :])).reshape(12, K, 12).transpose(1, 0, 2)
     A, B, C, D = Phi[:, :6, :6], Phi[:, :6, 6:], Phi[:, 6:, :6], Phi[:, 6:, 6:]
     before = D @ np.linalg.inv(B)  # force at a node by its pose, with the node before it held
     beyond = -np.asarray(tip_variation(nodes[:, K], constants))  # and by the part of the rod beyond it

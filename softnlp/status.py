@@ -34,7 +34,7 @@ _ADVICE = {
     Status.NO_CONTACT: "the free shape does not reach the wall, so the force is 0",
     Status.NO_EQUILIBRIUM: "the stretch balance has no root on the branch from zero pressure; lower the pressure",
     Status.UNSTABLE_MATERIAL: (
-        "a tangent stiffness would lose its sign; lower the pressure or choose a law fitted further"
+        "a stiffness would lose its sign; lower the pressure, or choose a law fitted further or smaller chambers"
     ),
     Status.DIVERGED: (
         "neither a direct solve nor continuation in pressure and load reached it; take smaller steps or lower the load"

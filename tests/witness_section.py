@@ -22,7 +22,7 @@ class NoRoot(ArithmeticError):
 
 
 class Unstable(ArithmeticError):
-    """E_t, EA or EI is not positive."""
+    """E_t, EA, EI, GA or GJ is not positive, with pressure or of the silicone alone."""
 
 
 @dataclass(frozen=True)
@@ -295,7 +295,7 @@ def section(body: Body, rubber: Rubber, pressures: Sequence[float] | Array, choi
         E_t * choices.k_i * inertia[0] + choices.k_b * stiffening[0],
         E_t * choices.k_i * inertia[1] + choices.k_b * stiffening[1],
     )
-    if min(E_t, EA, *EI) <= 0:
-        raise Unstable(f"E_t = {E_t:.4g} Pa, EA = {EA:.4g} N, EI = {EI[0]:.4g} N m^2 at stretch {lam:.4f}")
+    if min(E_t, A, J, *inertia, EA, *EI) <= 0:
+        raise Unstable(f"E_t = {E_t:.4g} Pa, A = {A:.4g} m^2, J = {J:.4g}, I = {inertia} m^4 at stretch {lam:.4f}")
     G = E_t / 3
     return Section(lam, lam * body.L_0, A, E_t, float(EA), G * A, EI, G * J, PA, d, r_co, r_ci, P)

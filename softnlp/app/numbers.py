@@ -11,6 +11,11 @@ from softnlp.studies.step import Run
 from softnlp.units import MILLIMETRE
 
 NOTHING = "–"
+_STABILITY = {
+    True: "",
+    False: " The equilibrium is not stable.",
+    None: " Its stability is undefined: a dead tip moment has no potential.",
+}
 
 
 @dataclass(frozen=True)
@@ -73,7 +78,7 @@ def certificate_words(run: Run) -> str:
     step = run.steps[0]
     if not step.status.has_solution or step.residual is None:
         return f"{step.status.value.replace('_', ' ').capitalize()}: {step.message}."
-    stable = "" if step.pose is None or step.pose.stable else " The equilibrium is not stable."
+    stable = "" if step.pose is None else _STABILITY[step.pose.stable]
     error = "" if step.discretisation_error is None else f", tip within {step.discretisation_error:.0e} L₀"
     lead = "Solved" if step.status.value == "solved" else "No contact: the robot does not reach the wall"
     return f"{lead}, residual {step.residual:.0e}{error}, {step.intervals} intervals.{stable}"

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.batch.shooting import Shooting
-from softnlp.branch import branch_function
+from softnlp.branch import SILICONE, branch_function
 from softnlp.loadcase import RodFunctions
 from softnlp.units import BAR
 
@@ -96,7 +96,7 @@ class Stretches:
         driven = rows[1] > 0
         sums = np.where(driven, rows[0] / np.where(driven, rows[1], 1.0), np.nan) * BAR
         sums[:, 0] = 0.0
-        good = np.isfinite(sums) & np.all(rows[2:6] > 0, axis=0)
+        good = np.isfinite(sums) & np.all(rows[SILICONE] > 0, axis=0)
         good[:, 1:] &= np.diff(sums, axis=1) > 0
         return sums, np.where(good.all(axis=1), samples, np.argmin(good, axis=1))
 

@@ -168,7 +168,11 @@ def _summary_rows(found: Workspace, s: Summary) -> Iterator[tuple[str, str]]:
     yield "workspace", f"{found.title}: {found.robot.name}, {found.material}"
     yield from (("gravity", line) for line in gravity_lines(found.gravity))
     yield "poses", f"{s.poses:,}"
-    kinds = {"unstable": s.unstable, "that pass through themselves": s.self_intersecting}
+    kinds = {
+        "unstable": s.unstable,
+        "of undefined stability": s.undefined,
+        "that pass through themselves": s.self_intersecting,
+    }
     told = ", ".join(f"{count:,} {kind}" for kind, count in kinds.items() if count)
     yield "solved", f"{s.solved:,}" + (f" ({told})" if told else "")
     yield "failed", ", ".join(f"{n:,} {status}" for status, n in s.failed.items()) or "0"

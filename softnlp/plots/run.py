@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from softnlp.plots.abscissa import abscissa
 from softnlp.plots.blocked import blocked_figure
 from softnlp.plots.body import body_panel
@@ -12,6 +14,7 @@ from softnlp.plots.inverse import inverse_figure
 from softnlp.plots.series import finish_panels, new_panels, series
 from softnlp.plots.style import GREY, INK, SMALL, WRONG, colour, in_own_style, new_figure
 from softnlp.results import RunView
+from softnlp.studies.step import STABLE_FLAGS
 from softnlp.units import DEGREE, MILLIMETRE
 
 if TYPE_CHECKING:
@@ -57,8 +60,11 @@ def _set_legend(figure: Figure, view: RunView) -> None:
     marks = []
     if len(view.solved) < len(view.status):
         marks.append(Line2D([], [], color=WRONG, marker="x", linestyle="", label="no solution"))
-    if not view.stable[list(view.solved)].all():
+    stable = view.stable[list(view.solved)]
+    if np.any(stable == STABLE_FLAGS["unstable"]):
         marks.append(Line2D([], [], color=GREY, marker="o", markerfacecolor="white", linestyle="", label="unstable"))
+    if np.any(stable == STABLE_FLAGS["undefined"]):
+        marks.append(Line2D([], [], color=GREY, marker="o", linestyle="", label="stability undefined"))
     if marks:
         figure.legend(handles=marks, loc="upper right", bbox_to_anchor=(0.99, 0.935), ncols=len(marks), **style)
     if view.solved:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from softnlp.plots.abscissa import STEP, Abscissa
 from softnlp.plots.style import GREY, WRONG, colour, plain, step_colours
 from softnlp.results import RunView
+from softnlp.studies.step import STABLE_FLAGS
 from softnlp.units import BAR
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def series(axes: Axes, view: RunView, x: Abscissa, y: Array, label: str, least_s
     plain(axes, x.label, label)
     shades = step_colours(len(y))
     axes.plot(x.values, y, color=GREY, linewidth=1.0, zorder=2)
-    faces = np.where(view.stable[:, None], shades, 1.0)
+    faces = np.where((view.stable == STABLE_FLAGS["unstable"])[:, None], 1.0, shades)
     size = float(np.clip(1000 / len(y), 5, 26))
     axes.scatter(
         x.values, y, s=size, c=faces, edgecolors=list(map(tuple, shades)), linewidths=1.2, zorder=3, label="steps"

@@ -12,6 +12,7 @@ from softnlp.plots.body import disc
 from softnlp.plots.cloud import VIEWS, Outline, mark_size, outline, seen, shown
 from softnlp.plots.space import space_axes
 from softnlp.plots.style import GREY, INK, SMALL, TEXT, WRONG, in_own_style, new_figure, plain
+from softnlp.studies.step import STABLE_FLAGS
 from softnlp.units import MILLIMETRE
 from softnlp.workspace.read import Column, Workspace, read_column
 from softnlp.workspace.summary import parameters
@@ -55,8 +56,9 @@ def workspace_figure(workspace: Workspace, colour: str = COLOUR) -> Figure:
         workspace.material,
         f"{workspace.poses - failed:,} of {workspace.poses:,} poses solved",
     ]
-    if unstable := int(np.count_nonzero(workspace.stable == 0)):
-        parts.append(f"{unstable:,} unstable")
+    for what, words in (("unstable", "unstable"), ("undefined", "of undefined stability")):
+        if count := int(np.count_nonzero(workspace.stable[workspace.solved] == STABLE_FLAGS[what])):
+            parts.append(f"{count:,} {words}")
     if through := int(np.count_nonzero(workspace.self_intersecting == 1)):
         parts.append(f"{through:,} through themselves")
     parts += gravity_lines(workspace.gravity)

@@ -33,7 +33,7 @@ from softnlp.results.inputs import (
 from softnlp.results.netcdf import dataset_bytes, said
 from softnlp.results.targets import INVERSE, TARGET_FIELDS, target_values
 from softnlp.solver import EquationResidual
-from softnlp.studies.step import Run, Step
+from softnlp.studies.step import STABLE_FLAGS, Run, Step, stable_flag
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,7 +42,6 @@ Array = NDArray[np.float64]
 Variable = tuple[tuple[str, ...], Any, dict[str, Any]]
 
 AXES = ("x", "y", "z")
-STABLE_FLAGS = {"not_solved": -1, "unstable": 0, "stable": 1}
 SELF_INTERSECTING_FLAGS = {"not_solved": -1, "no": 0, "self_intersecting": 1}
 FLAGS = {STABLE: STABLE_FLAGS, SELF_INTERSECTING: SELF_INTERSECTING_FLAGS}
 
@@ -62,7 +61,8 @@ def to_dataset(run: Run) -> xr.Dataset:
         runs
         along the rod, with the coordinate `s` = s/L where all solved steps share it (else see `arc`); `equation` names
         the
-        lines of the certificate. Numbers of a step without a solution are NaN (`stable` is -1).
+        lines of the certificate. Numbers of a step without a solution are NaN (`stable` is -1, as
+        under a dead tip moment).
     """
     import xarray as xr
 
@@ -125,7 +125,7 @@ def _variable(field: Field, steps: Sequence[Step], sizes: dict[str, int]) -> Var
     """Return a field over the steps; a shape with fewer points than another is filled up with NaN at the tip."""
     dims = ("step", *field.dims)
     if (known := FLAGS.get(field.name)) is not None:
-        flags = [known["not_solved"] if (p := solved_pose(s)) is None else int(field.of(s, p)) for s in steps]
+        flags = [stable_flag(None if (p := solved_pose(s)) is None else field.of(s, p)) for s in steps]
         values = np.array(flags, dtype=np.int8)
         meanings = {"flag_values": np.array(list(known.values()), np.int8), "flag_meanings": " ".join(known)}
         return dims, values, said(field.unit, field.meaning, **meanings)

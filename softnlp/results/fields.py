@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from softnlp.solver import EquationResidual
-from softnlp.studies.step import Contact, Pose, Run, Step
+from softnlp.studies.step import STABLE_MEANING, Contact, Pose, Run, Step
 from softnlp.units import DEGREE, MILLIMETRE, NEWTON_MILLIMETRE
 
 BLOCKED_FORCE = "blocked-force"
@@ -39,7 +39,7 @@ STABLE, SELF_INTERSECTING = "stable", "self_intersecting"
 
 POSE_FIELDS: tuple[Field, ...] = (
     Field("stretch", (), "1", "axial stretch from the pressure balance, Eq. (23)", lambda s, p: p.stretch),
-    Field(STABLE, (), "1", "no conjugate point on the rod", lambda s, p: bool(p.stable)),
+    Field(STABLE, (), "1", STABLE_MEANING, lambda s, p: p.stable),
     Field(
         SELF_INTERSECTING,
         (),

@@ -64,6 +64,7 @@ def table_lines(run: Run) -> Group:
     return Group(table, *lines)
 
 
+_STABLE = {True: "yes", False: "no", None: "undef."}
 _TIP = ("bending\n[deg]", "tip x\n[mm]", "y\n[mm]", "z\n[mm]")
 _HEADERS: tuple[str, ...] = (*_TIP, "stretch", "stable", "resid.", "error", "time\n[s]")
 _BLOCKED_HEADERS = ("force\n[N]", "gap\n[mm]", *_TIP, "resid.")
@@ -79,7 +80,7 @@ def _numbers(step: Step) -> list[str]:
         f"{pose.bending_angle / DEGREE:.2f}",
         *(_millimetres(v) for v in pose.tip_position),
         f"{pose.stretch:.3f}",
-        "yes" if pose.stable else "no",
+        _STABLE[pose.stable],
         residual,
         _short(step.discretisation_error),
         f"{step.solve_time:.3f}",

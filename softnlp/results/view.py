@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.results.dataset import STABLE_FLAGS
 from softnlp.results.fields import BLOCKED_FORCE, solved_pose
 from softnlp.results.inputs import loads_of_table, robot_of_table
 from softnlp.results.targets import INVERSE
 from softnlp.robot import Robot
 from softnlp.rod import Loads
 from softnlp.status import Status
-from softnlp.studies.step import Contact, Run, SectionRadii
+from softnlp.studies.step import Contact, Run, SectionRadii, stable_flag
 from softnlp.units import BAR, DEGREE, MILLIMETRE
 
 if TYPE_CHECKING:
@@ -81,8 +80,9 @@ class RunView:
     """A run as figures see it; S steps, NaN and None where a step has no solution.
 
     material : its name and law. pressure : (S, sets) [Pa]. time : (S,) [s] or None.
-    stable : (S,), False where unsolved. stretch : (S,). bending_angle : (S,) [rad]. backbone_length : (S,) [m].
-    bodies : S entries. contact : of a blocked force, else None. targets : of inverse kinematics, else None.
+    stable : (S,) of `STABLE_FLAGS`, undefined where unsolved. stretch : (S,). bending_angle : (S,) [rad].
+    backbone_length : (S,) [m]. bodies : S entries. contact : of a blocked force, else None. targets : of inverse
+    kinematics, else None.
     """
 
     title: str
@@ -94,7 +94,7 @@ class RunView:
     status: tuple[Status, ...]
     pressure: Array
     time: Array | None
-    stable: NDArray[np.bool_]
+    stable: NDArray[np.int8]
     stretch: Array
     bending_angle: Array
     backbone_length: Array
@@ -126,7 +126,7 @@ def view_of_run(run: Run) -> RunView:
         status=tuple(step.status for step in run.steps),
         pressure=np.array([step.pressure for step in run.steps], dtype=float),
         time=None if np.all(np.isnan(times)) else np.array(times),
-        stable=np.array([pose is not None and pose.stable for pose in poses]),
+        stable=np.array([stable_flag(None if pose is None else pose.stable) for pose in poses], np.int8),
         stretch=series("stretch"),
         bending_angle=series("bending_angle"),
         backbone_length=series("backbone_length"),
@@ -201,7 +201,7 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
         status=status,
         pressure=values["pressure_bar"] * BAR,
         time=values.get("t_s"),
-        stable=values["stable"] == STABLE_FLAGS["stable"],
+        stable=values["stable"],
         stretch=values["stretch"],
         bending_angle=values["bending_angle_deg"] * DEGREE,
         backbone_length=values["backbone_length_mm"] * MILLIMETRE,

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.continuation import Path, around_folds, follow, straight_path
+from softnlp.continuation import Followed, Path, around_folds, follow, straight_path
 from softnlp.rod import STATE_SIZE
 from softnlp.solver import Solution
 from softnlp.studies.pose_grid import Grid, pose_distance, pose_weight
+from softnlp.turning import change, moved
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Any]
@@ -24,7 +25,7 @@ Values = Mapping[str, Any]
 LOADS = ("tip_force", "tip_moment", "gravity")
 _PRESSURE_PARTS = (0.0, 0.5, 0.25, 0.75)
 _ROUNDING = 1e-12  # of the length or of a load
-_LARGEST_REFERENCE = 8000  # unknowns up to which IPOPT is tried: MUMPS has taken minutes over more
+_REFERENCE = 150  # what a try of IPOPT costs, in iterations of Newton's method
 
 
 class Work:
@@ -97,15 +98,24 @@ class Attempt:
     on_path: bool = False
 
 
+def from_near(goal: Goal, work: Work) -> Iterator[Attempt]:
+    """Make the attempts from the neighbour that cost the least: Newton's method, where there is one."""
+    grid, near = goal.grid, goal.near
+    if near is None:
+        return
+    p = grid.problem.pack(goal.values)
+    yield Attempt(grid.engine.solve(p, near.moved))
+    if goal.is_loaded and np.any(near.p != p):
+        yield Attempt(grid.engine.solve(p, near.x))
+
+
 def attempts(goal: Goal, work: Work) -> Iterator[Attempt]:
     """Make one attempt after another; whoever asks for them takes their iterations off `work`."""
     grid, values, near = goal.grid, goal.values, goal.near
     p = grid.problem.pack(values)
-    if near is not None:
-        yield Attempt(grid.engine.solve(p, near.moved))
-        if goal.is_loaded and np.any(near.p != p):
-            yield Attempt(grid.engine.solve(p, near.x))
-            yield _from_near(grid, near, p, work)
+    yield from from_near(goal, work)
+    if near is not None and goal.is_loaded and np.any(near.p != p):
+        yield _along_from_near(grid, near, p, work)
     arc = goal.arc(values)
     yield Attempt(grid.engine.solve(p, arc))
     if not goal.is_loaded:
@@ -115,19 +125,19 @@ def attempts(goal: Goal, work: Work) -> Iterator[Attempt]:
     for part in () if goal.is_a_column else _PRESSURE_PARTS:  # every path keeps a column straight
         partly = {**values, "pressure": part * values["pressure"]}
         yield from _along(goal, [{**partly, **no_loads}, partly, values], work)
-    if arc.size <= _LARGEST_REFERENCE:
+    if work.iterations_left(grid) >= _REFERENCE:
+        work.spend(grid, _REFERENCE)
         yield Attempt(grid.reference.solve(p, arc if near is None else near.moved))
 
 
-def _from_near(grid: Grid, near: Neighbour, p: Array, work: Work) -> Attempt:
+def _along_from_near(grid: Grid, near: Neighbour, p: Array, work: Work) -> Attempt:
     """Follow the neighbour's solution along the straight line between its values and these."""
 
     def path(t: float) -> Array:
         return p if t >= 1.0 else near.p + t * (p - near.p)
 
-    followed = follow(
-        grid.stepper, path, near.x, distance=pose_distance, most_iterations=work.iterations_left(grid), first_step=0.5
-    )
+    most = work.iterations_left(grid) // 3  # the other attempts shall have their turn
+    followed = _follow(grid, path, near.x, most, first_step=0.5)
     spent = followed.iterations
     if not followed.arrived:
         return Attempt(replace(followed.solution, iterations=spent), followed.fraction)
@@ -150,7 +160,7 @@ def _along(goal: Goal, waypoints: list[Values], work: Work) -> Iterator[Attempt]
     for k in range(legs):
         path = straight_path(problem, waypoints[k], waypoints[k + 1])
         left = work.iterations_left(grid) - spent
-        followed = follow(grid.stepper, path, x, distance=pose_distance, most_iterations=left)
+        followed = _follow(grid, path, x, left)
         spent += followed.iterations
         x = followed.solution.x
         if not followed.arrived:
@@ -160,6 +170,20 @@ def _along(goal: Goal, waypoints: list[Values], work: Work) -> Iterator[Attempt]
             return
     final = grid.engine.solve(p_end, x)
     yield Attempt(replace(final, iterations=spent + final.iterations), on_path=True)
+
+
+def _follow(grid: Grid, path: Path, start: Array, most: int, first_step: float = 0.125) -> Followed:
+    """Follow a solution along a path within a number of iterations."""
+    return follow(
+        grid.stepper,
+        path,
+        start,
+        distance=pose_distance,
+        most_iterations=most,
+        first_step=first_step,
+        moved=moved,
+        change=change,
+    )
 
 
 def _snapped(grid: Grid, path: Path, start: Solution, fraction: float, work: Work) -> Iterator[Attempt]:

@@ -14,7 +14,7 @@ from softnlp.rod import STATE_SIZE
 from softnlp.solver import EquationResidual, certificate, outputs
 from softnlp.status import Status
 from softnlp.studies.blocked_grid import Blocked
-from softnlp.studies.pose import SHAPE_POINTS, bending_angle, between_nodes, pose_of, pose_warnings, shape_of
+from softnlp.studies.pose import SHAPE_POINTS, bending_angle, between_nodes, pose_of, pose_warnings, shape_of, stability
 from softnlp.studies.statics import PoseSolver
 from softnlp.studies.step import Contact, Pose, Step
 from softnlp.studies.wall import Wall
@@ -89,7 +89,7 @@ def solved_step(
     unloaded = np.asarray(functions.arc(column, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
     # The branch keeps the sign of its determinant, so it is as stable in the plane as the free shape it begins at.
     bending = bending_angle(poses.shape, nodes, found.constants)
-    pose = pose_of(model, result, shape, bending, unloaded, free.stable)
+    pose = pose_of(model, result, shape, bending, unloaded, stability(situation.loads, free.stable))
     warnings = list(pose_warnings(model, pose))
     if found.slips is not None:
         warnings.append(

@@ -203,7 +203,7 @@ def unmet(found: Evaluation, task: DesignTask) -> list[str]:
     reasons = [words for words, _ in missed(found.outputs, task.requirements)]
     contact = found.step and found.step.contact
     free = found.step and (contact.free if contact else found.step.pose)
-    if free and not free.stable:
+    if free and free.stable is False:
         reasons.append("the free shape is not stable: it buckles under its load")
     shapes = {"free": free, "blocked": found.step.pose if found.step and contact else None}
     for name, pose in shapes.items():

@@ -220,7 +220,7 @@ def _guards(cases: list[LoadCase]) -> Iterator[Constraint]:
     free = cases[0]
     slope = ca.jacobian(free.residuals[0], free.symbols[0])
     yield Constraint("end of the stretch's branch", slope, _SLOPE, np.inf)
-    yield Constraint("stiffness that loses its sign", free.constants[:4], 0.0, np.inf)
+    yield Constraint("stiffness that loses its sign", free.constants[:5], 0.0, np.inf)
     if len(cases) > 1:
         F_b = cases[1].outputs["tip_forces"][0] / cases[1].force_unit
         yield Constraint("contact", F_b, 0.0, np.inf)

@@ -283,12 +283,12 @@ class InverseSolver:
         """Return a stable pose that a body can take as an answer, else the step that says why there is none."""
         if step.pose is None or solved is None:
             return step
-        fit = step.pose.fit
-        if not step.pose.stable:
+        fit, message = step.pose.fit, ""
+        if step.pose.stable is False:
             message = "the target is met by an equilibrium that is not stable only: the real robot buckles away from it"
-            return Step(pressure, Status.OUT_OF_REACH, message, residual=step.residual)
-        if fit.self_intersecting and SELF_INTERSECTION not in self.task.allow:
+        elif fit.self_intersecting and SELF_INTERSECTION not in self.task.allow:
             message = f'{_NO_BODY}: {fit.warnings[-1]}; [robot] allow = ["{SELF_INTERSECTION}"] accepts it'
+        if message:
             return Step(pressure, Status.OUT_OF_REACH, message, residual=step.residual)
         aimed = aim.aimed(step.pose)
         return Reached(pressure, step, solved, aimed, aim.cost(aimed))

@@ -10,7 +10,7 @@ from softnlp import rod
 from softnlp.loadcase import unpack_section
 from softnlp.quantities import Model
 from softnlp.robot import touching_stretch
-from softnlp.rod import RodSection
+from softnlp.rod import Loads, RodSection
 from softnlp.section import deform
 from softnlp.studies.step import Pose, SectionRadii, Shape
 from softnlp.transcription import RK4, rk_step
@@ -21,6 +21,7 @@ SHAPE_POINTS = 61
 _SUBSTEPS = 4
 _LENGTH = len(RodSection._fields)  # where the constants of a load case hold the length of the stretched rod
 _SAMPLES, _ZOOMS, _GRADES, _GAUSS = 6, 12, 16, 4  # of the bending angle's quadrature
+_MOST_PARTS = 225
 
 
 def shape_function(field: ca.Function) -> ca.Function:
@@ -45,10 +46,10 @@ def bending_angle(function: ca.Function, nodes: Array, constants: Array) -> floa
     """Return the integral of sqrt(u_x^2 + u_y^2) over s [rad], to 1e-7 also where the curvature vanishes on the way.
 
     function : of `shape_function`. The curvature is smooth, its norm has a kink where it crosses zero, or nearly so. In
-    every interval the curvature is the polynomial through `_SAMPLES` points, and the quadrature of its norm is graded
-    towards the point where that is smallest.
+    every interval, or part of the rod where those are many, the curvature is the polynomial through `_SAMPLES` points,
+    and the quadrature of its norm is graded towards the point where that is smallest.
     """
-    K = nodes.shape[1] - 1
+    K = min(nodes.shape[1] - 1, _MOST_PARTS)
     length = float(constants[_LENGTH])  # in L_0
     ends = (1 - np.cos(np.pi * np.arange(_SAMPLES) / (_SAMPLES - 1))) / 2  # Chebyshev points, 0 and 1 among them
     s = ((np.arange(K)[:, None] + ends[:-1]) / K).ravel()
@@ -110,8 +111,13 @@ def section_radii(model: Model, stretch: float) -> SectionRadii:
     )
 
 
+def stability(loads: Loads, is_minimum: bool | None) -> bool | None:
+    """Return whether a pose is stable, undefined (None) under a dead tip moment: in space that has no potential."""
+    return None if np.any(loads.tip_moment) else is_minimum
+
+
 def pose_of(
-    model: Model, outputs: dict[str, Array], shape: Shape, bending: float, unloaded_tip: Array, stable: bool
+    model: Model, outputs: dict[str, Array], shape: Shape, bending: float, unloaded_tip: Array, stable: bool | None
 ) -> Pose:
     """Assemble a pose. outputs : of the load case, SI. unloaded_tip : tip at this pressure without loads [m].
 
@@ -149,6 +155,10 @@ def pose_warnings(model: Model, pose: Pose) -> tuple[str, ...]:
         found.append(f"stretch {pose.stretch:.3f} is above {limit:.3f}, where neighbouring reinforced chambers touch")
     if np.min(pose.shape.shear_extension[:, 2]) <= 0:
         found.append("the load compresses the rod to nothing somewhere (v_z <= 0); the model does not hold there")
-    if not pose.stable:
+    if pose.stable is None:
+        found.append(
+            "stability is undefined: a dead tip moment in space has no potential, so there is no energy to be least"
+        )
+    elif not pose.stable:
         found.append("this equilibrium is not stable: the real robot buckles away from it")
     return (*found, *pose.fit.warnings)

@@ -15,12 +15,15 @@ from softnlp.solver import Engine, Solution
 
 Array = NDArray[np.float64]
 
+_ROUGH = 1e-2  # error of a grid whose word on stability does not count
+
 
 @dataclass(frozen=True, eq=False)
 class Grid:
     """Everything compiled for one number of intervals.
 
     engine : Newton's method to full tolerance. stepper : the same, loosely, for points of a path. reference : IPOPT.
+    order : of the transcription's error at the nodes.
     iteration_cost : time of one Newton iteration, in units of one interval of Runge-Kutta (some 0.04 ms).
     """
 
@@ -29,12 +32,18 @@ class Grid:
     stepper: Engine
     reference: Engine
     transition: ca.Function
+    order: int
     iteration_cost: float
 
     @property
     def problem(self) -> CompiledProblem:
         """The compiled problem, with every quantity fixed."""
         return self.engine.problem
+
+    @property
+    def intervals(self) -> int:
+        """The number of intervals."""
+        return self.case.transcribed.node_index.size - 1
 
     def nodes(self, x: Array) -> Array:
         """Return the scaled node states (18, K + 1) in x."""
@@ -50,13 +59,15 @@ class Grid:
 class Solved:
     """A solution on a grid and what was found of it.
 
-    nodes : (18, K + 1) scaled states. constants : what the field takes beside them. error : estimated tip position
-    error over L_0. rotation_error : the same for the tip's orientation [rad]. stable : no conjugate point.
+    nodes : (18, K + 1) scaled states. limit : what they tend to on finer grids, where those begin. constants : what the
+    field takes beside them. error : estimated tip position error over L_0. rotation_error : the same for the tip's
+    orientation [rad]. stable : no conjugate point.
     """
 
     grid: Grid
     solution: Solution
     nodes: Array
+    limit: Array
     constants: Array
     error: float
     rotation_error: float
@@ -65,7 +76,12 @@ class Solved:
     @property
     def intervals(self) -> int:
         """The number of intervals."""
-        return int(self.nodes.shape[1]) - 1
+        return self.grid.intervals
+
+    @property
+    def is_rough(self) -> bool:
+        """Whether the pose is not stable on its grid, which is so coarse that it may be on another."""
+        return not self.stable and self.refinement_error > _ROUGH
 
     @property
     def refinement_error(self) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from typing import Any
 
@@ -12,15 +12,16 @@ from numpy.typing import NDArray
 
 from softnlp.branch import BranchPoint, branch_function, stretch_on_branch
 from softnlp.condensed import CondensedSolver
-from softnlp.loadcase import load_case, rod_functions
+from softnlp.loadcase import load_case, rod_functions, unpack_section
 from softnlp.numerics import Numerics
 from softnlp.problem import compile_problem
 from softnlp.quantities import Model, quantities
 from softnlp.rod import STATE_SIZE, Loads
 from softnlp.solver import Engine, LinearSolver, Solution, SparseSolver, certificate, discretisation_correction, outputs
+from softnlp.stability import MOST_INTERVALS as CONJUGATE_INTERVALS
 from softnlp.stability import conjugate_points, transition_functions
 from softnlp.status import Status
-from softnlp.studies.attempts import LOADS, Goal, Neighbour, Work, attempts
+from softnlp.studies.attempts import LOADS, Attempt, Goal, Neighbour, Work, attempts, from_near
 from softnlp.studies.pose import (
     SHAPE_POINTS,
     bending_angle,
@@ -29,10 +30,12 @@ from softnlp.studies.pose import (
     pose_warnings,
     shape_function,
     shape_of,
+    stability,
 )
 from softnlp.studies.pose_grid import Grid, Solved, next_size
 from softnlp.studies.step import Step
 from softnlp.transcription import MultipleShooting, method_named
+from softnlp.turning import carried, moved
 
 Array = NDArray[np.float64]
 
@@ -40,9 +43,11 @@ FIRST_INTERVALS = {"multiple-shooting": 10, "collocation": 5}
 MOST_INTERVALS = 1810
 _MOST_COLLOCATION = 320  # as many points; order 8 needs no more
 _TURN = 0.25  # largest angle [rad] of the unloaded arc within one RK4 interval of a first grid
+_SEARCHED_BY = "multiple-shooting"
+_DEARER = 3  # an iteration on a neighbour's grid than on a coarse one, where the neighbour's is still tried first
 _FINER = 4  # how much finer a grid is tried where a coarse one finds no solution
-_MOST_WORK = 150_000  # Runge-Kutta intervals of Newton iterations for one pose, which is some six seconds
-_OVERHEAD, _COLLOCATION_COST = 30, 20  # time of an iteration: beside its intervals, and of a collocation interval
+_MOST_WORK = 8_000  # Runge-Kutta intervals of Newton iterations to find one pose, which is some 0.6 seconds
+_OVERHEAD, _COLLOCATION_COST = 15, 15  # time of an iteration: beside its intervals, and of a collocation interval
 # Without loads the exact answer is a circular arc; a solution is good enough to show it.
 UNLOADED_ACCURACY = 5e-9
 
@@ -63,7 +68,7 @@ class PoseSolver:
         self.functions = rod_functions(model)
         self.shape = shape_function(self.functions.field)
         self._transition, self._tip_variation = transition_functions(self.functions.field)
-        self._grids: dict[int, Grid] = {}
+        self._grids: dict[tuple[str, int], Grid] = {}
         self._numbers: dict[str, Array] = {}
 
     def with_model(self, model: Model) -> PoseSolver:
@@ -74,10 +79,11 @@ class PoseSolver:
         other._numbers = {name: q.nominal for name, q in quantities(model).items()}
         return other
 
-    def grid(self, intervals: int) -> Grid:
-        """Return the compiled problem on a grid, building it at first use."""
-        if intervals not in self._grids:
-            method = method_named(self.numerics.transcription, intervals)
+    def grid(self, intervals: int, transcription: str | None = None) -> Grid:
+        """Return the compiled problem on a grid, building it at first use; transcribed as the numerics say, or so."""
+        name = transcription or self.numerics.transcription
+        if (name, intervals) not in self._grids:
+            method = method_named(name, intervals)
             case = load_case("pose", self.functions, self.quantities, method)
             problem = compile_problem(list(self.quantities.values()), [case])
             linear: LinearSolver
@@ -85,15 +91,16 @@ class PoseSolver:
                 linear, cost = CondensedSolver(self.functions, method), 1
             else:
                 linear, cost = SparseSolver(problem), _COLLOCATION_COST
-            self._grids[intervals] = Grid(
+            self._grids[name, intervals] = Grid(
                 case=case,
-                engine=Engine(problem, linear=linear, newton_only=True),
-                stepper=Engine(problem, linear=linear, newton_only=True, tolerance=1e-7),
+                engine=Engine(problem, linear=linear, newton_only=True, moved=moved),
+                stepper=Engine(problem, linear=linear, newton_only=True, tolerance=1e-7, moved=moved),
                 reference=Engine(problem),
-                transition=self._transition.map(intervals),
+                transition=self._transition.map(min(intervals, CONJUGATE_INTERVALS)),
+                order=method.order,
                 iteration_cost=_OVERHEAD + cost * intervals,
             )
-        return self._grids[intervals]
+        return self._grids[name, intervals]
 
     @property
     def most_intervals(self) -> int:
@@ -124,61 +131,82 @@ class PoseSolver:
             return Step(pressure, branch.status, branch.message, solve_time=time.perf_counter() - began), None
 
         target = self.target_accuracy(loads)
-        unloaded = not any(np.any(values[name]) for name in LOADS)
-        first = self.numerics.intervals or self.first_intervals(column, branch.stretch, target if unloaded else None)
-        intervals = max(warm.intervals, first) if warm else first
-        iterations = 0
-        found: Solved | None = warm
+        loaded = any(np.any(values[name]) for name in LOADS)
+        first = self.numerics.intervals or self.first_intervals(column, branch.stretch, None if loaded else target)
         work = Work(_MOST_WORK)
-        finest = min(_FINER * first, self.most_intervals)
-        while True:
-            attempt, spent, how_far = self._solve_on(intervals, values, branch, found, work)
-            iterations += spent
-            if attempt is None and self.numerics.intervals is None and intervals < finest and not work.used_up:
-                intervals, found = min(_FINER * intervals, self.most_intervals), None
-                continue
-            if attempt is None:
-                step = Step(
-                    pressure,
-                    Status.DIVERGED,
-                    f"{Status.DIVERGED.advice}{how_far}",
-                    iterations=iterations,
-                    solve_time=time.perf_counter() - began,
-                )
-                return step, None
-            found = attempt
-            wanted = self.next_intervals(found.refinement_error, intervals, target)
-            if wanted is None:
+        found, iterations, how_far = self._searched(values, branch, warm, work, first, loaded)
+        most = self.most_intervals
+        while found is not None:
+            chosen = found.grid is self.grid(found.intervals) and found.intervals >= (self.numerics.intervals or 0)
+            wanted = self.next_intervals(found.refinement_error, found.intervals, target) if chosen else first
+            if wanted is None or (found.intervals >= most and found.refinement_error <= self.numerics.accuracy):
+                return self._finished(pressure, loads, found, iterations, began), found
+            if chosen and found.intervals >= most:
+                status, residual = Status.INACCURATE, found.solution.residual
+                how_far = f"; with {found.intervals} intervals it is {found.refinement_error:.2g} L_0"
                 break
-            if intervals >= self.most_intervals:
-                if found.refinement_error <= self.numerics.accuracy:
-                    break
-                step = Step(
-                    pressure,
-                    Status.INACCURATE,
-                    f"{Status.INACCURATE.advice}; with {intervals} intervals it is {found.refinement_error:.2g} L_0",
-                    residual=found.solution.residual,
-                    iterations=iterations,
-                    solve_time=time.perf_counter() - began,
-                )
-                return step, None
-            intervals = min(wanted, self.most_intervals)
-        return self._finished(pressure, loads, found, iterations, began), found
+            found, spent, how_far = self._solve_on(self.grid(min(wanted, most)), values, branch, found, work)
+            iterations += spent
+        else:
+            status, residual = Status.DIVERGED, None
+        seconds = time.perf_counter() - began
+        message = status.advice + how_far
+        return Step(pressure, status, message, residual=residual, iterations=iterations, solve_time=seconds), None
 
-    def first_intervals(self, column: Array, stretch: float, arc_target: float | None = None) -> int:
+    def _searched(
+        self, values: dict[str, Any], branch: BranchPoint, near: Solved | None, work: Work, first: int, loaded: bool
+    ) -> tuple[Solved | None, int, str]:
+        """Find a pose by Newton's method from a neighbour, else on a coarse shooting grid, where paths cost the least.
+
+        first : intervals of the grid that the pose is shown on first, at once where it is an arc. Returns as
+        `_solve_on`.
+        """
+        given, name, size, spent = self.numerics.intervals, None, first, 0
+        if loaded:
+            name = _SEARCHED_BY
+            quick = self.first_intervals(self.column(values), branch.stretch, transcription=name)
+            size = min(quick, given or quick)
+        coarse = self.grid(size, name)
+        if near is not None:
+            grid = self.grid(max(near.intervals, first))
+            if grid.iteration_cost <= _DEARER * coarse.iteration_cost:
+                found, spent, _ = self._solve_on(grid, values, branch, near, work, from_near)
+                if found is not None and found.stable:
+                    return found, spent, ""
+        finest = min(_FINER * size, self.most_intervals)
+        while True:
+            found, more, how_far = self._solve_on(self.grid(size, name), values, branch, near, work)
+            spent += more
+            if (found and not found.is_rough) or given is not None or size >= finest or work.used_up:
+                return found, spent, how_far
+            size, near = min(_FINER * size, self.most_intervals), found
+
+    def first_intervals(
+        self, column: Array, stretch: float, arc_target: float | None = None, transcription: str | None = None
+    ) -> int:
         """Return a grid coarse enough to be quick and fine enough for the curl of the unloaded robot.
 
         arc_target : for a robot without loads, the error to meet at once: RK4 turns a circular arc of angle a by
-        a (a / K)^4 / 120 too little, of which the tip's position shows about 0.6.
+        a (a / K)^4 / 120 too little, of which the tip's position shows about 0.6. transcription : as of `grid`.
         """
-        first = FIRST_INTERVALS[self.numerics.transcription]
+        name = transcription or self.numerics.transcription
+        first = FIRST_INTERVALS[name]
         straight = np.asarray(self.functions.arc(column, stretch, 0.01)).ravel()
         curl = 100 * float(np.hypot(straight[9], straight[10]))  # of the axis, R e3, over the first hundredth
+        curl = max(curl, self._turn_of_moment(column, stretch))
         turn = _TURN * FIRST_INTERVALS["multiple-shooting"] / first
         wanted = max(first, curl / turn)
-        if arc_target is not None and self.numerics.transcription == "multiple-shooting":
+        if arc_target is not None and name == "multiple-shooting":
             wanted = max(wanted, curl * (0.6 * curl / (120 * arc_target)) ** 0.25)
         return min(next_size(wanted), self.most_intervals)
+
+    def _turn_of_moment(self, column: Array, stretch: float) -> float:
+        """Return how far the dead tip moment alone would bend or twist the rod [rad]."""
+        constants, _, units = (np.asarray(part).ravel() for part in self.functions.section(column, stretch))
+        after = self.model.robot.chamber_sets + 3  # the pressures and the tip force
+        section, scaled = unpack_section(constants), column[after : after + 3] / np.prod(units)
+        length = constants[len(section)]
+        return float(np.linalg.norm(scaled) * length / min(section.bending_x, section.bending_y, section.torsion))
 
     def target_accuracy(self, loads: Loads) -> float:
         """Return the estimate to aim for: a third of the accuracy, since estimates are good to a factor of 3."""
@@ -196,17 +224,23 @@ class PoseSolver:
         return next_size(max(factor, 1.3) * intervals)
 
     def _solve_on(
-        self, intervals: int, values: dict[str, Any], branch: BranchPoint, near: Solved | None, work: Work
+        self,
+        grid: Grid,
+        values: dict[str, Any],
+        branch: BranchPoint,
+        near: Solved | None,
+        work: Work,
+        tried: Callable[[Goal, Work], Iterator[Attempt]] = attempts,
     ) -> tuple[Solved | None, int, str]:
         """Make the attempts in turn; the first stable solution wins, an unstable one is kept if there is no other.
 
         Of several unstable ones that is the first along a load path, which is where the robot buckles or snaps from;
-        what a guess led to comes after. near : a neighbour, or this pose on a coarser grid, whose like is the answer.
-        Returns the solution, the iterations spent and what to say where there is none.
+        what a guess led to comes after. One on too coarse a grid to be judged is for a finer one to judge.
+        near : a neighbour, or this pose on another grid, whose like is the answer. Returns the solution, the iterations
+        spent and what to say where there is none.
         """
-        grid = self.grid(intervals)
         p = grid.problem.pack(values)
-        refining = near is not None and np.array_equal(near.solution.p, p)
+        refining = near is not None and not near.is_rough and np.array_equal(near.solution.p, p)
 
         def arc(at: Mapping[str, Any]) -> Array:
             return self.arc_guess(grid, grid.problem.pack(at), self._stretch(at))
@@ -215,7 +249,7 @@ class PoseSolver:
         kept: Solved | None = None
         kept_from_path = False
         goal = Goal(grid, values, arc, None if near is None else self._neighbour(near, grid, p, branch.stretch))
-        for attempt in attempts(goal, work):
+        for attempt in tried(goal, work):
             spent += attempt.solution.iterations
             work.spend(grid, attempt.solution.iterations)
             if attempt.fraction < 1.0:
@@ -224,9 +258,9 @@ class PoseSolver:
                 try:
                     solved = self._examine(grid, attempt.solution)
                 except np.linalg.LinAlgError as error:
-                    note = f"; a solution found on {intervals} intervals cannot be judged: {error}"
+                    note = f"; a solution found on {grid.intervals} intervals cannot be judged: {error}"
                     continue
-                if solved.stable or refining:
+                if solved.stable or refining or (solved.is_rough and self.numerics.intervals is None):
                     return solved, spent, ""
                 if kept is None or (attempt.on_path and not kept_from_path):
                     kept, kept_from_path = solved, attempt.on_path
@@ -234,7 +268,7 @@ class PoseSolver:
                 note += "; stopped, since it took too long"
                 break
         if not goal.is_loaded:
-            return kept, spent, f"; {intervals} intervals do not show how far it curls{note}"
+            return kept, spent, f"; {grid.intervals} intervals do not show how far it curls{note}"
         return kept, spent, f"; continuation came {100 * reached:.3g} % of the way{note}"
 
     def column(self, values: Mapping[str, Any]) -> Array:
@@ -261,21 +295,20 @@ class PoseSolver:
         if solved.grid is grid:
             states = solved.solution.x[1:]
         else:
-            states = between_nodes(self.shape, solved.nodes, solved.constants, s)[:STATE_SIZE].T.ravel()
+            states = between_nodes(self.shape, solved.limit, solved.constants, s)[:STATE_SIZE].T.ravel()
         x_old, p_old = solved.solution.x, solved.solution.p
         x = np.concatenate([[x_old[0]], states])
-        moves = self.arc_guess(grid, p, stretch) - self.arc_guess(grid, p_old, x_old[0])
-        return Neighbour(x=x, p=p_old, moved=x + moves, stable=solved.stable)
+        arcs = self.arc_guess(grid, p_old, x_old[0]), self.arc_guess(grid, p, stretch)
+        return Neighbour(x=x, p=p_old, moved=carried(x, *arcs), stable=solved.stable)
 
     def _examine(self, grid: Grid, solution: Solution) -> Solved:
         """Estimate the discretisation error of a solution and test its stability.
 
         Raises `numpy.linalg.LinAlgError` where they are not numbers.
         """
-        correction = discretisation_correction(grid.problem, solution, grid.engine.linear)
-        order = method_named(self.numerics.transcription, 1).order
-        richardson = 2**order / (2**order - 1)
-        tip = correction[-STATE_SIZE:] * richardson
+        richardson = 2**grid.order / (2**grid.order - 1)
+        correction = richardson * discretisation_correction(grid.problem, solution, grid.engine.linear)
+        tip = correction[-STATE_SIZE:]
         nodes = grid.nodes(solution.x)
         constants = grid.constants(solution)
         if not np.all(np.isfinite(tip)):
@@ -284,6 +317,7 @@ class PoseSolver:
             grid=grid,
             solution=solution,
             nodes=nodes,
+            limit=grid.nodes(moved(solution.x, correction)),
             constants=constants,
             error=float(np.linalg.norm(tip[:3])),
             rotation_error=float(np.linalg.norm(tip[3:12]) / np.sqrt(2)),
@@ -300,7 +334,7 @@ class PoseSolver:
         shape = shape_of(between_nodes(self.shape, solved.nodes, solved.constants, s), s, L_0, F_0)
         unloaded_tip = np.asarray(self.functions.arc(solution.p, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
         bending = bending_angle(self.shape, solved.nodes, solved.constants)
-        pose = pose_of(self.model, result, shape, bending, unloaded_tip, solved.stable)
+        pose = pose_of(self.model, result, shape, bending, unloaded_tip, stability(loads, solved.stable))
         warnings = list(pose_warnings(self.model, pose))
         if solved.error > self.numerics.accuracy:
             warnings.append(

@@ -66,6 +66,16 @@ class SectionRadii:
     bore: float
 
 
+STABLE_FLAGS = {"undefined": -1, "unstable": 0, "stable": 1}
+"""What files of numbers hold for `Pose.stable`."""
+STABLE_MEANING = "no conjugate point on the rod; undefined under a dead tip moment and without a solution"
+
+
+def stable_flag(stable: bool | None) -> int:
+    """Return the flag of `Pose.stable`."""
+    return STABLE_FLAGS["undefined"] if stable is None else int(stable)
+
+
 @dataclass(frozen=True, eq=False)
 class Pose:
     """A solved static pose, world frame.
@@ -75,7 +85,7 @@ class Pose:
     stretch
         lambda, of the pressure alone [1].
     stable
-        No conjugate point on the rod.
+        No conjugate point on the rod, so that the energy is least; None under a dead tip moment, which has no energy.
     tip_position
         (3,) [m].
     tip_displacement
@@ -97,7 +107,7 @@ class Pose:
     """
 
     stretch: float
-    stable: bool
+    stable: bool | None
     tip_position: Array
     tip_displacement: Array
     tip_rotation: Array

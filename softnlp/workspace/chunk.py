@@ -16,10 +16,10 @@ from softnlp.studies.blocked import BlockedSolver
 from softnlp.studies.blocked_grid import Blocked
 from softnlp.studies.pose_grid import Solved
 from softnlp.studies.statics import PoseSolver
-from softnlp.studies.step import Step
+from softnlp.studies.step import Step, stable_flag
 from softnlp.workspace.blocked_lane import CLOSURES, BlockedLane, BlockedPoses, wall_of_plan
 from softnlp.workspace.plan import Plan
-from softnlp.workspace.pose_lane import PoseLane, Poses
+from softnlp.workspace.pose_lane import PoseLane, Poses, entries
 from softnlp.workspace.poses import STATUSES, Block, Lane, Rows, unsolved_rows
 
 Array = NDArray[np.float64]
@@ -56,6 +56,8 @@ class ChunkSolver:
             _fill(rows, k, step)
             if step.status is not Status.SOLVED:
                 messages.append((int(numbers[k]), step.message))
+        dead_moment = np.any(columns[entries(self.plan, "tip_moment")] != 0, axis=0)
+        rows["stable"][dead_moment] = stable_flag(None)  # also of those that the lane found
         return Block(chunk, rows, tuple(messages))
 
     def _solve_together(self, lane: PoseLane, rows: Rows, columns: Array, features: Array) -> None:
@@ -152,7 +154,7 @@ def _fill(rows: Rows, k: int, step: Step) -> None:
     pose = step.pose
     if pose is None or not step.status.has_solution:
         return
-    rows["stable"][k] = pose.stable
+    rows["stable"][k] = stable_flag(pose.stable)
     rows["self_intersecting"][k] = pose.fit.self_intersecting
     rows["error"][k] = step.discretisation_error
     for name in ("stretch", "tip_position", "tip_rotation", "bending_angle", "backbone_length", "chamber_length"):

@@ -14,6 +14,7 @@ from softnlp.gravity import gravity_words
 from softnlp.results.dataset import SELF_INTERSECTING_FLAGS
 from softnlp.results.fields import SELF_INTERSECTING
 from softnlp.robot import DIMENSIONS
+from softnlp.studies.step import STABLE_FLAGS, STABLE_MEANING
 from softnlp.units import BAR, DEGREE, MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.workspace.plan import Plan
 from softnlp.workspace.poses import STATUSES, Lane, Rows
@@ -23,7 +24,6 @@ Array = NDArray[Any]
 TEXT = "text"
 _STATUS_NAMES = np.array([status.value for status in STATUSES], dtype=object)
 LONGEST_STATUS = max(len(status.value) for status in STATUSES)
-_STABLE_FLAGS = {"not_solved": -1, "unstable": 0, "stable": 1}
 _DECIMALS = 12
 
 
@@ -95,7 +95,7 @@ _WALL = (
     _number("gap_mm", "mm", "from the wall to the free shape's contact point; negative beyond it", "gap", MILLIMETRE),
 )
 _SOLVE = (
-    _whole("stable", "stable", "i1", "no conjugate point on the rod", **_flags(_STABLE_FLAGS)),
+    _whole("stable", "stable", "i1", STABLE_MEANING, **_flags(STABLE_FLAGS)),
     _whole(
         SELF_INTERSECTING,
         SELF_INTERSECTING,

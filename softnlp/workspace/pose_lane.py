@@ -106,7 +106,7 @@ class PoseLane:
         shot = self._batch.solve(Batch(np.vstack([c, force, moment]), bend), features[numbers])
         residual = np.maximum(shot.residual, np.abs(sections.imbalance))
         numerics = self._plan.numerics
-        good = (residual <= numerics.tolerance) & shot.certain & np.all(c[:5] > 0, axis=0)
+        good = (residual <= numerics.tolerance) & shot.certain
         good &= (shot.refinement_error <= numerics.accuracy) | (numerics.intervals is not None)
         return Poses(numbers[good], some(sections, good), some(shot, good), residual[good])
 

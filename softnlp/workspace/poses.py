@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.status import Status
+from softnlp.studies.step import STABLE_FLAGS
 
 Rows = NDArray[np.void]
 
@@ -27,10 +28,10 @@ class Lane(IntEnum):
 def row_type(chambers: int, *, wall: bool) -> np.dtype[Any]:
     """Return the type of a row; SI units, world frame, NaN where there is no solution.
 
-    pose : number of the pose in the plan. status : position in `STATUSES`. stable : 1, 0, or -1 without a solution.
-    self_intersecting : as stable. lane : `Lane`. error : estimated tip position error over L_0. The rest is as in
-    `softnlp.studies.step.Pose`; with a wall the blocked shape's, blocked_force [N] and gap, of the free shape's contact
-    point to the wall [m].
+    pose : number of the pose in the plan. status : position in `STATUSES`. stable : of `STABLE_FLAGS`.
+    self_intersecting : 1, 0, or -1 without a solution. lane : `Lane`. error : estimated tip position error over L_0.
+    The rest is as in `softnlp.studies.step.Pose`; with a wall the blocked shape's, blocked_force [N] and gap, of the
+    free shape's contact point to the wall [m].
     """
     fields: list[tuple[Any, ...]] = [
         ("pose", "<i8"),
@@ -62,7 +63,7 @@ def unsolved_rows(numbers: NDArray[np.int64], kind: np.dtype[Any]) -> Rows:
             rows[name] = np.nan
     rows["pose"] = numbers
     rows["status"] = STATUSES.index(Status.DIVERGED)
-    rows["stable"] = -1
+    rows["stable"] = STABLE_FLAGS["undefined"]
     rows["self_intersecting"] = -1
     rows["lane"] = Lane.PROBLEM
     return rows

@@ -34,8 +34,8 @@ class Workspace:
     file : where it was read from. material : its name and law. attributes : global ones of the file, tables parsed.
     pressure : (N, sets) [Pa]. status : (N,) positions in `STATUSES`. tip_position : (N, 3) [m].
     tip_axis : (N, 3) third column of the tip's rotation. bending_angle : (N,) [rad].
-    stable, self_intersecting : (N,) 1, 0, or -1 without a solution. residual : (N,), known of failed poses too.
-    time : (N,) [s] or None.
+        stable : (N,) of `softnlp.studies.step.STABLE_FLAGS`. self_intersecting : (N,) 1, 0, or -1 without a solution.
+    residual : (N,), known of failed poses too. time : (N,) [s] or None.
     """
 
     file: Path

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softnlp.status import Status
+from softnlp.studies.step import STABLE_FLAGS
 from softnlp.workspace.boundary import Boundary, Reach, alpha_shape, convex_hull, reach
 from softnlp.workspace.dexterity import Dexterity, dexterity
 from softnlp.workspace.read import Workspace
@@ -16,14 +17,17 @@ _SPAN = 1e-9  # of the largest pressure: a column that varies less does not vary
 
 @dataclass(frozen=True, eq=False)
 class Summary:
-    """A sweep in numbers. failed : poses of each status without a solution. worst_residual : of the solved poses.
+    """A sweep in numbers.
 
-    dexterity : None where no pose has a solution. parameters : how many independent pressures the poses vary.
+    unstable, undefined : solved poses that are not stable, and whose stability is undefined. failed : poses of each
+    status without a solution. worst_residual : of the solved poses. dexterity : None where no pose has a solution.
+    parameters : how many independent pressures the poses vary.
     """
 
     poses: int
     solved: int
     unstable: int
+    undefined: int
     self_intersecting: int
     failed: dict[Status, int]
     parameters: int
@@ -49,7 +53,8 @@ def summarise(workspace: Workspace, *, radius: float | None = None, voxel: float
     return Summary(
         poses=workspace.poses,
         solved=len(tips),
-        unstable=int(np.count_nonzero(workspace.stable == 0)),
+        unstable=int(np.count_nonzero(workspace.stable[solved] == STABLE_FLAGS["unstable"])),
+        undefined=int(np.count_nonzero(workspace.stable[solved] == STABLE_FLAGS["undefined"])),
         self_intersecting=int(np.count_nonzero(workspace.self_intersecting == 1)),
         failed={s: n for s in Status if not s.has_solution and (n := workspace.count(s))},
         parameters=count,

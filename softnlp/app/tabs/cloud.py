@@ -202,6 +202,8 @@ def lines(swept: Swept) -> list[Line]:
         return found
     if summary.unstable:
         found.append(Line("Not stable", str(summary.unstable), ""))
+    if summary.undefined:
+        found.append(Line("Stability undefined", str(summary.undefined), ""))
     if summary.self_intersecting:
         found.append(Line("Pass through themselves", str(summary.self_intersecting), ""))
     reach, boundary, hull = summary.reach, summary.boundary, summary.hull
