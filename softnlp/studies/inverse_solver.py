@@ -122,8 +122,7 @@ class InverseSolver:
             step = rejected or Step(self.task.lower, Status.DIVERGED, Status.DIVERGED.advice)
             return replace(step, aimed=aim.aimed(None), solve_time=time.perf_counter() - began), None
         warnings = [*best.step.warnings, *self._jumped(best, chosen, near)]
-        met = self._meets(aim, best)
-        aimed = best.aimed
+        met, aimed = self._meets(aim, best), best.aimed
         if self._redundant(aim) or not met:
             left = self._left(aim, best, meets=met)
             aimed = replace(best.aimed, optimal=left <= OPTIMAL)
@@ -131,8 +130,7 @@ class InverseSolver:
                 warnings.append(not_optimal(left, "the search of pressures"))
         step = replace(best.step, aimed=aimed, warnings=tuple(warnings), solve_time=time.perf_counter() - began)
         if not met:
-            message = self._out_of_reach(aim, best, rejected)
-            step = replace(step, status=Status.OUT_OF_REACH, message=message)
+            step = replace(step, status=Status.OUT_OF_REACH, message=self._out_of_reach(aim, best, rejected))
         return step, best
 
     def forget_table(self) -> None:
