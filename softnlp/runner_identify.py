@@ -34,7 +34,7 @@ def run_robots(scenario: Scenario, progress: Progress | None = None) -> Identifi
     """
     task = scenario.task
     assert isinstance(task, RobotTask)
-    return identify(
+    found = identify(
         task.measurements,
         scenario.material,
         task.free,
@@ -46,6 +46,7 @@ def run_robots(scenario: Scenario, progress: Progress | None = None) -> Identifi
         numerics=scenario.numerics,
         progress=progress,
     )
+    return replace(found, warnings=(*task.notes, *found.warnings))
 
 
 def run_tensile(scenario: Scenario) -> TensileFit:

@@ -1,20 +1,22 @@
 """The tables of a scenario file, in the units of the file.
 
-Every key that a scenario may hold is a field here, so the file format can be read off this module. `scenario_check`
-words what does not fit; what needs more than one key, or another file, is checked in `scenario` and `pressures`.
+Every key that a scenario may hold is a field here, so the file format can be read off this module. `ranges` has the
+range of each number; `scenario_check` words what does not fit; what needs more than one key, or another file, is
+checked in `scenario` and `pressures`.
 """
 
 from __future__ import annotations
 
 from math import hypot
 from typing import Annotated, Any, Literal
+from unicodedata import category
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator
 from pydantic_core import PydanticCustomError
 
 from softnlp.gravity import DIRECTIONS, unknown_direction
 from softnlp.numerics import Numerics
-from softnlp.reading import choices, shown
+from softnlp.reading import BACKSLASH_HINT, as_typed, choices, shown
 from softnlp.robot import MINIMUM_WALL
 from softnlp.units import MILLIMETRE
 
@@ -67,6 +69,14 @@ def _intervals(value: Any) -> int | None:
     return value
 
 
+def _file_name(value: str) -> str:
+    r"""Refuse control characters, which are escapes that nobody meant: in TOML "data\table.csv" holds a tab."""
+    if controls := [c for c in value if category(c) == "Cc"]:
+        escape = as_typed(controls[0])
+        raise wrong(f"expected a path, got '{as_typed(value)}', where {escape} is one character: {BACKSLASH_HINT}")
+    return value
+
+
 def _label(value: str) -> str:
     """Put a name or a title on one line; control characters would reach a terminal or a figure."""
     label = " ".join(value.split())
@@ -77,13 +87,12 @@ def _label(value: str) -> str:
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
-Fraction = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=1)]
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Direction = Annotated[tuple[float, float, float], PlainValidator(_direction)]
 Normal = Annotated[tuple[float, float, float], PlainValidator(_normal)]
 Label = Annotated[str, Field(max_length=LONGEST_LABEL), AfterValidator(_label)]
-FileName = Annotated[str, Field(max_length=LONGEST_FILE_NAME)]
+FileName = Annotated[str, Field(max_length=LONGEST_FILE_NAME), AfterValidator(_file_name)]
 
 
 class Table(BaseModel):
@@ -137,7 +146,7 @@ class CorrectionsTable(Table):
 
     area: Positive | None = None
     inertia: Positive | None = None
-    bore_fraction: Fraction | None = None
+    bore_fraction: NotNegative | None = None
     conventions: Literal["reproduction", "as_printed"] = "reproduction"
 
 
@@ -166,7 +175,7 @@ class RampTable(Table):
 class PressureTable(Table):
     """[pressure]: exactly one of its keys."""
 
-    sequence_bar: Annotated[list[list[NotNegative]], Field(min_length=1)] | None = None
+    sequence_bar: Annotated[list[list[float]], Field(min_length=1)] | None = None
     ramp: RampTable | None = None
     file: FileName | None = None
 
@@ -203,9 +212,9 @@ class SolverTable(Table):
     """[solver]."""
 
     intervals: Annotated[int | None, PlainValidator(_intervals)] = Numerics.intervals
-    accuracy: Annotated[float, Field(gt=0, le=1e-2)] = Numerics.accuracy
+    accuracy: Positive = Numerics.accuracy
     transcription: Literal["multiple-shooting", "collocation"] = Numerics.transcription
-    tolerance: Annotated[float, Field(gt=0, le=1e-4)] = Numerics.tolerance
+    tolerance: Positive = Numerics.tolerance
 
 
 class ScenarioFile(Table):

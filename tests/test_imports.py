@@ -18,7 +18,8 @@ PACKAGE = Path(softnlp.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
 # A module imports only what stands above it; the modules of MIXED may import each other within their package.
 LAYERS = (
-    *("errors", "status", "units", "conventions", "numerics", "reading", "gravity", "contact_settings", "processes"),
+    *("errors", "status", "units", "conventions", "numerics", "reading", "ranges", "gravity"),
+    *("contact_settings", "processes"),
     *("formula", "laws", "material_reading", "materials", "rules", "robot", "section", "rod", "tip", "transcription"),
     *(
         "quantities",
