@@ -50,7 +50,16 @@ from softnlp.status import Status
 from softnlp.studies.step import Run, WeightSensitivity
 
 STEP_KEYS = {
-    *("pressure_bar", "status", "message", "stretch", "stable", "tip_position_mm", "tip_displacement_mm"),
+    *(
+        "pressure_bar",
+        "status",
+        "message",
+        "stretch",
+        "stable",
+        "self_intersecting",
+        "tip_position_mm",
+        "tip_displacement_mm",
+    ),
     *("tip_rotation", "bending_angle_deg", "tilt_deg", "backbone_length_mm", "chamber_length_mm", "residual"),
     *("discretisation_error", "intervals", "iterations", "solve_time_s", "warnings", "certificate"),
 }
@@ -262,7 +271,9 @@ def test_table_has_a_row_a_step_and_units_in_its_header(mixed: Run) -> None:
     rows = list(csv.DictReader(io.StringIO(table_text(mixed))))
     assert [row["step"] for row in rows] == [str(k) for k in range(1, 12)]
     for column in rows[0]:
-        counted = re.fullmatch(r"step|status|message|warnings|stretch|stable|intervals|iterations|residual", column)
+        counted = re.fullmatch(
+            r"step|status|message|warnings|stretch|stable|self_intersecting|intervals|iterations|residual", column
+        )
         assert counted or re.search(r"_(mm|bar|deg|s|error|[xyz]{2})$", column), column
     assert {row["t_s"] for row in rows} == {str(0.5 * k) for k in range(11)}
     assert [float(row["p1_bar"]) for row in rows] == pytest.approx(np.linspace(0, 1.5, 11))
