@@ -60,7 +60,16 @@ from softnlp.status import Status
 from softnlp.studies.step import Run, WeightSensitivity
 
 STEP_KEYS = {
-    *("pressure_bar", "status", "message", "stretch", "stable", "tip_position_mm", "tip_displacement_mm"),
+    *(
+        "pressure_bar",
+        "status",
+        "message",
+        "stretch",
+        "stable",
+        "self_intersecting",
+        "tip_position_mm",
+        "tip_displacement_mm",
+    ),
     *("tip_rotation", "bending_angle_deg", "tilt_deg", "backbone_length_mm", "chamber_length_mm", "residual"),
     *("discretisation_error", "intervals", "iterations", "solve_time_s", "warnings", "certificate"),
     "self_intersecting",

@@ -348,7 +348,9 @@ def test_poses_that_refinement_does_not_bring_to_the_target_keep_their_error(mon
         if n == 3:
             asked.append(int(grids.max()))
         known = np.zeros(n, np.int64)
-        return Shot(guess, np.zeros((18, n)), np.zeros((8, n)), np.zeros(n), error, error, known > 0, grids, known)
+        return Shot(
+            guess, np.zeros((18, n)), np.zeros((8, n)), np.zeros(n), np.zeros(n), error, error, known > 0, grids, known
+        )
 
     monkeypatch.setattr(BatchSolver, "_shoot", shoot)
     shot = solver.solve(Batch(np.zeros((20, 3)), np.full(3, 0.1)), np.arange(3.0)[:, None])
@@ -372,7 +374,7 @@ def test_blocked_poses_that_refinement_does_not_bring_to_the_target_keep_their_e
     ) -> BlockedShot:
         n, error = grids.size, 2e-2 / grids
         asked.append(int(grids[0]))
-        fields = [np.zeros((2, n)), np.zeros(n), np.ones(n), error, error, grids, np.zeros(n, np.int64)]
+        fields = [np.zeros((2, n)), np.zeros(n), np.zeros(n), np.ones(n), error, error, grids, np.zeros(n, np.int64)]
         return BlockedShot(guess, np.zeros((21, n)), *fields)  # type: ignore[arg-type]
 
     monkeypatch.setattr(ContactBatch, "_shoot", shoot)
@@ -402,7 +404,7 @@ def test_blocked_poses_that_are_lost_are_not_followed_further(monkeypatch: pytes
     ) -> BlockedShot:
         n, nothing = grids.size, np.zeros(grids.size)
         residual = np.where([len(followed) == 1] * n, np.inf, 0.0)
-        fields = [np.zeros((2, n)), residual, np.ones(n), nothing, nothing, grids, np.ones(n, np.int64)]
+        fields = [np.zeros((2, n)), nothing, residual, np.ones(n), nothing, nothing, grids, np.ones(n, np.int64)]
         return BlockedShot(guess, np.zeros((21, n)), *fields)  # type: ignore[arg-type]
 
     monkeypatch.setattr(ContactBatch, "_shoot", shoot)

@@ -327,7 +327,7 @@ def check_task(task: DesignTask, setting: Setting) -> None:
         raise InputError(f"expected different sets of 0 to {fewest - 1}, got {list(task.sets)}", key="sets")
     for rule in task.allow:
         if rule not in ALLOWABLE:
-            raise InputError(f"expected names of {', '.join(ALLOWABLE)}, got {rule!r}", key="allow")
+            raise InputError(f"expected rules of {', '.join(ALLOWABLE)}, got {rule!r}", key="allow")
     for key, value in (("starts", task.starts), ("trials", task.trials)):
         if value is not None and value < 1:
             raise InputError(f"expected a number of at least 1, got {value}", key=key)
