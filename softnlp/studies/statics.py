@@ -46,7 +46,7 @@ _TURN = 0.25  # largest angle [rad] of the unloaded arc within one RK4 interval 
 _SEARCHED_BY = "multiple-shooting"
 _DEARER = 3  # an iteration on a neighbour's grid than on a coarse one, where the neighbour's is still tried first
 _FINER = 4  # how much finer a grid is tried where a coarse one finds no solution
-_MOST_WORK = 8_000  # Runge-Kutta intervals of Newton iterations to find one pose, which is some 0.6 seconds
+_MOST_WORK = 9_000  # Runge-Kutta intervals of Newton iterations to find one pose, which is some 0.7 seconds
 _OVERHEAD, _COLLOCATION_COST = 15, 15  # time of an iteration: beside its intervals, and of a collocation interval
 # Without loads the exact answer is a circular arc; a solution is good enough to show it.
 UNLOADED_ACCURACY = 5e-9
@@ -193,7 +193,7 @@ class PoseSolver:
         first = FIRST_INTERVALS[name]
         straight = np.asarray(self.functions.arc(column, stretch, 0.01)).ravel()
         curl = 100 * float(np.hypot(straight[9], straight[10]))  # of the axis, R e3, over the first hundredth
-        curl = max(curl, self._turn_of_moment(column, stretch))
+        curl = max(curl, self._turn_of_moment(column, stretch) / 2)  # half as finely: it is not there at first
         turn = _TURN * FIRST_INTERVALS["multiple-shooting"] / first
         wanted = max(first, curl / turn)
         if arc_target is not None and name == "multiple-shooting":
@@ -230,7 +230,7 @@ class PoseSolver:
         branch: BranchPoint,
         near: Solved | None,
         work: Work,
-        tried: Callable[[Goal, Work], Iterator[Attempt]] = attempts,
+        tried: Callable[[Goal, Work], Iterator[Attempt]] | None = None,
     ) -> tuple[Solved | None, int, str]:
         """Make the attempts in turn; the first stable solution wins, an unstable one is kept if there is no other.
 
@@ -249,7 +249,7 @@ class PoseSolver:
         kept: Solved | None = None
         kept_from_path = False
         goal = Goal(grid, values, arc, None if near is None else self._neighbour(near, grid, p, branch.stretch))
-        for attempt in tried(goal, work):
+        for attempt in (tried or attempts)(goal, work):
             spent += attempt.solution.iterations
             work.spend(grid, attempt.solution.iterations)
             if attempt.fraction < 1.0:
