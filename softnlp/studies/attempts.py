@@ -32,20 +32,20 @@ class Work:
     """What the attempts at one pose may still cost, over all its grids; in intervals of one iteration (see `Grid`)."""
 
     def __init__(self, most: float) -> None:
-        self._left = most
+        self.left = most
 
     @property
     def used_up(self) -> bool:
         """Whether nothing is left."""
-        return self._left <= 0
+        return self.left <= 0
 
     def iterations_left(self, grid: Grid) -> int:
         """Return how many iterations on a grid that is."""
-        return max(int(self._left / grid.iteration_cost), 0)
+        return max(int(self.left / grid.iteration_cost), 0)
 
     def spend(self, grid: Grid, iterations: int) -> None:
         """Take off iterations on a grid; every attempt costs at least one."""
-        self._left -= max(iterations, 1) * grid.iteration_cost
+        self.left -= max(iterations, 1) * grid.iteration_cost
 
 
 @dataclass(frozen=True, eq=False)
