@@ -32,20 +32,20 @@ class Work:
     """What the attempts at one pose may still cost, over all its grids; in intervals of one iteration (see `Grid`)."""
 
     def __init__(self, most: float) -> None:
-        self._left = most
+        self.left = most
 
     @property
     def used_up(self) -> bool:
         """Whether nothing is left."""
-        return self._left <= 0
+        return self.left <= 0
 
     def iterations_left(self, grid: Grid) -> int:
         """Return how many iterations on a grid that is."""
-        return max(int(self._left / grid.iteration_cost), 0)
+        return max(int(self.left / grid.iteration_cost), 0)
 
     def spend(self, grid: Grid, iterations: int) -> None:
         """Take off iterations on a grid; every attempt costs at least one."""
-        self._left -= max(iterations, 1) * grid.iteration_cost
+        self.left -= max(iterations, 1) * grid.iteration_cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +136,8 @@ def _along_from_near(grid: Grid, near: Neighbour, p: Array, work: Work) -> Attem
     def path(t: float) -> Array:
         return p if t >= 1.0 else near.p + t * (p - near.p)
 
-    most = work.iterations_left(grid) // 3  # the other attempts shall have their turn
-    followed = _follow(grid, path, near.x, most, first_step=0.5)
+    most = work.iterations_left(grid) // 4  # the other attempts shall have their turn
+    followed = _follow(grid, path, near.x, most, (0.5, 1 / 64))
     spent = followed.iterations
     if not followed.arrived:
         return Attempt(replace(followed.solution, iterations=spent), followed.fraction)
@@ -172,17 +172,20 @@ def _along(goal: Goal, waypoints: list[Values], work: Work) -> Iterator[Attempt]
     yield Attempt(replace(final, iterations=spent + final.iterations), on_path=True)
 
 
-def _follow(grid: Grid, path: Path, start: Array, most: int, first_step: float = 0.125) -> Followed:
-    """Follow a solution along a path within a number of iterations."""
+def _follow(
+    grid: Grid, path: Path, start: Array, most: int, steps: tuple[float, float] = (1 / 8, 1 / 1024)
+) -> Followed:
+    """Follow a solution along a path within a number of iterations. steps : the first and the smallest."""
     return follow(
         grid.stepper,
         path,
         start,
         distance=pose_distance,
         most_iterations=most,
-        first_step=first_step,
         moved=moved,
         change=change,
+        first_step=steps[0],
+        smallest_step=steps[1],
     )
 
 

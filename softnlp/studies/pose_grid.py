@@ -24,7 +24,7 @@ class Grid:
 
     engine : Newton's method to full tolerance. stepper : the same, loosely, for points of a path. reference : IPOPT.
     order : of the transcription's error at the nodes.
-    iteration_cost : time of one Newton iteration, in units of one interval of Runge-Kutta (some 0.04 ms).
+    iteration_cost : time of one Newton iteration, in units of one interval of Runge-Kutta (some 0.07 ms).
     """
 
     case: LoadCase

@@ -46,8 +46,10 @@ _TURN = 0.25  # largest angle [rad] of the unloaded arc within one RK4 interval 
 _SEARCHED_BY = "multiple-shooting"
 _DEARER = 3  # an iteration on a neighbour's grid than on a coarse one, where the neighbour's is still tried first
 _FINER = 4  # how much finer a grid is tried where a coarse one finds no solution
-_MOST_WORK = 8_000  # Runge-Kutta intervals of Newton iterations to find one pose, which is some 0.6 seconds
-_OVERHEAD, _COLLOCATION_COST = 15, 15  # time of an iteration: beside its intervals, and of a collocation interval
+# Work is counted in Runge-Kutta intervals of Newton iterations, some 0.07 ms each.
+_MOST_WORK, _KEPT_TO_SHOW = 9_000, 3_000  # to find one pose, and then to solve it on the grid that its accuracy needs
+_TO_SHOW = 4  # iterations on that grid, the error and stability counted
+_OVERHEAD, _COST = 15, {"multiple-shooting": 1, "collocation": 25}  # of an iteration: beside its intervals, and of one
 # Without loads the exact answer is a circular arc; a solution is good enough to show it.
 UNLOADED_ACCURACY = 5e-9
 
@@ -86,11 +88,9 @@ class PoseSolver:
             method = method_named(name, intervals)
             case = load_case("pose", self.functions, self.quantities, method)
             problem = compile_problem(list(self.quantities.values()), [case])
-            linear: LinearSolver
+            linear: LinearSolver = SparseSolver(problem)
             if isinstance(method, MultipleShooting):
-                linear, cost = CondensedSolver(self.functions, method), 1
-            else:
-                linear, cost = SparseSolver(problem), _COLLOCATION_COST
+                linear = CondensedSolver(self.functions, method)
             self._grids[name, intervals] = Grid(
                 case=case,
                 engine=Engine(problem, linear=linear, newton_only=True, moved=moved),
@@ -98,7 +98,7 @@ class PoseSolver:
                 reference=Engine(problem),
                 transition=self._transition.map(min(intervals, CONJUGATE_INTERVALS)),
                 order=method.order,
-                iteration_cost=_OVERHEAD + cost * intervals,
+                iteration_cost=_iteration_cost(intervals, name),
             )
         return self._grids[name, intervals]
 
@@ -132,20 +132,26 @@ class PoseSolver:
 
         target = self.target_accuracy(loads)
         loaded = any(np.any(values[name]) for name in LOADS)
-        first = self.numerics.intervals or self.first_intervals(column, branch.stretch, None if loaded else target)
+        given = self.numerics.intervals
+        first = given or self.first_intervals(column, branch.stretch, None if loaded else target)
         work = Work(_MOST_WORK)
         found, iterations, how_far = self._searched(values, branch, warm, work, first, loaded)
         most = self.most_intervals
         while found is not None:
-            chosen = found.grid is self.grid(found.intervals) and found.intervals >= (self.numerics.intervals or 0)
+            own = self._grids.get((self.numerics.transcription, found.intervals)) is found.grid
+            chosen = own and found.intervals >= (given or 0)
             wanted = self.next_intervals(found.refinement_error, found.intervals, target) if chosen else first
             if wanted is None or (found.intervals >= most and found.refinement_error <= self.numerics.accuracy):
                 return self._finished(pressure, loads, found, iterations, began), found
-            if chosen and found.intervals >= most:
+            wanted = min(wanted, most)
+            cost = _iteration_cost(wanted, self.numerics.transcription)
+            dear = given is None and _TO_SHOW * cost > work.left + _KEPT_TO_SHOW
+            if dear or (chosen and found.intervals >= most):
                 status, residual = Status.INACCURATE, found.solution.residual
                 how_far = f"; with {found.intervals} intervals it is {found.refinement_error:.2g} L_0"
+                how_far += f", and {wanted} would take too long" if dear else ""
                 break
-            found, spent, how_far = self._solve_on(self.grid(min(wanted, most)), values, branch, found, work)
+            found, spent, how_far = self._solve_on(self.grid(wanted), values, branch, found, work)
             iterations += spent
         else:
             status, residual = Status.DIVERGED, None
@@ -193,7 +199,7 @@ class PoseSolver:
         first = FIRST_INTERVALS[name]
         straight = np.asarray(self.functions.arc(column, stretch, 0.01)).ravel()
         curl = 100 * float(np.hypot(straight[9], straight[10]))  # of the axis, R e3, over the first hundredth
-        curl = max(curl, self._turn_of_moment(column, stretch))
+        curl = max(curl, self._turn_of_moment(column, stretch) / 2)  # half as finely: it is not there at first
         turn = _TURN * FIRST_INTERVALS["multiple-shooting"] / first
         wanted = max(first, curl / turn)
         if arc_target is not None and name == "multiple-shooting":
@@ -230,7 +236,7 @@ class PoseSolver:
         branch: BranchPoint,
         near: Solved | None,
         work: Work,
-        tried: Callable[[Goal, Work], Iterator[Attempt]] = attempts,
+        tried: Callable[[Goal, Work], Iterator[Attempt]] | None = None,
     ) -> tuple[Solved | None, int, str]:
         """Make the attempts in turn; the first stable solution wins, an unstable one is kept if there is no other.
 
@@ -249,7 +255,7 @@ class PoseSolver:
         kept: Solved | None = None
         kept_from_path = False
         goal = Goal(grid, values, arc, None if near is None else self._neighbour(near, grid, p, branch.stretch))
-        for attempt in tried(goal, work):
+        for attempt in (tried or attempts)(goal, work):
             spent += attempt.solution.iterations
             work.spend(grid, attempt.solution.iterations)
             if attempt.fraction < 1.0:
@@ -354,3 +360,8 @@ class PoseSolver:
             solve_time=time.perf_counter() - began,
             warnings=tuple(warnings),
         )
+
+
+def _iteration_cost(intervals: int, transcription: str) -> int:
+    """Return the time of a Newton iteration on a grid, see `Grid`."""
+    return _OVERHEAD + _COST[transcription] * intervals
