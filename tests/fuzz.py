@@ -107,10 +107,14 @@ def _cut(tables: Tables) -> None:
         tables["measurements"]["free"] = tables["measurements"]["free"][:2]
     if workspace and "contact" in tables:
         del workspace["vary"]
+        workspace["to_bar"] = 0.5
     if "objective" in tables:
         tables["objective"] |= {"trials": 3, "starts": 1}
+        tables["requirements"].pop("blocked_force_N", None)
         for choices in tables["choices"].values():
             choices.update({key: value[:1] for key, value in choices.items() if isinstance(value, list)})
+            for key in [key for key, value in choices.items() if isinstance(value, dict)][2:]:
+                del choices[key]
 
 
 def as_toml(tables: Tables) -> str:

@@ -1,4 +1,4 @@
-"""Physical ranges: each number of a file and of a function is within its own, and noise of a regulator is no pressure."""
+"""Each number of a file and of a function is in its physical range, and the noise of a regulator is no pressure."""
 
 from __future__ import annotations
 
@@ -61,36 +61,39 @@ BLOCKED = scenario(top='study = "blocked-force"\n', more="[contact]\n")
 @pytest.mark.parametrize(
     ("text", "place"),
     [
-        (scenario(material=MATERIAL + "density_kg_m3 = {}\n"), "[material] density_kg_m3"),
-        (scenario(robot=ROBOT + "length_mm = {}\n"), "[robot] length_mm"),
-        (scenario(pressure="[pressure]\nsequence_bar = [[0, 0, {}]]\n"), "[pressure] sequence_bar: row 1 column 3"),
-        (scenario(pressure="[pressure]\nramp = {{ sets = [1], steps = 2, to_bar = {} }}\n"), "[pressure] ramp.to_bar"),
-        (BLOCKED + "offset_mm = {}\n", "[contact] offset_mm"),
-        (BLOCKED + "offsets_mm = [0, {}]\n", "[contact] offsets_mm: item 2"),
-        (BLOCKED + "tip_cap_mm = {}\n", "[contact] tip_cap_mm"),
-        (BLOCKED + "target_force_N = {}\n", "[contact] target_force_N"),
-        (BLOCKED + "wall_normal = [1, 0, 0]\nwall_point_mm = [0, {}, 0]\n", "[contact] wall_point_mm: item 2"),
-        (BLOCKED + "chamber_reaction = {}\n", "[contact] chamber_reaction"),
-        (BLOCKED + "closure = 'weighted'\nweight_force_per_N = {}\n", "[contact] weight_force_per_N"),
-        (f"study = 'inverse'\n{ROBOT}{MATERIAL}[target]\ntip_position_mm = [[0, 0, {{}}]]\n", "[target]"),
-        (f"study = 'workspace'\n{ROBOT}{MATERIAL}[workspace]\nlevels = 2\nto_bar = {{}}\n", "[workspace] to_bar"),
+        (scenario(material=MATERIAL + "density_kg_m3 = NUMBER\n"), "[material] density_kg_m3"),
+        (scenario(robot=ROBOT + "length_mm = NUMBER\n"), "[robot] length_mm"),
+        (scenario(pressure="[pressure]\nsequence_bar = [[0, 0, NUMBER]]\n"), "[pressure] sequence_bar: row 1 column 3"),
         (
-            f"study = 'design'\n{ROBOT}{MATERIAL}[choices.robot]\nlength_mm = {{{{ from = 1, to = {{}} }}}}\n"
+            scenario(pressure="[pressure]\nramp = { sets = [1], steps = 2, to_bar = NUMBER }\n"),
+            "[pressure] ramp.to_bar",
+        ),
+        (BLOCKED + "offset_mm = NUMBER\n", "[contact] offset_mm"),
+        (BLOCKED + "offsets_mm = [0, NUMBER]\n", "[contact] offsets_mm: item 2"),
+        (BLOCKED + "tip_cap_mm = NUMBER\n", "[contact] tip_cap_mm"),
+        (BLOCKED + "target_force_N = NUMBER\n", "[contact] target_force_N"),
+        (BLOCKED + "wall_normal = [1, 0, 0]\nwall_point_mm = [0, NUMBER, 0]\n", "[contact] wall_point_mm: item 2"),
+        (BLOCKED + "chamber_reaction = NUMBER\n", "[contact] chamber_reaction"),
+        (BLOCKED + "closure = 'weighted'\nweight_force_per_N = NUMBER\n", "[contact] weight_force_per_N"),
+        (f"study = 'inverse'\n{ROBOT}{MATERIAL}[target]\ntip_position_mm = [[0, 0, NUMBER]]\n", "[target]"),
+        (f"study = 'workspace'\n{ROBOT}{MATERIAL}[workspace]\nlevels = 2\nto_bar = NUMBER\n", "[workspace] to_bar"),
+        (
+            f"study = 'design'\n{ROBOT}{MATERIAL}[choices.robot]\nlength_mm = {{ from = 1, to = NUMBER }}\n"
             "[actuation]\npressure_bar = 1\n[objective]\nmaximise = 'stretch'\n",
             "[choices] robot.length_mm.to",
         ),
         (
             f"study = 'design'\n{ROBOT}{MATERIAL}[choices.robot]\nlength_mm = [50, 60]\n[actuation]\npressure_bar = 1\n"
-            "[objective]\nmaximise = 'stretch'\n[requirements]\nblocked_force_N = {{ at_least = {} }}\n",
+            "[objective]\nmaximise = 'stretch'\n[requirements]\nblocked_force_N = { at_least = NUMBER }\n",
             "[requirements] blocked_force_N.at_least",
         ),
         (
-            "study = 'identify'\n[tensile]\nfile = 'none.csv'\nwidth_mm = {}\n",
+            "study = 'identify'\n[tensile]\nfile = 'none.csv'\nwidth_mm = NUMBER\n",
             "[tensile] width_mm",
         ),
         (
             f"study = 'identify'\n{MATERIAL}{ROBOT}[measurements]\nfile = 'none.csv'\nfree = ['k_b']\n"
-            "[sigma]\ntip_position_mm = {}\n",
+            "[sigma]\ntip_position_mm = NUMBER\n",
             "[sigma] tip_position_mm",
         ),
     ],
@@ -98,7 +101,7 @@ BLOCKED = scenario(top='study = "blocked-force"\n', more="[contact]\n")
 )
 def test_absurd_numbers_everywhere(text: str, place: str) -> None:
     with pytest.raises(InputError) as caught:
-        scenario_from_text(text.format("1e300"), "f")
+        scenario_from_text(text.replace("NUMBER", "1e300"), "f")
     assert str(caught.value).startswith(f"f: {place}")
     assert "expected at least" in str(caught.value)
     assert "got 1e+300" in str(caught.value)
@@ -123,12 +126,12 @@ def test_the_python_interface_has_the_same_ranges(key: str, call: Callable[[], A
     assert caught.value.key == key
 
 
-def test_the_largest_loads_are_accepted_and_end_without_a_word_of_python(
+def test_a_load_that_bends_the_tip_over_ends_without_a_word_of_python(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     one = "[pressure]\nsequence_bar = [[0.5, 0, 0]]\n"
-    Path("s.toml").write_text(scenario(pressure=one, more="[tip_load]\nforce_N = [1e4, 0, 0]\n"))
+    Path("s.toml").write_text(scenario(pressure=one, more="[tip_load]\nforce_N = [10, 0, 0]\n"))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert main(["run", "s.toml", "--json"]) in (0, 3)
@@ -166,9 +169,8 @@ def test_noise_in_the_pressures_of_a_study(study: str, source: str, tmp_path: Pa
     text = scenario(top=f"study = {study!r}\n", pressure=f"[pressure]\n{rows}")
     found = scenario_from_text(text, tmp_path / "s.toml")
     np.testing.assert_array_equal(found.pressures, [[0, 0, 0], [0.5 * BAR, 0, 0]])
-    assert [w for w in found.warnings if "2 pressure readings below 0, the lowest -0.003 bar" in w] == list(
-        found.warnings
-    )
+    assert len(found.warnings) == 1
+    assert "2 pressure readings below 0, the lowest -0.003 bar" in found.warnings[0]
     (tmp_path / "p.csv").write_text(f"{HEADER}\n-0.051,0,0\n")
     with pytest.raises(InputError, match=r"at least 0 .*, got -0.051 bar; readings down to -0.05 bar count as 0"):
         scenario_from_text(text.replace("-0.003", "-0.051"), tmp_path / "s.toml")
