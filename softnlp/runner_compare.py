@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from softnlp.columns import Columns, read_columns
 from softnlp.contact_settings import CLOSURES, ContactSettings, ContactTask
 from softnlp.conventions import CONVENTIONS, Coefficients, Conventions
-from softnlp.errors import InputError, nearest
+from softnlp.errors import InputError, listed, nearest
 from softnlp.evaluation.compare import SHAPES, compare
 from softnlp.evaluation.comparison import Comparison
 from softnlp.evaluation.variants import NAMED, OWN, Variant, every_variant, named_coefficients
@@ -112,7 +112,7 @@ def _task(scenario: Scenario, path: str | PathLike[str], asked: Asked) -> Compar
         why = f" ({notes[0]})" if notes else ""
         raise InputError(
             f"expected a column that study {scenario.study!r} can be compared with, of {known}; it has "
-            f"{', '.join(columns.header)}{why}",
+            f"{listed(columns.header)}{why}",
             source=columns.file,
         )
     rows, measurements = _measured(scenario, columns)
