@@ -159,7 +159,7 @@ def report(outcomes: Sequence[Outcome]) -> str:
             f"intervals {min(o.intervals or 0 for o in successes)} to {max(o.intervals or 0 for o in successes)}"
         )
     lines += [f"not solved: {o.status} {o.error} after {o.seconds:.2f} s, {o.case}" for o in outcomes if not o.success]
-    lines += [f"not stable: {o.case}" for o in successes if not o.stable]
+    lines += [f"not stable: {o.case}" for o in successes if o.stable is False]
     slow = sorted(outcomes, key=lambda o: -o.seconds)[:3]
     return "\n".join([*lines, *(f"slowest: {o.seconds:.2f} s, {o.case}" for o in slow)])
 

@@ -111,7 +111,13 @@ def test_loads_coefficients_and_solver_reach_the_file(tab: Watched, tmp_path: Pa
     tab.type("solver-tolerance", "1e-9")
     assert_same_as_the_command(tab, tmp_path)
     text = tab.saved(tmp_path).read_text()
-    for line in ('direction = "hanging"', "force_N = [0.08, 0.0, 0.0]", "bending = 1.9", "area = 0.98", "intervals = 12"):
+    for line in (
+        'direction = "hanging"',
+        "force_N = [0.08, 0.0, 0.0]",
+        "bending = 1.9",
+        "area = 0.98",
+        "intervals = 12",
+    ):
         assert line in text
     assert "tip_displacement_mm.0" in tab.numbers()
     tab.press("coefficients-back")

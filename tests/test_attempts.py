@@ -61,12 +61,12 @@ def test_every_attempt_leads_to_the_same_pose(near: np.ndarray | None, count: in
     assert sum(attempt.on_path for attempt in made) == (6 if count == 10 else 5)
 
 
-def test_the_reference_has_no_turn_where_the_work_left_is_less_than_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_reference_is_tried_where_there_is_work_left_for_it() -> None:
     goal = goal_of(PRESSURE, MILD)
     by_ipopt = list(attempts(goal, Work(1e9)))[-1].solution.engine_status
     assert by_ipopt == "Solve_Succeeded"
-    monkeypatch.setattr(ladder, "_REFERENCE", 10**12)
-    assert all("Newton" in a.solution.engine_status for a in attempts(goal, Work(1e9)))
+    too_little = Work(0.99 * ladder._REFERENCE * GRID.iteration_cost)
+    assert all("Newton" in a.solution.engine_status for a in attempts(goal, too_little))
 
 
 def test_a_path_from_the_neighbour_ends_where_the_work_is_used_up() -> None:

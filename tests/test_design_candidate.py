@@ -152,6 +152,9 @@ def test_a_free_shape_that_buckles_is_not_feasible() -> None:
     assert found.status == "infeasible"
     assert found.reasons == ("the free shape is not stable: it buckles under its load",)
     assert the_only(task).status == "feasible"
+    undefined = the_only(task, loads=replace(squeezed, tip_moment=(0.0, 0.0, 1e-6)))
+    assert undefined.status == "feasible"
+    assert any("stability is undefined" in warning for warning in undefined.warnings)
 
 
 @pytest.mark.parametrize(

@@ -160,7 +160,7 @@ def agrees(pose: Pose, w: Witnessed, L: float) -> float:
     assert abs(pose.backbone_length - w.backbone_length) <= 1e-6 * L
     assert pose.bending_angle == pytest.approx(w.bending_angle, abs=5e-6)
     assert pose.tilt == pytest.approx(w.tilt, abs=5e-6)
-    assert pose.stable
+    assert pose.stable is None  # a dead moment acts
     if w.s.size == pose.shape.arc.size:
         assert np.linalg.norm(pose.shape.position - w.p, axis=1).max() <= 1e-6 * L
         assert np.abs(pose.shape.rotation - w.R).max() <= 5e-6
@@ -356,7 +356,8 @@ def test_a_sequence_gives_what_single_poses_give() -> None:
 
 
 def test_a_failed_step_does_not_stop_the_run_and_carries_no_numbers() -> None:
-    run = forward(ROBOTS["D20L60"], silicone("Ecoflex 00-30", "yeoh"), [[3e4] * 3, [4e5] * 3, [3e4] * 3],
+    slim = replace(ROBOTS["D20L60"], chamber_diameter=3e-3)  # whose GJ outlasts the limit pressure
+    run = forward(slim, silicone("Ecoflex 00-30", "yeoh"), [[3e4] * 3, [6e5] * 3, [3e4] * 3],
                   coefficients=Coefficients(elongation=0.0))  # fmt: skip
     assert [step.status for step in run.steps] == [Status.SOLVED, Status.NO_EQUILIBRIUM, Status.SOLVED]
     failed = run.steps[1]

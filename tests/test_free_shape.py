@@ -25,7 +25,7 @@ def test_a_free_shape_that_is_not_found_is_not_a_number() -> None:
     assert lengths == pytest.approx(pose.chamber_length, rel=1e-6)
     assert point == pytest.approx(pose.tip_position, abs=1e-8)
     beyond = Situation(np.full(3, 9e5), hung, None)
-    assert solver.poses.solve(beyond.pressure, hung)[0].status is Status.NO_EQUILIBRIUM
+    assert solver.poses.solve(beyond.pressure, hung)[0].status in (Status.NO_EQUILIBRIUM, Status.UNSTABLE_MATERIAL)
     lengths, point = shapes.tip(beyond)
     assert np.isnan(lengths).all()
     assert lengths.shape == pose.chamber_length.shape

@@ -73,7 +73,8 @@ def test_the_forward_pose_at_the_answer_meets_the_target(loaded: bool) -> None:
     for step in run.steps:
         assert step.status is Status.SOLVED
         assert step.pose is not None
-        assert step.pose.stable
+        assert step.pose.stable is (None if loaded else True)  # a dead moment is among the loads
+        assert any("stability is undefined" in warning for warning in step.warnings) is loaded
         assert (step.pressure >= 0).all()
         assert (step.pressure <= HIGHEST).all()
         assert step.residual is not None

@@ -238,7 +238,23 @@ def test_unsolved_steps_are_nan_with_their_status(mixed: Run) -> None:
     flags = dict(
         zip(dataset.stable.attrs["flag_meanings"].split(), dataset.stable.attrs["flag_values"].tolist(), strict=True)
     )
-    assert flags == {"not_solved": -1, "unstable": 0, "stable": 1}
+    assert flags == {"undefined": -1, "unstable": 0, "stable": 1}
+
+
+def test_undefined_stability_is_null_and_not_false() -> None:
+    undefined, tipping = (replace(arc_pose(robot("D25L60"), np.zeros(3)), stable=s) for s in (None, False))
+    steps = [arc_step(robot("D25L60"), [0, 0, 0], pose=pose) for pose in (undefined, tipping)]
+    run = run_of([*steps, failed_step([1e5, 0, 0])])
+    assert [step["stable"] for step in to_json(run)["steps"]] == [None, False, None]
+    assert to_dataset(run).stable.values.tolist() == [-1, 0, -1]
+    assert to_dataset(run).stable.dtype == np.int8
+    assert view_of_run(run).stable.tolist() == view_of_dataset(to_dataset(run)).stable.tolist() == [-1, 0, -1]
+    rows = list(csv.DictReader(io.StringIO(table_text(run))))
+    assert [row["stable"] for row in rows] == ["", "false", ""]
+    console = Console(width=120, file=io.StringIO())
+    console.print(table_lines(run))
+    shown = console.file.getvalue()  # type: ignore[attr-defined]
+    assert shown.count("undef.") == 1
 
 
 def test_global_attributes_say_what_was_asked_and_by_what(mixed: Run) -> None:

@@ -53,7 +53,7 @@ def critical(stable_at: Callable[[float], bool], low: float, high: float, steps:
 def stands(step: Step) -> bool:
     """Whether the pose is the straight one and stable; a robot that leans has lost it."""
     assert step.pose is not None
-    return step.pose.stable and step.pose.bending_angle < 1e-3
+    return bool(step.pose.stable) and step.pose.bending_angle < 1e-3
 
 
 @pytest.mark.parametrize("transcription", ["multiple-shooting", "collocation"])
@@ -74,6 +74,19 @@ def test_a_tall_soft_column_falls_standing_and_not_hanging(transcription: str) -
         assert any("not stable" in warning for warning in standing.warnings)
     firm = solve(TALL, FIRM, Loads(gravity=(0, 0, -GRAVITY)), numerics=numerics)
     assert stands(firm)
+
+
+@pytest.mark.parametrize("pressure", [(0, 0, 0), (4e4, 0, 0)])
+@pytest.mark.parametrize("moment", [(0, 0, 1e-3), (1e-9, 0, 0)], ids=["twists", "a little"])
+def test_under_a_dead_tip_moment_stability_is_undefined(pressure: object, moment: object) -> None:
+    """Also where the column is past its buckling load: undefined is not false."""
+    for gravity in ((0, 0, 0), (0, 0, -GRAVITY)):
+        step = solve(TALL, SOFT, Loads(tip_moment=moment, gravity=gravity), pressure)
+        assert step.pose is not None
+        assert step.pose.stable is None
+        assert [warning for warning in step.warnings if "stab" in warning] == [
+            "stability is undefined: a dead tip moment in space has no potential, so there is no energy to be least"
+        ]
 
 
 def test_a_column_buckles_under_its_weight_at_greenhill_s_density() -> None:

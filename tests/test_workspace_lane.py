@@ -184,6 +184,25 @@ def test_what_cannot_be_solved_is_named() -> None:
     assert block.rows["stable"].tolist() == [1, -1, 1]
 
 
+def test_a_stiffness_that_loses_its_sign_ends_the_batch_too() -> None:
+    """D20L60 stretched beyond 3.26 has no torsional stiffness; the batch and the problem both say so."""
+    pressures = np.array([[1.1, 1.1, 1.1], [1.2, 1.2, 1.2]]) * BAR
+    asked = plan(pressures, "D20L60", "Ecoflex 00-30", law="yeoh", coefficients=Coefficients(elongation=0.0))
+    columns = asked.full_values(np.arange(2))
+    assert PoseLane(asked).sections(columns)[1].tolist() == [0]
+    block = ChunkSolver(asked).solve(0)
+    assert [STATUSES[k] for k in block.rows["status"]] == [Status.SOLVED, Status.UNSTABLE_MATERIAL]
+    assert "GJ loses its sign" in block.messages[0][1]
+
+
+def test_under_a_dead_tip_moment_no_pose_of_a_sweep_is_called_stable_or_not() -> None:
+    pressures = np.array([[0.2, 0, 0], [0.4, 0.1, 0], [90.0, 90.0, 0]]) * BAR
+    twisted = plan(pressures, law="ogden", loads=Loads(tip_moment=(0.0, 0.0, 1e-4)))
+    block = ChunkSolver(twisted).solve(0)
+    assert [STATUSES[k].has_solution for k in block.rows["status"]] == [True, True, False]
+    assert block.rows["stable"].tolist() == [-1, -1, -1]
+
+
 def test_an_unstable_pose_is_left_to_the_problem() -> None:
     """A tall soft column under its own weight is straight and unstable; the batch must not call it stable."""
     asked = plan(np.zeros((1, 3)), "D10L60", "Ecoflex 00-10", loads=Loads(gravity=(0.0, 0.0, -9.80665)))
