@@ -19,7 +19,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 # A module imports only what stands above it; the modules of MIXED may import each other within their package.
 LAYERS = (
     *("errors", "status", "units", "conventions", "numerics", "reading", "contact_settings"),
-    *("formula", "laws", "material_reading", "materials", "robot", "section", "rod", "tip", "transcription"),
+    *("formula", "laws", "material_reading", "materials", "robot", "section", "rod", "turning", "tip", "transcription"),
     *("quantities", "loadcase", "unloaded", "problem", "branch", "solver", "condensed", "continuation", "stability"),
     "implicit",
     *("evaluation", "evaluation.statistics"),
