@@ -20,7 +20,8 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 LAYERS = (
     *("errors", "status", "units", "conventions", "numerics", "reading", "ranges", "gravity"),
     *("contact_settings", "processes"),
-    *("formula", "laws", "material_reading", "materials", "rules", "robot", "section", "rod", "tip", "transcription"),
+    *("formula", "laws", "material_reading", "materials", "rules", "robot", "section", "rod", "turning", "tip"),
+    "transcription",
     *(
         "quantities",
         "loadcase",
