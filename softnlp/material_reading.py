@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from numbers import Real
@@ -15,11 +14,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from softnlp.errors import MaterialError, nearest
+from softnlp.errors import InputError, MaterialError, nearest
 from softnlp.formula import shown
 from softnlp.laws import SYMBOLS
-
-MAX_FILE_SIZE = 1_000_000  # bytes
+from softnlp.reading import LARGEST_TOML, read_text, toml_tables
 
 
 @contextmanager
@@ -37,35 +35,14 @@ def file_label(file: Any) -> str:
     return text if isinstance(file, str | PathLike) and text.isprintable() else shown(file)
 
 
-def unreadable(file: Path) -> str | None:
-    """Return why a file cannot be opened as a materials file, in words, or None."""
-    try:
-        if file.is_dir():
-            return "expected a TOML file, this is a folder"
-        if not file.exists():
-            return "no such file"
-        if not file.is_file():
-            return "expected a TOML file, this is a device or a pipe"
-        size = file.stat().st_size
-    except OSError as error:
-        return f"cannot be read: {error.strerror}"
-    return None if size <= MAX_FILE_SIZE else f"too large for a materials file: {size} bytes, at most {MAX_FILE_SIZE}"
-
-
 def read_table(file: Any) -> dict[str, Any]:
     """Return the tables of a TOML file, or raise `MaterialError`."""
     if not isinstance(file, str | PathLike):
         raise MaterialError("expected the path of a TOML file")
-    if problem := unreadable(Path(file)):
-        raise MaterialError(problem)
     try:
-        return tomllib.loads(Path(file).read_bytes().decode("utf-8-sig"))
-    except OSError as error:
-        raise MaterialError(f"cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise MaterialError("not a TOML file: it is not UTF-8 text") from None
-    except (ValueError, RecursionError) as error:  # invalid TOML, an integer without end, brackets without end
-        raise MaterialError(f"not a TOML file: {error}") from None
+        return toml_tables(read_text(Path(file), LARGEST_TOML))
+    except InputError as error:
+        raise MaterialError(error.message) from None
 
 
 def quoted(name: str) -> str:

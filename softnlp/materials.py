@@ -27,7 +27,6 @@ from softnlp.material_reading import (
     read_table,
     stretch_range,
     text_of,
-    unreadable,
 )
 from softnlp.units import MEGAPASCAL
 
@@ -271,8 +270,6 @@ def material_from_table(table: Mapping[str, Any], *, folder: str | PathLike[str]
             law, constants = _law_with_constants(model, table, "material.constants")
             return _checked(name, law, constants, given, "material" if "formula" in table else "material.constants")
         file = Path(folder, text_of(table, "file")) if "file" in table else None
-        if file and (problem := unreadable(file)):
-            raise MaterialError(f"{file_label(file)}: {problem}", key="file")
         return material(name, model, file=file, density=given.get("density"))
 
 

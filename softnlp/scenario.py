@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike, fspath
@@ -19,7 +18,7 @@ from softnlp.materials import Material, material_from_table
 from softnlp.numerics import Numerics
 from softnlp.pressures import PressurePath, pressure_path
 from softnlp.quantities import Model
-from softnlp.reading import LONGEST_NAME, one_line, read_text, shown
+from softnlp.reading import LARGEST_TOML, LONGEST_NAME, one_line, read_text, shown, toml_tables
 from softnlp.robot import DIMENSIONS, ROBOTS, Robot, Violation, check, violations
 from softnlp.rod import Loads
 from softnlp.scenario_check import first_of, parse
@@ -132,7 +131,7 @@ def load_scenario(path: str | PathLike[str]) -> Scenario:
         On one line, naming the file, the table and the key of the first error and counting the others.
     """
     try:
-        text = read_text(Path(path))
+        text = read_text(Path(path), LARGEST_TOML)
     except InputError as error:
         raise placed(error, fspath(path)) from None
     return scenario_from_text(text, path)
@@ -161,7 +160,7 @@ def robot_of_scenario(path: str | PathLike[str]) -> tuple[Robot, tuple[Violation
         As `load_scenario`, for everything but those rules.
     """
     try:
-        file = parse(parse_toml(read_text(Path(path))))
+        file = parse(parse_toml(read_text(Path(path), LARGEST_TOML)))
         robot = _dimensions(file.robot)
         return robot, violations(robot, file.robot.minimum_wall_mm * MILLIMETRE)
     except InputError as error:
@@ -234,17 +233,10 @@ def placed(error: InputError, source: str) -> InputError:
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Return the tables of TOML 1.0; raises `InputError` where the text is not."""
+    """Return the tables of a scenario; raises `InputError` where the text is empty or not TOML."""
     if not text.strip():
         raise InputError("expected a scenario, got an empty file")
-    try:
-        return tomllib.loads(text)
-    except RecursionError:
-        raise InputError("not valid TOML: nested too deeply") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"not valid TOML: {error}") from None
-    except ValueError:  # of int
-        raise InputError("not valid TOML: a number has thousands of digits") from None
+    return toml_tables(text)
 
 
 def _robot(table: RobotTable) -> tuple[Robot, tuple[str, ...]]:

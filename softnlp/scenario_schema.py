@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import hypot
 from typing import Annotated, Any, Literal
+from unicodedata import category
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator
 from pydantic_core import PydanticCustomError
 
 from softnlp.numerics import Numerics
-from softnlp.reading import choices, did_you_mean, shown
+from softnlp.reading import BACKSLASH_HINT, as_typed, choices, did_you_mean, shown
 from softnlp.robot import MINIMUM_WALL
 from softnlp.units import MILLIMETRE
 
@@ -77,6 +78,14 @@ def _intervals(value: Any) -> int | None:
     return value
 
 
+def _file_name(value: str) -> str:
+    r"""Refuse control characters, which are escapes that nobody meant: in TOML "data\table.csv" holds a tab."""
+    if controls := [c for c in value if category(c) == "Cc"]:
+        escape = as_typed(controls[0])
+        raise wrong(f"expected a path, got '{as_typed(value)}', where {escape} is one character: {BACKSLASH_HINT}")
+    return value
+
+
 def _label(value: str) -> str:
     """Put a name or a title on one line; control characters would reach a terminal or a figure."""
     label = " ".join(value.split())
@@ -93,7 +102,7 @@ Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Direction = Annotated[tuple[float, float, float], PlainValidator(_direction)]
 Normal = Annotated[tuple[float, float, float], PlainValidator(_normal)]
 Label = Annotated[str, Field(max_length=LONGEST_LABEL), AfterValidator(_label)]
-FileName = Annotated[str, Field(max_length=LONGEST_FILE_NAME)]
+FileName = Annotated[str, Field(max_length=LONGEST_FILE_NAME), AfterValidator(_file_name)]
 
 
 class Table(BaseModel):

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from softnlp.app.document import START, Document
 from softnlp.app.live import LivePoses
 from softnlp.errors import InputError
-from softnlp.reading import one_line, read_text, shown
+from softnlp.reading import LARGEST_TOML, one_line, read_bytes, read_text, shown
 from softnlp.scenario import Scenario, load_scenario, placed, scenario_from_text
 from softnlp.units import BAR
 
@@ -112,13 +112,13 @@ class Session:
     def open_path(self, path: Path) -> None:
         """Show the scenario of a file, with the files that it names; raises `InputError` where one cannot be read."""
         load_scenario(path)  # says the same of a broken file as the commands
-        document = Document(read_text(path))
+        document = Document(read_text(path, LARGEST_TOML))
         files = {}
         for file in document.files():
             try:
-                files[PurePath(file).name] = (path.parent / file).read_bytes()
-            except OSError as error:
-                raise InputError(f"{file}: {error.strerror}", source=one_line(str(path)), key="file") from None
+                files[PurePath(file).name] = read_bytes(path.parent / file)
+            except InputError as error:
+                raise InputError(f"{file}: {error.message}", source=one_line(str(path)), key="file") from None
         document.rename_files(lambda file: PurePath(file).name)
         self.open(document.source(), path.name, files)
 
