@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from softnlp.errors import InputError
 from softnlp.pressures import csv_rows
+from softnlp.ranges import range_of
 from softnlp.reading import LONGEST_NAME, did_you_mean, one_line, read_text, shown
 
 Array = NDArray[np.float64]
@@ -39,7 +40,7 @@ class Columns:
     def numbers(self, name: str, *, blank: bool = False) -> Array:
         """Return a column as numbers; nan where a cell is blank, if it may be, or where there is no such column.
 
-        Raises `InputError` naming file, line and column of the first cell that is not a finite number.
+        Raises `InputError` naming file, line and column of the first cell that is no finite number in its range.
         """
         values = np.full(len(self.rows), np.nan)
         if name not in self.header:
@@ -53,6 +54,9 @@ class Columns:
                 raise self.wrong(k, name, f"expected a number, got {shown(cell)}") from None
             if not isfinite(values[k]) or "_" in cell:
                 raise self.wrong(k, name, f"expected a finite number, got {shown(cell)}")
+        if (limits := range_of(name)) is not None:
+            for k in np.flatnonzero(~(limits.holds(values) | np.isnan(values)))[:1]:
+                raise self.wrong(int(k), name, limits.refusal(float(values[k])))
         return values
 
     def wrong(self, row: int, name: str, message: str) -> InputError:

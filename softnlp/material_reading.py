@@ -17,6 +17,7 @@ import numpy as np
 from softnlp.errors import InputError, MaterialError, nearest
 from softnlp.formula import shown
 from softnlp.laws import SYMBOLS
+from softnlp.ranges import Range
 from softnlp.reading import LARGEST_TOML, read_text, toml_tables
 
 
@@ -91,6 +92,15 @@ def number(value: Any, key: str, *, positive: bool = False) -> Any:
     if not np.all(np.isfinite(number)) or (positive and not np.all(number > 0)):
         raise MaterialError(f"expected {expected}, got {shown(value)}", key=key)
     return number
+
+
+def within(limits: Range, value: Any, key: str) -> None:
+    """Raise `MaterialError` for a number, or one of an array, outside its range; a symbol is none."""
+    if not isinstance(value, SYMBOLS):
+        try:
+            limits.require(value, key)
+        except InputError as error:
+            raise MaterialError(error.message, key=error.key) from None
 
 
 def stretch_range(value: Any) -> tuple[float, float]:

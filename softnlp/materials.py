@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from softnlp import ranges
 from softnlp.errors import MaterialError, nearest
 from softnlp.formula import check_constant_name, shown
 from softnlp.laws import LAWS, SYMBOLS, Constant, Law, evaluate, formula_law, function_law
@@ -27,6 +28,7 @@ from softnlp.material_reading import (
     read_table,
     stretch_range,
     text_of,
+    within,
 )
 from softnlp.units import MEGAPASCAL
 
@@ -84,9 +86,16 @@ class Material:
         names = [c.name for c in self.law.constants]
         check_keys(self.constants, names, what=f"constant of law {shown(self.law.name)}")
         constants = {name: number(self.constants[name], name) for name in names}
+        for constant in self.law.constants:
+            within(
+                ranges.STRESS if constant.unit == "MPa" else ranges.CONSTANT,
+                constants[constant.name],
+                constant.file_key,
+            )
         # Frozen and read-only, so that constants cannot change behind the checks.
         object.__setattr__(self, "constants", MappingProxyType(constants))
         object.__setattr__(self, "density", number(self.density, "density", positive=True))
+        within(ranges.DENSITY, self.density, "density")
         object.__setattr__(self, "fitted_stretch", stretch_range(self.fitted_stretch))
         if not any(isinstance(value, SYMBOLS) for value in constants.values()):
             _check_response(self)

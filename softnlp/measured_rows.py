@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from softnlp.columns import Columns
 from softnlp.errors import nearest
-from softnlp.pressures import HIGHEST_BAR, UNIT_HINT
+from softnlp.ranges import PRESSURE, without_noise
 from softnlp.reading import shown
 from softnlp.robot import ROBOTS, Robot
 from softnlp.units import BAR, DEGREE, MILLIMETRE
@@ -49,7 +49,11 @@ class RobotRows:
         return np.array([kept[id(columns)][k] for columns, k in self.places])
 
     def pressure(self) -> Array:
-        """Return the pressures (rows, sets) [Pa].
+        """Return the pressures (rows, sets) [Pa], noise below 0 taken as 0; raises `InputError` as `readings`."""
+        return without_noise(self.readings()) * BAR
+
+    def readings(self) -> Array:
+        """Return the pressures (rows, sets) [bar] as they stand in the files.
 
         Raises `InputError` for one that is missing or out of range, and for one in a set that the robot does not have.
         """
@@ -57,12 +61,11 @@ class RobotRows:
         for k in range(self.robot.chamber_sets):
             name = f"p{k + 1}_bar"
             values = self.column(name)
-            for row in np.flatnonzero(~((values >= 0) & (values <= HIGHEST_BAR)))[:1]:
+            for row in np.flatnonzero(np.isnan(values))[:1]:
                 columns, place = self.places[row]
-                got = "nothing" if np.isnan(values[row]) else f"{values[row]:g}"
-                expected = f"expected a pressure from 0 to {HIGHEST_BAR:g} bar"
-                raise columns.wrong(place, name, f"{expected}, got {got}; {UNIT_HINT}")
-            found.append(values * BAR)
+                expected = f"expected a pressure from {PRESSURE.low:g} to {PRESSURE.high:g} bar"
+                raise columns.wrong(place, name, f"{expected}, got nothing{PRESSURE.hint}")
+            found.append(values)
         self._refuse_more_sets()
         return np.column_stack(found)
 

@@ -14,22 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.errors import InputError
+from softnlp.ranges import READING, TIME, noise_note, without_noise
 from softnlp.reading import LONGEST_NAME, did_you_mean, one_line, read_text, shown
 from softnlp.scenario_schema import PressureTable, RampTable
 from softnlp.units import BAR
 
 Array = NDArray[np.float64]
 
-HIGHEST_BAR = 100.0
-UNIT_HINT = "pressures are gauge, in bar: 1 bar = 100 kPa = 1000 mbar"
 TIME_COLUMN = "t_s"
 
 
 class PressurePath(NamedTuple):
-    """pressures : (steps, sets) [Pa]. times : (steps,) [s], or None when the source has none."""
+    """pressures : (steps, sets) [Pa]. times : (steps,) [s], or None when the source has none. notes : on readings."""
 
     pressures: Array
     times: Array | None
+    notes: tuple[str, ...] = ()
 
 
 def pressure_path(table: PressureTable, sets: int, folder: Path) -> PressurePath:
@@ -53,7 +53,7 @@ def pressure_path(table: PressureTable, sets: int, folder: Path) -> PressurePath
             key=given[1] if given else None,
         )
     if table.sequence_bar is not None:
-        return PressurePath(_sequence(table.sequence_bar, sets), None)
+        return _path(_sequence(table.sequence_bar, sets))
     if table.ramp is not None:
         return PressurePath(_ramp(table.ramp, sets), None)
     assert table.file is not None
@@ -61,6 +61,11 @@ def pressure_path(table: PressureTable, sets: int, folder: Path) -> PressurePath
         return _csv(read_text(folder / table.file), sets)
     except InputError as error:
         raise InputError(f"{one_line(table.file, LONGEST_NAME)}: {error.message}", key="file") from None
+
+
+def _path(readings: Array, times: Array | None = None) -> PressurePath:
+    """Return the path of readings [bar], noise below 0 taken as 0."""
+    return PressurePath(without_noise(readings) * BAR, times, noise_note(readings))
 
 
 def _sequence(rows: list[list[float]], sets: int) -> Array:
@@ -71,11 +76,7 @@ def _sequence(rows: list[list[float]], sets: int) -> Array:
                 f"row {number}: expected {sets} pressures, one for each chamber set, got {len(row)}",
                 key="sequence_bar",
             )
-    pressures = np.array(rows, dtype=float)
-    for row, column in np.argwhere(pressures > HIGHEST_BAR)[:1]:
-        problem = _too_high(pressures[row, column])
-        raise InputError(f"row {row + 1} column {column + 1}: {problem}", key="sequence_bar")
-    return pressures * BAR
+    return np.array(rows, dtype=float)
 
 
 def _ramp(ramp: RampTable, sets: int) -> Array:
@@ -87,9 +88,6 @@ def _ramp(ramp: RampTable, sets: int) -> Array:
             )
         if chosen in ramp.sets[: number - 1]:
             raise InputError(f"item {number}: expected each chamber set once, got {chosen} twice", key="ramp.sets")
-    for key in ("from_bar", "to_bar"):
-        if getattr(ramp, key) > HIGHEST_BAR:
-            raise InputError(_too_high(getattr(ramp, key)), key=f"ramp.{key}")
     pressures = np.zeros((ramp.steps, sets))
     pressures[:, [chosen - 1 for chosen in ramp.sets]] = np.linspace(ramp.from_bar, ramp.to_bar, ramp.steps)[:, None]
     return pressures * BAR
@@ -120,7 +118,7 @@ def _csv(text: str, sets: int) -> PressurePath:
                 raise _not_a_number(line, header, row)
     _require_possible(table, lines, columns)
     pressures = table[:, [columns[name] for name in columns if name != TIME_COLUMN]]
-    return PressurePath(pressures * BAR, table[:, columns[TIME_COLUMN]].copy() if TIME_COLUMN in columns else None)
+    return _path(pressures, table[:, columns[TIME_COLUMN]].copy() if TIME_COLUMN in columns else None)
 
 
 def csv_rows(text: str) -> Iterator[tuple[int, list[str]]]:
@@ -153,19 +151,13 @@ def _columns(header: list[str], sets: int, line: int) -> dict[str, int]:
 
 
 def _require_possible(table: Array, lines: array[int], columns: dict[str, int]) -> None:
-    """Raise InputError for the first value that is not finite, negative, far too high, or back in time."""
-    pressure_columns = [position for name, position in columns.items() if name != TIME_COLUMN]
-    wrong = ~np.isfinite(table)
-    wrong[:, pressure_columns] |= (table[:, pressure_columns] < 0) | (table[:, pressure_columns] > HIGHEST_BAR)
+    """Raise InputError for the first value that is not finite, outside its range, or back in time."""
+    limits = {p: TIME if name == TIME_COLUMN else READING for name, p in columns.items()}
+    wrong = np.column_stack([~limits[p].holds(table[:, p]) for p in range(table.shape[1])])
     for row, position in np.argwhere(wrong)[:1]:
         value = float(table[row, position])
         name = next(n for n, p in columns.items() if p == position)
-        if not isfinite(value):
-            problem = f"expected a finite number, got {value}"
-        elif value < 0:
-            problem = f"expected a number of at least 0, got {value:g}"
-        else:
-            problem = _too_high(value)
+        problem = limits[position].refusal(value) if isfinite(value) else f"expected a finite number, got {value}"
         raise InputError(f"line {lines[row]}: {name}: {problem}")
     if TIME_COLUMN in columns:
         times = table[:, columns[TIME_COLUMN]]
@@ -187,11 +179,6 @@ def _not_a_number(line: int, header: list[str], row: list[str]) -> InputError:
         if not readable:
             return InputError(f"line {line}: {name.strip()}: expected a number, got {shown(cell)}")
     raise AssertionError("called for a row of numbers")
-
-
-def _too_high(value: float) -> str:
-    """Word a pressure that no silicone holds."""
-    return f"expected at most {HIGHEST_BAR:g} bar, got {value:g}; {UNIT_HINT}"
 
 
 def _names(sets: int) -> str:

@@ -71,7 +71,7 @@ def read_bytes(path: Path, largest: int = LARGEST_DATA) -> bytes:
     if kind:
         raise InputError(f"expected a file, got {kind}")
     if size > largest:
-        raise InputError(f"expected at most {largest / 1e6:g} MB, got a file of {size / 1e6:.8g} MB")
+        raise InputError(f"too large: expected at most {largest / 1e6:g} MB, got a file of {size / 1e6:.8g} MB")
     if len(content) > size:
         raise InputError("expected a file, got one longer than its size (it grows, or is of /proc); copy it first")
     return content

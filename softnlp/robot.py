@@ -13,12 +13,13 @@ from typing import Any
 import casadi as ca
 
 from softnlp.errors import RobotError, nearest
+from softnlp.ranges import SIZE
 from softnlp.reading import choices, did_you_mean, shown
 from softnlp.units import DEGREE, MILLIMETRE
 
 MINIMUM_WALL = 0.8e-3  # delta_s of Eq. (1) [m]
 ROUND_OFF = 1e-9  # lengths closer than this are equal: published dimensions meet their rules exactly [m]
-LENGTH_LIMITS = (1e-6, 100.0)  # outside this the checks (and the unit) make no sense [m]
+LENGTH_LIMITS = (SIZE.low * MILLIMETRE, SIZE.high * MILLIMETRE)  # [m]
 LARGEST = 1e300  # beyond it, an int may not even have a float
 MOST_CHAMBERS = 1000
 

@@ -22,6 +22,7 @@ from softnlp.evaluation.variants import NAMED, OWN, Variant, every_variant, name
 from softnlp.materials import Material, load_materials
 from softnlp.measured_rows import SCALARS, TIP_COLUMNS, RobotRows, rows_by_robot
 from softnlp.pressures import TIME_COLUMN
+from softnlp.ranges import noise_note
 from softnlp.reading import choices, read_text, shown
 from softnlp.robot import Robot
 from softnlp.scenario import Scenario
@@ -115,6 +116,7 @@ def _task(scenario: Scenario, path: str | PathLike[str], asked: Asked) -> Compar
             source=columns.file,
         )
     rows, measurements = _measured(scenario, columns)
+    notes += noise_note(np.concatenate([of_robot.readings().ravel() for of_robot in rows]))
     against_wall = scenario.contact is not None and (
         asked.shape == "blocked" or any(np.isfinite(m.blocked_force).any() for m in measurements)
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from softnlp.contact_settings import ContactSettings
 from softnlp.scenario import Scenario
@@ -24,7 +25,7 @@ def run_robots(scenario: Scenario, progress: Progress | None = None) -> Identifi
     """
     task = scenario.task
     assert isinstance(task, RobotTask)
-    return identify(
+    found = identify(
         task.measurements,
         scenario.material,
         task.free,
@@ -36,6 +37,7 @@ def run_robots(scenario: Scenario, progress: Progress | None = None) -> Identifi
         numerics=scenario.numerics,
         progress=progress,
     )
+    return replace(found, warnings=(*task.notes, *found.warnings))
 
 
 def run_tensile(scenario: Scenario) -> TensileFit:

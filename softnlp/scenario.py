@@ -67,7 +67,7 @@ class Scenario:
     task
         What else the study is asked.
     warnings
-        Rules of manufacture that the robot breaks with leave.
+        Rules of manufacture that the robot breaks with leave, and readings that count as 0.
     """
 
     path: Path
@@ -201,7 +201,7 @@ def _scenario(text: str, path: Path) -> Scenario:
         numerics=Numerics(**dict(file.solver)),
         contact=contact,
         task=task,
-        warnings=warnings,
+        warnings=(*warnings, *steps.notes),
     )
 
 

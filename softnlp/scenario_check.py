@@ -9,6 +9,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from softnlp.errors import InputError, nearest
+from softnlp.ranges import numbers_outside
 from softnlp.reading import choices, did_you_mean, one_line, shown
 from softnlp.scenario_schema import BlockedForceFile, ForwardFile, ScenarioFile
 from softnlp.schema_design import DesignFile
@@ -38,10 +39,18 @@ def parse(data: Mapping[str, Any]) -> ScenarioFile:
         For the first key that does not fit, with the number of the others.
     """
     schema = SCHEMAS[_study(data)]
+    details, file = [], None
     try:
-        return schema.model_validate(data)
+        file = schema.model_validate(data)
     except ValidationError as error:
-        raise first_of(list(_errors(schema, error.errors(include_url=False)))) from None
+        details = error.errors(include_url=False)
+    wrong = [detail["loc"] for detail in details]
+    for place, number, text in numbers_outside(data):
+        if not any(loc[: len(place)] == place[: len(loc)] for loc in wrong):
+            details.append({"type": "own", "loc": place, "msg": text, "input": number, "ctx": {"text": text}})
+    if file is None or details:
+        raise first_of(list(_errors(schema, details)))
+    return file
 
 
 def first_of(errors: list[InputError]) -> InputError:

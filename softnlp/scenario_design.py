@@ -9,7 +9,6 @@ from typing import Any
 
 from softnlp.errors import InputError, nearest
 from softnlp.materials import Material, material
-from softnlp.pressures import HIGHEST_BAR
 from softnlp.reading import shown
 from softnlp.robot import DIMENSIONS, ROBOTS, Robot
 from softnlp.scenario_contact import contact_settings
@@ -118,13 +117,6 @@ def _materials(table: MaterialChoices, base: Mapping[str, Any], folder: Path) ->
 def _pressure(table: ActuationTable) -> float | Range | PressureSteps:
     """Return the pressure in Pa."""
     value = table.pressure_bar
-    highest = value[2] if isinstance(value, tuple) else value
-    if highest > HIGHEST_BAR:
-        raise InputError(
-            f"expected at most {HIGHEST_BAR:g} bar, got {highest:g}; 1 bar = 100 kPa",
-            table="actuation",
-            key="pressure_bar",
-        )
     if not isinstance(value, tuple):
         return value * BAR
     kind, low, high = value

@@ -16,6 +16,7 @@ from softnlp.errors import InputError, nearest
 from softnlp.laws import LAWS, Law
 from softnlp.materials import Material
 from softnlp.measured_rows import SCALARS, RobotRows, rows_by_robot
+from softnlp.ranges import noise_note
 from softnlp.reading import shown
 from softnlp.robot import Robot
 from softnlp.scenario_schema import ContactTable, RobotTable
@@ -181,12 +182,13 @@ def _robots(given: Given, table: MeasurementsTable) -> RobotTask:
             return given.robot
         raise columns.wrong(row, "robot", "expected a name, or a table [robot] for rows without one")
 
-    made, cells = [], []
+    made, cells, readings = [], [], []
     for rows in rows_by_robot(tables, own, unnamed):
+        readings.append(rows.readings().ravel())
         made.append(_measurements(rows, given.file.sigma))
         cells.append(tuple(tuple(_cell(c, k, column) for column in header) for c, k in rows.places))
     free, bounds = _free(table, given.material)
-    return RobotTask(tuple(made), free, bounds, header, tuple(cells))
+    return RobotTask(tuple(made), free, bounds, header, tuple(cells), noise_note(np.concatenate(readings)))
 
 
 def _cell(columns: Columns, row: int, name: str) -> str:

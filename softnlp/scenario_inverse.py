@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.errors import InputError
-from softnlp.pressures import HIGHEST_BAR, UNIT_HINT
 from softnlp.robot import Robot
 from softnlp.schema_inverse import BoundsTable, TargetTable
 from softnlp.studies.inverse_task import InverseTask, Target
@@ -67,8 +66,6 @@ def _bounds(table: BoundsTable, sets: int) -> tuple[Array, Array]:
     for low, high in pairs:
         if high < low:
             raise _wrong(f"expected a highest pressure of at least the lowest, got [{low:g}, {high:g}]")
-        if high > HIGHEST_BAR:
-            raise _wrong(f"expected at most {HIGHEST_BAR:g} bar, got {high:g}; {UNIT_HINT}")
     return pairs[:, 0] * BAR, pairs[:, 1] * BAR
 
 

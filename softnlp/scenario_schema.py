@@ -1,7 +1,8 @@
 """The tables of a scenario file, in the units of the file.
 
-Every key that a scenario may hold is a field here, so the file format can be read off this module. `scenario_check`
-words what does not fit; what needs more than one key, or another file, is checked in `scenario` and `pressures`.
+Every key that a scenario may hold is a field here, so the file format can be read off this module. `ranges` has the
+range of each number; `scenario_check` words what does not fit; what needs more than one key, or another file, is
+checked in `scenario` and `pressures`.
 """
 
 from __future__ import annotations
@@ -96,7 +97,6 @@ def _label(value: str) -> str:
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
-Fraction = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=1)]
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Direction = Annotated[tuple[float, float, float], PlainValidator(_direction)]
@@ -156,7 +156,7 @@ class CorrectionsTable(Table):
 
     area: Positive | None = None
     inertia: Positive | None = None
-    bore_fraction: Fraction | None = None
+    bore_fraction: NotNegative | None = None
     conventions: Literal["reproduction", "as_printed"] = "reproduction"
 
 
@@ -185,7 +185,7 @@ class RampTable(Table):
 class PressureTable(Table):
     """[pressure]: exactly one of its keys."""
 
-    sequence_bar: Annotated[list[list[NotNegative]], Field(min_length=1)] | None = None
+    sequence_bar: Annotated[list[list[float]], Field(min_length=1)] | None = None
     ramp: RampTable | None = None
     file: FileName | None = None
 
@@ -222,9 +222,9 @@ class SolverTable(Table):
     """[solver]."""
 
     intervals: Annotated[int | None, PlainValidator(_intervals)] = Numerics.intervals
-    accuracy: Annotated[float, Field(gt=0, le=1e-2)] = Numerics.accuracy
+    accuracy: Positive = Numerics.accuracy
     transcription: Literal["multiple-shooting", "collocation"] = Numerics.transcription
-    tolerance: Annotated[float, Field(gt=0, le=1e-4)] = Numerics.tolerance
+    tolerance: Positive = Numerics.tolerance
 
 
 class ScenarioFile(Table):

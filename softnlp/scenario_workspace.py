@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from softnlp.errors import InputError, nearest
 from softnlp.materials import Material
-from softnlp.pressures import HIGHEST_BAR, UNIT_HINT
 from softnlp.reading import shown
 from softnlp.robot import DIMENSIONS, Robot
 from softnlp.rod import Vector
@@ -109,8 +108,6 @@ def _check_source(file: WorkspaceFile) -> None:
         raise InputError(f"missing; expected with {sources[0]}: the highest pressure in bar", key="to_bar")
     elif table.to_bar < table.from_bar:
         raise InputError(f"expected at least from_bar = {table.from_bar:g}, got {table.to_bar:g}", key="to_bar")
-    elif table.to_bar > HIGHEST_BAR:
-        raise InputError(f"expected at most {HIGHEST_BAR:g} bar, got {table.to_bar:g}; {UNIT_HINT}", key="to_bar")
     if table.levels == 1:
         raise InputError("expected a whole number of at least 2, got 1", key="levels")
     if table.samples is None and "seed" in table.model_fields_set:

@@ -18,7 +18,7 @@ PACKAGE = Path(softnlp.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
 # A module imports only what stands above it; the modules of MIXED may import each other within their package.
 LAYERS = (
-    *("errors", "status", "units", "conventions", "numerics", "reading", "contact_settings"),
+    *("errors", "status", "units", "conventions", "numerics", "reading", "ranges", "contact_settings"),
     *("formula", "laws", "material_reading", "materials", "robot", "section", "rod", "tip", "transcription"),
     *("quantities", "loadcase", "unloaded", "problem", "branch", "solver", "condensed", "continuation", "stability"),
     "implicit",

@@ -146,7 +146,8 @@ def _write_comparison(
     from softnlp.results.files import placed_whole
     from softnlp.workspace.comparison import comparison_rows
 
-    say("\n".join(["", *_comparison_lines(compared)]))
+    notes = [f"warning: {note}" for note in (measured.notes if measured else ())]
+    say("\n".join(["", *_comparison_lines(compared), *notes]))
     header, rows = comparison_rows(compared, measured)
     with placed_whole(table) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")

@@ -14,6 +14,7 @@ from softnlp.errors import InputError
 from softnlp.materials import Material
 from softnlp.numerics import Numerics
 from softnlp.quantities import Model
+from softnlp.ranges import FORCE, GRAVITY, MOMENT, PRESSURE
 from softnlp.robot import LOWERABLE_RULES, Robot, check
 from softnlp.rod import Loads
 from softnlp.studies.statics import PoseSolver
@@ -64,7 +65,7 @@ def forward(
     RobotError
         For a robot that is geometrically impossible; the rules that a scenario may lower are warnings here.
     InputError
-        For pressures or loads of the wrong shape, not finite, or negative.
+        For pressures or loads of the wrong shape, not finite, or out of their ranges.
     """
     warnings = check(robot, allow=LOWERABLE_RULES)
     P = pressure_table(pressures, robot.chamber_sets)
@@ -97,18 +98,20 @@ def pressure_table(pressures: Any, sets: int) -> NDArray[np.float64]:
         raise InputError("expected finite pressures", key="pressures")
     if np.any(table < 0):
         raise InputError(f"expected gauge pressures that are not negative, got {table.min():g} Pa", key="pressures")
+    PRESSURE.require(table, "pressures")
     return table
 
 
 def checked_loads(loads: Loads) -> Loads:
     """Return loads as arrays of three finite numbers, or raise `InputError` naming the one that is not."""
     checked = {}
-    for name in ("tip_force", "tip_moment", "gravity"):
+    for name, limits in (("tip_force", FORCE), ("tip_moment", MOMENT), ("gravity", GRAVITY)):
         try:
             value = np.asarray(getattr(loads, name), dtype=float)
         except (TypeError, ValueError) as error:
             raise InputError("expected three numbers", key=name) from error
         if value.shape != (3,) or not np.all(np.isfinite(value)):
             raise InputError(f"expected three finite numbers, got {value.tolist()}", key=name)
+        limits.require(value, name)
         checked[name] = value
     return Loads(**checked)

@@ -43,7 +43,7 @@ class RobotTask:
     """Constants to identify from measurements of robots.
 
     measurements : of each robot. free : names of constants. bounds : by name, SI. columns : the header of the file.
-    cells : for each robot and row, the cells of the file as they were read.
+    cells : for each robot and row, the cells of the file as they were read. notes : on readings that count as 0.
     """
 
     measurements: tuple[Measurements, ...]
@@ -51,6 +51,7 @@ class RobotTask:
     bounds: Mapping[str, tuple[float, float]]
     columns: tuple[str, ...]
     cells: tuple[tuple[tuple[str, ...], ...], ...]
+    notes: tuple[str, ...] = ()
 
     def step_count(self, pressures: int) -> int:
         """Return one: it is solved as a whole."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from softnlp.contact_settings import CLOSURES, Closure, ContactSettings
 from softnlp.errors import InputError
+from softnlp.ranges import POSITION
 from softnlp.rod import Loads
 from softnlp.status import Status
 from softnlp.studies.arc import unloaded_arc
@@ -68,6 +69,7 @@ def checked_contact(contact: ContactSettings) -> ContactSettings:
     for key, value in numbers.items():
         if not np.all(np.isfinite(value)):
             raise InputError("expected a finite length", key=key)
+        POSITION.require(value, key)
     if contact.tip_cap < 0:
         raise InputError("expected a length that is not negative", key="tip_cap")
     if (contact.wall_point is None) != (contact.wall_normal is None):
@@ -82,6 +84,7 @@ def checked_contact(contact: ContactSettings) -> ContactSettings:
     size = float(np.linalg.norm(normal)) if normal.shape == (3,) else 0.0
     if point.shape != (3,) or not np.all(np.isfinite(point)):
         raise InputError("expected three finite numbers", key="wall_point")
+    POSITION.require(point, "wall_point")
     if not np.isfinite(size) or size == 0:
         raise InputError("expected three numbers that are not all zero", key="wall_normal")
     x, y, z = (float(v) for v in normal / size)

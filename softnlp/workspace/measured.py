@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.columns import Columns, read_columns
+from softnlp.columns import read_columns
 from softnlp.errors import InputError
-from softnlp.pressures import HIGHEST_BAR, TIME_COLUMN, UNIT_HINT
+from softnlp.pressures import TIME_COLUMN
+from softnlp.ranges import noise_note, without_noise
 from softnlp.units import BAR, MILLIMETRE
 
 Array = NDArray[np.float64]
@@ -24,7 +25,7 @@ class Measured:
     """M measured tips, in the world frame of the robot's base.
 
     pressure : (M, sets) [Pa]. tip_position : (M, 3) [m]. time : (M,) [s] or None. header, cells : of the M rows as they
-    stand in the file, other columns among them. skipped : how many rows with a blank were left out.
+    stand in the file, other columns among them. skipped : how many rows with a blank were left out. notes : of readings.
     """
 
     file: Path
@@ -34,6 +35,7 @@ class Measured:
     header: tuple[str, ...]
     cells: tuple[tuple[str, ...], ...]
     skipped: int
+    notes: tuple[str, ...] = ()
 
 
 def load_measured(path: str | PathLike[str], sets: int) -> Measured:
@@ -60,26 +62,17 @@ def _measured(file: Path, sets: int) -> Measured:
         raise InputError(f"{columns.file}: expected pressures of {sets} chamber sets, got a column {extra_set!r}")
     needed += [TIME_COLUMN] * (TIME_COLUMN in columns)
     table = np.column_stack([columns.numbers(name, blank=True) for name in needed])
-    _require_possible(columns, table[:, :sets])
     full = np.isfinite(table).all(axis=1)
     skipped = int(np.sum(~full))
     if not full.any():
         raise InputError(f"{columns.file}: expected at least one row of numbers, got none; {skipped} rows have blanks")
     return Measured(
         file=file,
-        pressure=table[full, :sets] * BAR,
+        pressure=without_noise(table[full, :sets]) * BAR,
         tip_position=table[full, sets : sets + 3] * MILLIMETRE,
         time=table[full, sets + 3] if TIME_COLUMN in columns else None,
         header=columns.header,
         cells=tuple(columns.rows[k] for k in np.flatnonzero(full)),
         skipped=skipped,
+        notes=noise_note(table[full, :sets]),
     )
-
-
-def _require_possible(columns: Columns, pressure: Array) -> None:
-    """Refuse the first pressure [bar] that is negative or far too high."""
-    for row, k in np.argwhere((pressure < 0) | (pressure > HIGHEST_BAR))[:1]:
-        value = pressure[row, k]
-        expected = f"at most {HIGHEST_BAR:g} bar" if value > 0 else "a gauge pressure of at least 0"
-        hint = f"; {UNIT_HINT}" if value > 0 else ""
-        raise columns.wrong(int(row), f"p{k + 1}_bar", f"expected {expected}, got {value:g}{hint}")

@@ -13,7 +13,7 @@ from softnlp.app.pressure_units import PRESSURE_UNITS, PressureUnit
 from softnlp.app.redraw import Redraw
 from softnlp.app.session import Session
 from softnlp.plots.style import colour
-from softnlp.pressures import HIGHEST_BAR
+from softnlp.ranges import PRESSURE
 from softnlp.units import BAR
 
 FIRST_LIMIT = 1.5 * BAR  # of the sliders
@@ -63,11 +63,11 @@ def pressure_panel(session: Session) -> None:
 
     def reach(event: Any) -> None:
         value = event.value
-        if isinstance(value, int | float) and isfinite(value) and 0 < value * state.unit.pascal <= HIGHEST_BAR * BAR:
+        if isinstance(value, int | float) and isfinite(value) and 0 < value * state.unit.pascal <= PRESSURE.high * BAR:
             state.limit = max(value * state.unit.pascal, float(np.max(session.pressure, initial=0.0)))
             rebuild()
         else:
-            ui.notify(f"expected a pressure above 0 and up to {HIGHEST_BAR:g} bar", type="warning")
+            ui.notify(f"expected a pressure above 0 and up to {PRESSURE.high:g} bar", type="warning")
 
     refreshers: dict[int, Any] = {}
 
@@ -96,8 +96,8 @@ def _row(session: Session, state: _Shown, k: int) -> Any:
     def entered(event: Any) -> None:
         value = event.value
         is_number = isinstance(value, int | float) and isfinite(value)
-        if not is_number or not 0 <= value * unit.pascal <= HIGHEST_BAR * BAR:
-            most = _round(HIGHEST_BAR * BAR / unit.pascal, unit)
+        if not is_number or not 0 <= value * unit.pascal <= PRESSURE.high * BAR:
+            most = _round(PRESSURE.high * BAR / unit.pascal, unit)
             field.props(f'error error-message="expected a pressure from 0 to {most:g} {unit.name}"')
             return
         field.props(remove="error error-message")
