@@ -87,11 +87,8 @@ class Material:
         check_keys(self.constants, names, what=f"constant of law {shown(self.law.name)}")
         constants = {name: number(self.constants[name], name) for name in names}
         for constant in self.law.constants:
-            within(
-                ranges.STRESS if constant.unit == "MPa" else ranges.CONSTANT,
-                constants[constant.name],
-                constant.file_key,
-            )
+            limits = ranges.STRESS if constant.unit == "MPa" else ranges.CONSTANT
+            within(limits, constants[constant.name], constant.file_key)
         # Frozen and read-only, so that constants cannot change behind the checks.
         object.__setattr__(self, "constants", MappingProxyType(constants))
         object.__setattr__(self, "density", number(self.density, "density", positive=True))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -65,7 +66,7 @@ PRESSURE = Range("gauge pressure", "bar", 0, 100, BAR, hint=PRESSURE_HINT)
 READING = Range("gauge pressure of a step, or measured", "bar", 0, 100, BAR, -LOWEST_READING_BAR, PRESSURE_HINT)
 FORCE = Range("force", "N", -1e4, 1e4)
 MOMENT = Range("moment", "N mm", -1e6, 1e6, NEWTON_MILLIMETRE)
-GRAVITY = Range("gravity, or a component", "m/s^2", -1000, 1000)
+GRAVITY = Range("gravity", "m/s^2", 0, 1000)
 SIZE = Range("dimension of a robot or a specimen", "mm", 1e-3, 1e4, MILLIMETRE)
 POSITION = Range("position, offset, other length", "mm", -1e4, 1e4, MILLIMETRE)
 ANGLE = Range("angle", "deg", -36000, 36000)
@@ -158,11 +159,11 @@ def noise_note(readings_bar: Array) -> tuple[str, ...]:
 
 
 def numbers_outside(value: Any, keys: Sequence[int | str] = ()) -> list[tuple[tuple[int | str, ...], Any, str]]:
-    """Return place, number and what to say of each number in the tables of a file that is outside its range."""
+    """Return place, number and what to say of each finite number in the tables of a file that is outside its range."""
     if isinstance(value, Mapping | list):
         parts = value.items() if isinstance(value, Mapping) else enumerate(value)
         return [found for key, part in parts for found in numbers_outside(part, (*keys, key))]
-    if isinstance(value, bool) or not isinstance(value, int | float) or value != value:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < inf:
         return []
     limits = range_of(*(key for key in keys if isinstance(key, str)))
     return [] if limits is None or limits.holds(value) else [(tuple(keys), value, limits.refusal(value))]

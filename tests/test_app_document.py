@@ -96,7 +96,7 @@ def test_pressures_follow_the_number_of_sets(sets: int, rows: list[list[float]])
 
 @pytest.mark.parametrize("text", ["= 3", "[robot", "a = 1\na = 2", "x = [" * 500, "\0"])
 def test_what_is_not_toml_is_refused(text: str) -> None:
-    with pytest.raises(InputError, match="not valid TOML"):
+    with pytest.raises(InputError, match="TOML"):
         Document(text)
 
 

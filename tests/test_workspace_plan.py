@@ -325,10 +325,18 @@ VARY = GRID + "[workspace.vary]\n"
         (VARY + "robot.length_mm = { values = [] }\n", "vary.robot.length_mm.values", "at least 1 number"),
         (VARY + "robot.length_mm = { values = [1], levels = 2 }\n", "vary.robot.length_mm", "got both"),
         (VARY + "robot.length_mm = { values = [inf] }\n", "vary.robot.length_mm.values", "finite"),
-        (VARY + "robot.length_mm = { values = [0] }\n", "[workspace] vary", "length_mm = 0: expected a length between"),
-        (VARY + "stiffening.bending = { values = [-1] }\n", "vary.stiffening.bending", "of at least 0"),
-        (VARY + "corrections.area = { values = [0] }\n", "vary.corrections.area", "above 0"),
-        (VARY + "corrections.bore_fraction = { values = [1.5] }\n", "vary.corrections.bore_fraction", "from 0 to 1"),
+        (
+            VARY + "robot.length_mm = { values = [0] }\n",
+            "vary.robot.length_mm.values",
+            "at least 0.001 and at most 10000 mm, got 0 mm",
+        ),
+        (VARY + "stiffening.bending = { values = [-1] }\n", "vary.stiffening.bending", "at least 0"),
+        (VARY + "corrections.area = { values = [0] }\n", "vary.corrections.area", "at least 0.001"),
+        (
+            VARY + "corrections.bore_fraction = { values = [1.5] }\n",
+            "vary.corrections.bore_fraction",
+            "at most 1, got 1.5",
+        ),
         (VARY + "material.C10_MPa = { values = [-1] }\n", "[workspace] vary", "tangent modulus at stretch 1"),
         (VARY + "gravity.size_m_per_s2 = { values = [1] }\n", "vary.gravity.size_m_per_s2", "which is off"),
         (

@@ -112,6 +112,6 @@ def checked_loads(loads: Loads) -> Loads:
             raise InputError("expected three numbers", key=name) from error
         if value.shape != (3,) or not np.all(np.isfinite(value)):
             raise InputError(f"expected three finite numbers, got {value.tolist()}", key=name)
-        limits.require(value, name)
+        limits.require(np.abs(value), name)
         checked[name] = value
     return Loads(**checked)

@@ -25,7 +25,8 @@ class Measured:
     """M measured tips, in the world frame of the robot's base.
 
     pressure : (M, sets) [Pa]. tip_position : (M, 3) [m]. time : (M,) [s] or None. header, cells : of the M rows as they
-    stand in the file, other columns among them. skipped : how many rows with a blank were left out. notes : of readings.
+    stand in the file, other columns among them. skipped : how many rows with a blank were left out.
+    notes : of readings that count as 0.
     """
 
     file: Path
