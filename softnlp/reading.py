@@ -172,10 +172,10 @@ def _missing(path: Path) -> str:
     """Say that there is no such file: a link to nothing, or a name that is near another one."""
     for place in (path, *path.parents):
         if place.is_symlink() and not os.path.exists(place):
-            to = shown(os.path.realpath(place))
-            return f"{one_line(str(place), LONGEST_NAME)!r} is a link to something that does not exist: {to}"
-    if "\\" in str(path) and (other := Path(str(path).replace("\\", "/"))).is_file():
-        return f"no such file; did you mean {shown(str(other))}?"
+            link, to = (one_line(str(name), LONGEST_NAME) for name in (place, os.path.realpath(place)))
+            return f"{link!r} is a link to something that does not exist: {to!r}"
+    if "\\" in str(path) and Path(str(path).replace("\\", "/")).is_file():
+        return "no such file; there is one with / in place of the backslash, which works everywhere"
     try:
         names = [p.name for p in path.parent.iterdir() if os.path.exists(p)]
     except OSError:

@@ -23,6 +23,7 @@ from softnlp.cli import main
 from softnlp.conventions import COEFFICIENT_SETS, CONVENTIONS
 from softnlp.formula import FUNCTIONS
 from softnlp.laws import LAWS
+from softnlp.ranges import RANGES
 from softnlp.scenario import scenario_from_text
 from softnlp.scenario_check import SCHEMAS
 from softnlp.scenario_schema import BlockedForceFile, OffsetRampTable, RampTable
@@ -169,6 +170,14 @@ def test_defaults_are_documented_as_they_are() -> None:
         assert row
         assert [float(v) for v in row.groups()] == [c.elongation, c.bending, c.bore_fraction, c.chamber_reaction]
     assert set(CONVENTIONS) <= documented(MODEL)
+
+
+def test_every_range_is_documented_as_it_is() -> None:
+    section = SCENARIO.read_text().split("\n## Ranges")[1].split("\n## ")[0]
+    rows = re.findall(r"^\| ([^|]+) \| ?([^|]*) \| (\S+) \| (\S+) \|$", section, re.MULTILINE)[1:]
+    assert [(what, unit.strip(), float(low), float(high)) for what, unit, low, high in rows if low != "---"] == [
+        (r.what, r.unit, r.low, r.high) for r in RANGES
+    ]
 
 
 def test_every_status_is_documented() -> None:

@@ -1,0 +1,349 @@
+"""Scenarios, CSV and material files made from valid ones by structural changes, and what the command makes of them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+import random
+import re
+import tomllib
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from softnlp.cli import main
+from softnlp.reading import DEEPEST, LARGEST_TOML
+
+SHIPPED = Path(__file__).parents[1] / "scenarios"
+COMPARED = ("compare/angles", "compare/forces")
+MAIN = "scenario.toml"
+
+# Seconds of the processor: a refusal takes hundredths of them, an answer of few steps one to five on an idle machine.
+LONGEST_REFUSAL, LONGEST_ANSWER = 5.0, 60.0
+
+Tables = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One fuzzed input. name : what was changed of what. files : by name. command : of softnlp, in their folder."""
+
+    name: str
+    files: Mapping[str, bytes]
+    command: tuple[str, ...]
+
+    def write(self, folder: Path) -> None:
+        for name, content in self.files.items():
+            (folder / name).write_bytes(content)
+
+
+# --- valid inputs -----------------------------------------------------------------------------------------------------
+
+
+def small_scenarios() -> dict[str, tuple[Tables, dict[str, str], tuple[str, ...]]]:
+    """Return the shipped scenarios by name with the files that they name, cut down to a few steps, and the command."""
+    found = {}
+    for path in sorted(SHIPPED.rglob("*.toml")):
+        tables = tomllib.loads(path.read_text())
+        if "study" not in tables or path.parent.name == "paper":
+            continue
+        name = path.relative_to(SHIPPED).with_suffix("").as_posix()
+        files: dict[str, str] = {}
+        _bring_files(tables, path.parent, files)
+        _cut(tables)
+        command = ("run", MAIN, "--json")
+        if name in COMPARED:
+            measured = f"measured_{path.stem}.csv"
+            files[measured] = _few_rows((SHIPPED / "files" / measured).read_text())
+            command = ("compare", MAIN, measured, "--json")
+        found[name] = tables, files, command
+    return found
+
+
+def _bring_files(value: Any, folder: Path, files: dict[str, str]) -> None:
+    """Put the files that tables name beside them."""
+    for key, item in list(value.items()):
+        if isinstance(item, dict):
+            _bring_files(item, folder, files)
+        elif key == "file":
+            text = (folder / item).read_text()
+            value[key] = Path(item).name
+            files[value[key]] = _few_rows(text) if item.endswith(".csv") else text
+        elif key == "files":
+            value["file"] = item[0]
+            del value["files"]
+            _bring_files(value, folder, files)
+
+
+def _few_rows(text: str) -> str:
+    lines = text.splitlines()
+    rows = 12 if lines[0].startswith(("stretch", "displacement")) else 4
+    return "\n".join([lines[0], *lines[1 :: max(1, len(lines[1:]) // rows)][:rows]]) + "\n"
+
+
+def _cut(tables: Tables) -> None:
+    """Leave few steps, poses, targets and candidates of a scenario."""
+    pressure = tables.get("pressure", {})
+    pressure.update({"sequence_bar": pressure["sequence_bar"][-2:]} if "sequence_bar" in pressure else {})
+    for ramp in (pressure.get("ramp"), tables.get("contact", {}).get("offset_ramp")):
+        if ramp is not None:
+            ramp["steps"] = 2
+    contact = tables.get("contact", {})
+    contact.update({"offsets_mm": contact["offsets_mm"][:2]} if "offsets_mm" in contact else {})
+    target = tables.get("target", {})
+    target.update({key: rows[:2] for key, rows in target.items() if isinstance(rows, list)})
+    workspace = tables.get("workspace", {})
+    workspace.update({key: size for key, size in (("levels", 2), ("samples", 6)) if key in workspace})
+    for entry in workspace.get("vary", {}).values():
+        entry.update({"levels": 2} if "levels" in entry else {})
+    if "measurements" in tables:
+        tables["solver"] = {"accuracy": 1e-3}
+        tables["measurements"]["free"] = tables["measurements"]["free"][:2]
+    if workspace and "contact" in tables:
+        del workspace["vary"]
+        workspace["to_bar"] = 0.5
+    if "objective" in tables:
+        tables["objective"] |= {"trials": 3, "starts": 1}
+        tables["requirements"].pop("blocked_force_N", None)
+        for choices in tables["choices"].values():
+            choices.update({key: value[:1] for key, value in choices.items() if isinstance(value, list)})
+            for key in [key for key, value in choices.items() if isinstance(value, dict)][2:]:
+                del choices[key]
+
+
+def as_toml(tables: Tables) -> str:
+    """Return tables as TOML, one key of the top a line."""
+    return "".join(f"{_key(key)} = {_value(item)}\n" for key, item in tables.items())
+
+
+def _key(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else json.dumps(key)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return json.dumps(value)
+
+
+# --- changes ----------------------------------------------------------------------------------------------------------
+
+ODD = (
+    *(0, 1, -1, 2, 3, 1e-300, -1e-300, 1e-9, 1e9, 1e300, -1e300, 5e-324, 10**30, -(2**63), 10**400, 0.5, 1e-3, 1e4),
+    *(math.nan, math.inf, -math.inf, True, False, "", "x", "1.0", "$^_{}\\", "a\tb", "é\u2028", "x" * 300, [], {}),
+    *([0], [1, 2], [[0, 0, 0]], [[]], {"a": 1}, {"from": 1, "to": 2}, ["x"], [None] * 0, [1e300] * 3, [True]),
+)
+STRAY = (b"\xff", b"\0", b"\x1b", b'"', b"'", b"[", b"{", b"=", b"\\", b"#")
+CELLS = ("nan", "inf", "-1", "1e300", "-1e300", "1e-300", "1_0", "0x1", "1,5", "x", '"', "=1+1", "0.2")
+TABLE_CHANGES = (*("cell",) * 3, "blank", "extra", "twice", "drop", "short", "separator", "header", "noise")
+NAMES = ("name", "file", "study", "model", "levels", "constants", "x", "__class__", "", "a b", "p1_bar", "length_mm")
+
+
+def places(value: Any, above: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Return the path of every key and item."""
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    return [path for key, item in items for path in ((*above, key), *places(item, (*above, key)))]
+
+
+def _holder(tables: Tables, path: tuple[Any, ...]) -> Any:
+    for key in path[:-1]:
+        tables = tables[key]
+    return tables
+
+
+def change_tables(tables: Tables, rng: random.Random) -> str:
+    """Change one thing of tables and return what."""
+    path = rng.choice(places(tables))
+    holder, key = _holder(tables, path), path[-1]
+    kind = rng.choice(("odd", "odd", "odd", "drop", "rename", "wrap", "repeat", "nest", "swap", "deep"))
+    value = holder[key]
+    if isinstance(value, int | float) and not isinstance(value, bool) and rng.random() < 0.6:
+        kind, holder[key] = "scale", value * rng.choice((-1, 1e-12, 1e-3, 0.1, 0.5, 1.1, 3, 10, 1e3, 1e12))
+    elif kind == "drop":
+        del holder[key]
+    elif kind == "rename" and isinstance(holder, dict):
+        holder[rng.choice((f"{key}s", f"{key}"[1:], *NAMES))] = holder.pop(key)
+    elif kind == "wrap":
+        holder[key] = rng.choice(([value], {"value": value}, [value] * 3, [[value]]))
+    elif kind == "repeat" and isinstance(value, list):
+        holder[key] = value * rng.choice((0, 2, 40)) + value[:1]
+    elif kind == "nest":
+        holder[key] = {rng.choice(NAMES): value}
+    elif kind == "swap":
+        other = rng.choice(places(tables))
+        holder[key] = json.loads(json.dumps(_holder(tables, other)[other[-1]]))
+    elif kind == "deep":
+        for _ in range(rng.choice((3, 20, 60))):
+            value = [value]
+        holder[key] = value
+    else:
+        kind = "odd"
+        holder[key] = rng.choice(ODD)
+    return f"{kind} {'.'.join(map(str, path))}"
+
+
+def change_bytes(content: bytes, rng: random.Random) -> tuple[bytes, str]:
+    """Return the bytes of a file with one thing changed, and what."""
+    at = rng.randrange(len(content)) if content else 0
+    changes: dict[str, Callable[[], bytes]] = {
+        "empty": lambda: rng.choice((b"", b" \n", b"\n\n", b"# x\n")),
+        "cut": lambda: content[:at],
+        "byte": lambda: (
+            content[:at]
+            + rng.choice((b"\xff", b"\0", b"\x1b", b'"', b"'", b"[", b"{", b"=", b"\\", b"#"))
+            + content[at:]
+        ),
+        "gone": lambda: content[:at] + content[at + rng.choice((1, 3, 10)) :],
+        "BOM": lambda: b"\xef\xbb\xbf" + content,
+        "CRLF": lambda: content.replace(b"\n", b"\r\n"),
+        "CR": lambda: content.replace(b"\n", b"\r"),
+        "UTF-16": lambda: content.decode().encode("utf-16"),
+        "twice": lambda: content + content,
+        "long": lambda: content + b"#" * LARGEST_TOML,
+        "deep": lambda: content + b"z = " + b"[" * rng.choice((DEEPEST + 1, 5000)),
+        "dots": lambda: content + b"a." * rng.choice((DEEPEST, 5000)) + b"a = 1\n",
+        "line": lambda: b"\n".join(sorted(content.split(b"\n"), key=lambda line: rng.random())),
+        "digits": lambda: re.sub(rb"\d", lambda m: rng.choice((m[0], m[0] * 30)), content, count=rng.choice((1, 5))),
+    }
+    kind = rng.choice(list(changes))
+    return changes[kind](), kind
+
+
+def change_csv(text: str, rng: random.Random) -> tuple[str, str]:
+    """Return a CSV table with one thing changed, and what."""
+    rows = list(csv.reader(io.StringIO(text)))
+    r, c = rng.randrange(len(rows)), rng.randrange(len(rows[0]))
+    separator = ","
+    kind = rng.choice(
+        ("cell", "cell", "cell", "blank", "extra", "twice", "drop", "short", "separator", "header", "noise")
+    )
+    if kind == "cell":
+        rows[r][c] = rng.choice(
+            ("nan", "inf", "-1", "1e300", "-1e300", "1e-300", "1_0", "0x1", "1,5", "x", '"', "=1+1")
+        )
+    elif kind == "blank":
+        rows[r][c] = rng.choice(("", " "))
+    elif kind == "extra":
+        rows = [[*row, rng.choice(("", "1", "x"))] for row in rows]
+    elif kind == "twice":
+        rows = [[*row, row[c]] for row in rows]
+    elif kind == "drop":
+        rows = [row[:c] + row[c + 1 :] for row in rows]
+    elif kind == "short":
+        rows[r] = rows[r][:c]
+    elif kind == "separator":
+        separator = rng.choice((";", "\t", " ", "|"))
+    elif kind == "header":
+        rows[0][c] = rng.choice(("t_s", "p1_bar", "p9_bar", "x", "", "robot", "weight", "sigma_bending_angle_deg"))
+    else:
+        rows[max(r, 1)][c] = rng.choice(("-0.003", "-0.05", "-0.051", "-0.0"))
+    out = io.StringIO()
+    csv.writer(out, delimiter=separator, lineterminator="\n").writerows(rows)
+    return out.getvalue(), kind
+
+
+def cases(seed: int, count: int) -> Iterator[Case]:
+    """Yield as many cases, always the same ones of a seed."""
+    bases = small_scenarios()
+    named = sorted({name for _, texts, _ in bases.values() for name in texts})
+    for number in range(count):
+        rng = random.Random(f"{seed} {number}")  # so that no case changes with those before it
+        way = rng.choice(("tables", "tables", "tables", "bytes", "file", "file"))
+        name = rng.choice(named)
+        base = rng.choice([key for key in bases if way != "file" or name in bases[key][1]])
+        tables, texts, command = json.loads(json.dumps(bases[base][0])), bases[base][1], bases[base][2]
+        files = {name: text.encode() for name, text in texts.items()}
+        told = []
+        if way == "tables":
+            told = [change_tables(tables, rng) for _ in range(rng.choice((1, 1, 2)))]
+        files[MAIN] = as_toml(tables).encode("utf-8", "surrogatepass")
+        if way == "file":
+            told, files[name] = _changed_file(name, texts[name], rng)
+            if name.endswith(".toml") and rng.random() < 0.5:
+                command = ("materials", "--file", name)
+        elif way == "bytes":
+            files[MAIN], kind = change_bytes(files[MAIN], rng)
+            told = [f"bytes: {kind}"]
+        if command[0] == "run" and number % 8 == 0:
+            command = (*command, "--out", "out")
+        yield Case(f"{number} {base}: {', '.join(told)}", files, command)
+
+
+def _changed_file(name: str, text: str, rng: random.Random) -> tuple[list[str], bytes]:
+    if rng.random() < 0.3:
+        content, kind = change_bytes(text.encode(), rng)
+        return [f"{name}: {kind}"], content
+    if name.endswith(".csv"):
+        text, kind = change_csv(text, rng)
+        return [f"{name}: {kind}"], text.encode()
+    tables = tomllib.loads(text)
+    return [f"{name}: {change_tables(tables, rng)}"], as_toml(tables).encode("utf-8", "surrogatepass")
+
+
+# --- what comes out ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a command ended. seconds : of the processor, of this process and those that it waited for."""
+
+    status: int
+    out: str
+    err: str
+    seconds: float
+    written: tuple[str, ...]
+
+
+def outcome(case: Case, folder: Path) -> Outcome:
+    """Run a case in this process, in its own folder."""
+    case.write(folder)
+    before, out, err = os.getcwd(), io.StringIO(), io.StringIO()
+    os.chdir(folder)
+    began = sum(os.times()[:4])
+    try:
+        with redirect_stdout(out), redirect_stderr(err), warnings.catch_warnings():
+            warnings.simplefilter("always")
+            status = main(case.command)
+    finally:
+        os.chdir(before)
+    seconds = sum(os.times()[:4]) - began
+    written = sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+    return Outcome(status, out.getvalue(), err.getvalue(), seconds, tuple(written))
+
+
+def wrong_with(case: Case, found: Outcome) -> str | None:
+    """Return what is not as it has to be: bad input is one line and writes nothing, all else is a right answer."""
+    lines = found.err.splitlines()
+    if found.seconds > (LONGEST_REFUSAL if found.status == 2 else LONGEST_ANSWER):
+        return f"{found.seconds:.1f} s of the processor"
+    if found.status == 2:
+        if len(lines) != 1 or not found.err.startswith("softnlp: ") or len(found.err) > 2000 or found.out:
+            return f"not one line of refusal: {found.err[:300]!r}"
+        return None if set(found.written) == set(case.files) else f"refused and wrote {found.written}"
+    if found.status not in (0, 3):
+        return f"exit status {found.status}"
+    if any(not line.startswith("softnlp: ") for line in lines):
+        return f"on standard error: {found.err[:300]!r}"
+    if "--json" not in case.command:
+        return None
+    try:
+        document = json.loads(found.out, parse_constant=lambda name: float(f"no {name}"))
+    except ValueError as error:
+        return f"no JSON document: {error}"
+    steps = document.get("steps", [])
+    if found.status == 0 and any(step["status"] not in ("solved", "no_contact") for step in steps):
+        return "a step did not solve and the exit status is 0"
+    for step in steps:
+        if step["status"] == "solved" and not 0 <= step["residual"] <= 1e-4:
+            return f"solved with a residual of {step['residual']}"
+    return None
