@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.errors import InputError
+from softnlp.errors import InputError, listed
 from softnlp.pressures import csv_rows
 from softnlp.ranges import range_of
 from softnlp.reading import LONGEST_NAME, did_you_mean, one_line, read_text, shown
@@ -86,7 +86,7 @@ def read_columns(folder: Path, file: str, needed: Collection[str] = ()) -> Colum
     for name in needed:
         if name not in header:
             near = did_you_mean(name, header)
-            raise InputError(f"{label}: missing column {name!r}; it has {', '.join(header)}{near}", key="file")
+            raise InputError(f"{label}: missing column {name!r}; it has {listed(header)}{near}", key="file")
     for line, row in rows[1:]:
         if len(row) != len(header):
             raise InputError(

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+_MOST_LISTED = 50  # names in one message
+
 
 class SoftnlpError(Exception):
     """Base of every error this package raises on purpose."""
@@ -77,4 +79,11 @@ def nearest(word: str, known: Iterable[str]) -> str:
     close = get_close_matches(word, names, n=1, cutoff=0.5)
     if close:
         return f"; did you mean '{close[0]}'?"
-    return f"; known: {', '.join(names)}" if names else ""
+    return f"; known: {listed(names)}" if names else ""
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return names with commas between them; of very many the first ones and how many more there are."""
+    every = list(names)
+    more = len(every) - _MOST_LISTED
+    return ", ".join(every) if more <= 0 else f"{', '.join(every[:_MOST_LISTED])} and {more} more"

@@ -22,6 +22,7 @@ from softnlp.units import BAR
 Array = NDArray[np.float64]
 
 TIME_COLUMN = "t_s"
+MOST_COLUMNS = 2000
 
 
 class PressurePath(NamedTuple):
@@ -126,6 +127,9 @@ def csv_rows(text: str) -> Iterator[tuple[int, list[str]]]:
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
         for row in reader:
+            if len(row) > MOST_COLUMNS:
+                problem = f"expected at most {MOST_COLUMNS} columns, got {len(row)}"
+                raise InputError(f"line {reader.line_num}: {problem}")
             if any(row) and any(cell.strip() for cell in row):
                 yield reader.line_num, row
     except csv.Error as error:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from softnlp.columns import Columns, read_columns
 from softnlp.contact_settings import CLOSURES, ContactSettings, ContactTask
 from softnlp.conventions import CONVENTIONS, Coefficients, Conventions
-from softnlp.errors import InputError, nearest
+from softnlp.errors import InputError, listed, nearest
 from softnlp.evaluation.compare import SHAPES, compare
 from softnlp.evaluation.comparison import Comparison
 from softnlp.evaluation.variants import NAMED, OWN, Variant, every_variant, named_coefficients
@@ -65,7 +65,7 @@ class CompareTask:
 
     path, text : of the file. columns : of it, under the names that this package has for them; header : under its own.
     rows : of each robot, as `measurements`. time : (rows of the file,) [s], nan where there is none. notes : what is
-    not compared, and why.
+    not compared, and why. warnings : of readings that count as 0.
     """
 
     scenario: Scenario
@@ -79,6 +79,7 @@ class CompareTask:
     shape: str
     time: Array
     notes: tuple[str, ...]
+    warnings: tuple[str, ...]
 
 
 def compare_task(scenario: Scenario, path: str | PathLike[str], asked: Asked = Asked()) -> CompareTask:
@@ -112,11 +113,10 @@ def _task(scenario: Scenario, path: str | PathLike[str], asked: Asked) -> Compar
         why = f" ({notes[0]})" if notes else ""
         raise InputError(
             f"expected a column that study {scenario.study!r} can be compared with, of {known}; it has "
-            f"{', '.join(columns.header)}{why}",
+            f"{listed(columns.header)}{why}",
             source=columns.file,
         )
     rows, measurements = _measured(scenario, columns)
-    notes += noise_note(np.concatenate([of_robot.readings().ravel() for of_robot in rows]))
     against_wall = scenario.contact is not None and (
         asked.shape == "blocked" or any(np.isfinite(m.blocked_force).any() for m in measurements)
     )
@@ -142,6 +142,7 @@ def _task(scenario: Scenario, path: str | PathLike[str], asked: Asked) -> Compar
         shape=asked.shape,
         time=columns.numbers(TIME_COLUMN, blank=True),
         notes=tuple(notes),
+        warnings=noise_note(np.concatenate([of_robot.readings().ravel() for of_robot in rows])),
     )
 
 

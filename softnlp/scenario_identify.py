@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from softnlp.columns import Columns, read_columns
 from softnlp.conventions import Coefficients
-from softnlp.errors import InputError, nearest
+from softnlp.errors import InputError, listed, nearest
 from softnlp.laws import LAWS, Law
 from softnlp.materials import Material
 from softnlp.measured_rows import SCALARS, RobotRows, rows_by_robot
@@ -143,7 +143,7 @@ def _curve(columns: Columns, table: TensileTable) -> tuple[Array, Array]:
     else:
         raise InputError(
             f"{columns.file}: expected columns stretch, stress_MPa or displacement_mm, force_N; it has "
-            f"{', '.join(columns.header)}",
+            f"{listed(columns.header)}",
             key="file",
         )
     for row in np.flatnonzero(~(stretch > 0))[:1]:

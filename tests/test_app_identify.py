@@ -76,7 +76,7 @@ async def _robots() -> None:
             (b"", "expected a header"),
             (b"\xff\xfe\x00", "UTF-8"),
             (b"p1_bar,p2_bar,p3_bar,bending_angle_deg\n1,0,0,much\n", "expected a number"),
-            (b"p1_bar,p2_bar,p3_bar,bending_angle_deg\n-1,0,0,5\n", "expected a pressure"),
+            (b"p1_bar,p2_bar,p3_bar,bending_angle_deg\n-1,0,0,5\n", "at most 100 bar, got -1"),
             (b"x" * (LARGEST_FILE + 1), "at most 5 MB"),
         ):
             await drop(user, "measurements.drop", "wrong.csv", content)

@@ -346,7 +346,7 @@ GOOD = f"{HEADER},bending_angle_deg"
     [
         ("forward", "", [GOOD, "1,0,0,x"], [], "measured.csv: line 2: bending_angle_deg: expected a number, got 'x'"),
         ("forward", "", [GOOD, "1,,0,3"], [], "line 2: p2_bar: expected a pressure"),
-        ("forward", "", [GOOD, "-1,0,0,3"], [], "line 2: p1_bar: expected a pressure from 0 to 100 bar, got -1"),
+        ("forward", "", [GOOD, "-1,0,0,3"], [], "line 2: p1_bar: expected at least 0 and at most 100 bar, got -1 bar"),
         ("forward", "", [GOOD, "1,0,0,"], [], "something measured, got blank cells"),
         ("forward", "", [HEADER + ",bending", "1,0,0,3"], [], "it has p1_bar, p2_bar, p3_bar, bending"),
         ("forward", "", [HEADER + ",blocked_force_N", "1,0,0,3"], [], "has no wall"),

@@ -119,6 +119,8 @@ def _say(task: CompareTask, found: Comparison) -> None:
         say(f"\nleast error: {found.labels[found.best]}")
     for note in task.notes:
         say(f"note: {note}")
+    for warning in task.warnings:
+        say(f"warning: {warning}")
     _complain_of_lost(found)
 
 

@@ -43,6 +43,7 @@ def comparison_document(task: CompareTask, found: Comparison) -> dict[str, Any]:
         "best": _best(found),
         "variants": [_variant(task, found, v) for v in range(len(found.variants))],
         "notes": list(task.notes),
+        "warnings": list(task.warnings),
     }
 
 
