@@ -9,6 +9,7 @@ from typing import Any
 
 from softnlp.app.document import Document
 from softnlp.errors import RobotError
+from softnlp.ranges import SIZE
 from softnlp.reading import shown
 from softnlp.robot import (
     DIMENSIONS,
@@ -104,8 +105,8 @@ def robot_state(document: Document) -> RobotState:
     values = {d.field: effective(table, d) for d in DIMENSIONS}
     said = {d.file_key: problem for d in DIMENSIONS if (problem := _problem(d, values[d.field]))}
     wall = table.get("minimum_wall_mm", MINIMUM_WALL / MILLIMETRE)
-    if not is_number(wall) or not 0 < wall < 1e6:
-        said["minimum_wall_mm"] = f"expected a length above 0, got {shown(wall)}"
+    if not is_number(wall) or not SIZE.holds(wall):
+        said["minimum_wall_mm"] = f"expected a length from {SIZE.low:g} to {SIZE.high:g} mm, got {shown(wall)}"
         wall = MINIMUM_WALL / MILLIMETRE
     if any(d.file_key in said for d in DIMENSIONS):
         return RobotState(None, said, (), allowed)
