@@ -214,8 +214,8 @@ def test_blanks_are_counted_and_other_columns_kept(space: Workspace, tmp_path: P
         (HEADER + "\n0,0,0,0,0,60\n", "line 2: expected 7 values as in the header, got 6"),
         (HEADER + "\n0,0,0,0,0,0,60\n1,0,0,0,0,up,60\n", "line 3: y_mm: expected a number, got 'up'"),
         (HEADER + "\n0,0,0,0,nan,0,60\n", "x_mm: expected a finite number"),
-        (HEADER + "\n0,0,-0.1,0,0,0,60\n", "p2_bar: expected a gauge pressure of at least 0, got -0.1"),
-        (HEADER + "\n0,0,500,0,0,0,60\n", "p2_bar: expected at most 100 bar, got 500"),
+        (HEADER + "\n0,0,-0.1,0,0,0,60\n", "p2_bar: expected at least 0 and at most 100 bar, got -0.1"),
+        (HEADER + "\n0,0,500,0,0,0,60\n", "p2_bar: expected at least 0 and at most 100 bar, got 500"),
     ],
 )
 def test_a_measured_file_that_is_wrong_is_one_line(tmp_path: Path, text: str, words: str) -> None:
