@@ -465,7 +465,7 @@ def test_what_is_not_feasible_is_worse_for_a_search_than_all_before(sign: int, m
         ({"choices": {"material": SOFT}}, "choices.material: expected a list of values"),
         ({"choices": {"length": "60"}}, "choices.length: expected a list or a range"),
         ({"choices": {"length": []}}, "choices.length: expected a list or a range"),
-        ({"allow": ("wall_thickness", "sharp")}, "allow: expected names of"),
+        ({"allow": ("wall_thickness", "sharp")}, "allow: expected rules of"),
     ],
 )
 def test_a_task_that_cannot_be_meant_names_its_key(changes: dict[str, Any], named: str) -> None:
