@@ -115,7 +115,7 @@ def test_absurd_numbers_everywhere(text: str, place: str) -> None:
         ("gravity", lambda: forward(D25L60, SOFT, [0, 0, 0], loads=Loads(gravity=(0, 0, -1e4)))),
         ("pressures", lambda: forward(D25L60, SOFT, [101 * BAR, 0, 0])),
         ("offset", lambda: blocked_force(D25L60, SOFT, [0, 0, 0], ContactSettings(offset=11.0))),
-        ("length", lambda: robot("D25L60", length=11.0)),
+        ("length", lambda: robot("D25L60", length=101.0)),
         ("density", lambda: material("Ecoflex 00-50", density=1e6)),
         ("E_l_MPa", lambda: Material("S", LAWS["linear"], {"E_l": 1e13})),
     ],
