@@ -66,7 +66,10 @@ def test_a_sweep_and_a_design_run_from_a_script_whose_law_is_its_own(tmp_path: P
     assert done.stdout == "top level\n8 0\n['mine', 'Dragon Skin 10']\n"
 
 
-def test_processes_that_others_start_meanwhile_are_told_their_main() -> None:
+def test_processes_that_others_start_meanwhile_are_told_their_main(monkeypatch: pytest.MonkeyPatch) -> None:
+    main = sys.modules["__main__"]
+    monkeypatch.setattr(main, "__spec__", None)  # a script, however the tests were started
+    monkeypatch.setattr(main, "__file__", "script.py", raising=False)
     told: dict[str, set[str]] = {}
 
     def ask(who: str) -> None:

@@ -32,10 +32,11 @@ def steps_of(name: str) -> list[dict[str, Any]]:
 def test_it_runs(name: str) -> None:
     for step in steps_of(name):
         assert step["status"] == "solved"
-        assert step["stable"]
+        twisted = name == "D25L60_loaded_tip"  # a dead moment has no potential
+        assert step["stable"] is (None if twisted else True)
         assert step["residual"] <= 1e-8
         assert step["discretisation_error"] <= 1e-6
-        assert not step["warnings"]
+        assert len(step["warnings"]) == twisted
 
 
 def test_the_published_angle_is_reproduced() -> None:
