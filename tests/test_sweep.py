@@ -460,7 +460,7 @@ def test_warnings_of_the_robot_are_told_and_kept(tmp_path: Path, cli: Cli, no_so
     thin = HEAD.replace('"D25L60"', '"D25L60"\nminimum_wall_mm = 3.0\nallow = ["wall_thickness"]')
     path, out = written(tmp_path, head=thin), tmp_path / "out"
     _, told, _ = cli("sweep", path, "--out", out)
-    assert told.splitlines()[1].startswith("warning: wall_thickness: ")
+    assert told.splitlines()[2].startswith("warning: wall_thickness: ")
     (warning,) = json.loads(opened(out).attrs["warnings"])
     assert warning.startswith("wall_thickness: ")
 
@@ -474,7 +474,7 @@ def test_a_sweep_goes_on_with_another_casadi_and_says_so(
         run_sweep(load_scenario(path), out, resume=True, stop=lambda: True)
     status, told, _ = cli("sweep", path, "--out", out, "--resume")
     assert status == 3  # every fifth pose is made up as failed
-    assert told.splitlines()[1] == "warning: the sweep was begun with casadi 3.8.0 and goes on with 3.9.0"
+    assert told.splitlines()[2] == "warning: the sweep was begun with casadi 3.8.0 and goes on with 3.9.0"
     assert json.loads(opened(out).attrs["versions_before"]) == [{"casadi": "3.8.0", "numpy": "2.4.0"}]
 
 
