@@ -16,7 +16,7 @@ from benchmarks.app import FLAGS, chromium
 from softnlp.cli import main
 
 SMALL, WINDOW = ({"width": w, "height": h} for w, h in ((1000, 700), (1280, 800)))  # the small one is drawn sooner
-WAIT_MS = 180_000
+WAIT_MS = 400_000
 
 
 @dataclass

@@ -377,7 +377,7 @@ def ended(tab: Watched, marker: str) -> str:
           const part = name => document.querySelector(`[data-testid='{marker}.${{name}}']`);
           return !part('stop').checkVisibility() && !part('message').textContent.endsWith('…');
         }}""",
-        timeout=90_000,
+        timeout=600_000,
     )
     return tab.text(f"{marker}.message")
 

@@ -353,7 +353,7 @@ VARY = GRID + "[workspace.vary]\n"
         (
             VARY + "robot.length_mm = { values = [0] }\n",
             "vary.robot.length_mm.values",
-            "at least 0.001 and at most 10000 mm, got 0 mm",
+            "at least 0.001 and at most 100000 mm, got 0 mm",
         ),
         (VARY + "stiffening.bending = { values = [-1] }\n", "vary.stiffening.bending", "at least 0"),
         (VARY + "corrections.area = { values = [0] }\n", "vary.corrections.area", "at least 0.001"),
