@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from softnlp.rod import Loads as Loads
     from softnlp.runner import run_scenario as run_scenario
     from softnlp.runner_design import run_design as run_design
+    from softnlp.runner_workspace import run_sweep as run_sweep
     from softnlp.scenario import load_scenario as load_scenario
     from softnlp.status import Status as Status
     from softnlp.studies.blocked_force import blocked_force as blocked_force
@@ -76,7 +77,6 @@ if TYPE_CHECKING:
     from softnlp.units import DEGREE as DEGREE
     from softnlp.units import MILLIMETRE as MILLIMETRE
     from softnlp.units import NEWTON_MILLIMETRE as NEWTON_MILLIMETRE
-    from softnlp.workspace.run import run_sweep as run_sweep
 
 _HOMES = {
     "contact_settings": ("Closure", "ClosureWeights", "ContactSettings"),
@@ -110,7 +110,7 @@ _HOMES = {
     "studies.tolerances": ("error_bars", "monte_carlo"),
     "studies.weight_sensitivity": ("weight_sensitivity",),
     "units": ("BAR", "DEGREE", "MILLIMETRE", "NEWTON_MILLIMETRE"),
-    "workspace.run": ("run_sweep",),
+    "runner_workspace": ("run_sweep",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 

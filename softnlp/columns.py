@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import csv
+import io
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -11,11 +13,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.errors import InputError, listed
-from softnlp.pressures import csv_rows
 from softnlp.ranges import range_of
 from softnlp.reading import LONGEST_NAME, did_you_mean, one_line, read_text, shown
 
 Array = NDArray[np.float64]
+
+TIME_COLUMN = "t_s"
+MOST_COLUMNS = 2000
+
+
+def csv_rows(text: str) -> Iterator[tuple[int, list[str]]]:
+    """Yield each row that is not blank with the line it ends on, counted from 1."""
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    try:
+        for row in reader:
+            if len(row) > MOST_COLUMNS:
+                problem = f"expected at most {MOST_COLUMNS} columns, got {len(row)}"
+                raise InputError(f"line {reader.line_num}: {problem}")
+            if any(row) and any(cell.strip() for cell in row):
+                yield reader.line_num, row
+    except csv.Error as error:
+        raise InputError(f"line {reader.line_num}: not valid CSV: {one_line(str(error))}") from None
 
 
 @dataclass(frozen=True, eq=False)

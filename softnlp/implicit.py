@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from softnlp.errors import IllPosedError, nearest
 from softnlp.problem import CompiledProblem
-from softnlp.quantities import Quantity
+from softnlp.quantity import Quantity
 from softnlp.solver import LinearSolver, ManySidedSolver, SparseSolver
 
 Array = NDArray[np.float64]

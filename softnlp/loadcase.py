@@ -12,24 +12,14 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from softnlp import rod
-from softnlp.quantities import Model, Quantity, contact_quantities, force_unit, quantities, section_function
+from softnlp.case import Equation
+from softnlp.quantities import Model, contact_quantities, force_unit, quantities, section_function
+from softnlp.quantity import Quantity
 from softnlp.section import deform, stretch_balance
 from softnlp.tip import DEAD_LOADS, AtTip, Given, TipConditions, gap, length_error
 from softnlp.transcription import Transcribed, Transcription
-
-
-@dataclass(frozen=True, eq=False)
-class Equation:
-    """A named group of residual rows and the unit of one of them: SI value = scaled value * `si_scale`."""
-
-    name: str
-    rows: NDArray[np.intp]
-    unit: str
-    si_scale: ca.MX
-
 
 _SECTION_SIZE = len(rod.RodSection._fields)
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from array import array
-from collections.abc import Iterator
 from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
@@ -13,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.columns import TIME_COLUMN, csv_rows
 from softnlp.errors import InputError
 from softnlp.ranges import READING, TIME, noise_note, without_noise
 from softnlp.reading import LONGEST_NAME, did_you_mean, one_line, read_text, shown
@@ -20,9 +18,6 @@ from softnlp.scenario_schema import PressureTable, RampTable
 from softnlp.units import BAR
 
 Array = NDArray[np.float64]
-
-TIME_COLUMN = "t_s"
-MOST_COLUMNS = 2000
 
 
 class PressurePath(NamedTuple):
@@ -120,20 +115,6 @@ def _csv(text: str, sets: int) -> PressurePath:
     _require_possible(table, lines, columns)
     pressures = table[:, [columns[name] for name in columns if name != TIME_COLUMN]]
     return _path(pressures, table[:, columns[TIME_COLUMN]].copy() if TIME_COLUMN in columns else None)
-
-
-def csv_rows(text: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield each row that is not blank with the line it ends on, counted from 1."""
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    try:
-        for row in reader:
-            if len(row) > MOST_COLUMNS:
-                problem = f"expected at most {MOST_COLUMNS} columns, got {len(row)}"
-                raise InputError(f"line {reader.line_num}: {problem}")
-            if any(row) and any(cell.strip() for cell in row):
-                yield reader.line_num, row
-    except csv.Error as error:
-        raise InputError(f"line {reader.line_num}: not valid CSV: {one_line(str(error))}") from None
 
 
 def _columns(header: list[str], sets: int, line: int) -> dict[str, int]:

@@ -11,10 +11,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.case import Case, Equation
 from softnlp.errors import IllPosedError, nearest
-from softnlp.loadcase import Equation, LoadCase
 from softnlp.optimality import Bounds, slopes
-from softnlp.quantities import Quantity
+from softnlp.quantity import Quantity
 
 Array = NDArray[np.float64]
 
@@ -76,7 +76,7 @@ class CompiledProblem:
     case's equations, then the constraints over their scales. solver_arguments holds bounds and the NLP for IPOPT.
     """
 
-    cases: tuple[LoadCase, ...]
+    cases: tuple[Case, ...]
     free: tuple[Quantity, ...]
     fixed: tuple[Quantity, ...]
     constraints: tuple[Constraint, ...]
@@ -182,7 +182,7 @@ def _column(among: Sequence[Quantity], kind: str) -> _Column:
 
 def compile_problem(
     given: Sequence[Quantity],
-    cases: Sequence[LoadCase],
+    cases: Sequence[Case],
     *,
     free: Sequence[str] = (),
     constraints: Sequence[Constraint] = (),
@@ -261,14 +261,14 @@ def _split(column: ca.MX, like: Sequence[ca.MX]) -> list[ca.MX]:
     return list(ca.vertsplit(column, np.cumsum([0, *(s.numel() for s in like)]).tolist()))
 
 
-def _outputs(function: Any, cases: Sequence[LoadCase]) -> ca.Function:
+def _outputs(function: Any, cases: Sequence[Case]) -> ca.Function:
     """Return the outputs of every case; names are prefixed by the case's name when there are several."""
     names = [key if len(cases) == 1 else f"{case.name}_{key}" for case in cases for key in case.outputs]
     made: ca.Function = function("outputs", [e for case in cases for e in case.outputs.values()], names)
     return made
 
 
-def _all_equations(cases: Sequence[LoadCase], constraints: Sequence[Constraint]) -> tuple[Equation, ...]:
+def _all_equations(cases: Sequence[Case], constraints: Sequence[Constraint]) -> tuple[Equation, ...]:
     """Stack the equations of the cases and constraints, with rows counted in the whole residual."""
     every: list[Equation] = []
     start = 0

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
-from weakref import finalize
 
 from softnlp.errors import InputError
 from softnlp.runner_blocked import run_blocked
@@ -72,7 +69,9 @@ def run_scenario(
 
         return run_design(scenario, progress, workers)
     if study == "workspace":
-        return _workspace(scenario, progress, workers, folder)
+        from softnlp.runner_workspace import run_workspace
+
+        return run_workspace(scenario, progress, workers, folder)
     return solve_steps(scenario, progress, branches)
 
 
@@ -85,22 +84,6 @@ def partial_run(scenario: Scenario, steps: Sequence[Step]) -> Run:
     """Return the run of a scenario that was stopped after some steps; a warning says so."""
     note = f"stopped by the user after {len(steps)} of {scenario.step_count} steps"
     return run_of(scenario, steps, note)
-
-
-def _workspace(
-    scenario: Scenario, progress: Callable[[int, Any], None] | None, workers: int, folder: str | PathLike[str] | None
-) -> Workspace:
-    """Solve every pose of a workspace and read them."""
-    from softnlp.workspace.read import load_workspace
-    from softnlp.workspace.run import run_sweep
-
-    with ExitStack() as stack:
-        place = folder or stack.enter_context(tempfile.TemporaryDirectory(prefix="softnlp-"))
-        report = None if progress is None else lambda news: progress(news.done, news)
-        run_sweep(scenario, place, workers=workers, progress=report)
-        solved = load_workspace(place)
-        finalize(solved, stack.pop_all().close)
-    return solved
 
 
 def _forward(scenario: Scenario, progress: Progress | None, branches: int) -> Run:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.columns import Columns, read_columns
+from softnlp.columns import TIME_COLUMN, Columns, read_columns
 from softnlp.contact_settings import CLOSURES, ContactSettings, ContactTask
 from softnlp.conventions import CONVENTIONS, Coefficients, Conventions
 from softnlp.errors import InputError, listed, nearest
@@ -21,7 +21,6 @@ from softnlp.evaluation.comparison import Comparison
 from softnlp.evaluation.variants import NAMED, OWN, Variant, every_variant, named_coefficients
 from softnlp.materials import Material, load_materials
 from softnlp.measured_rows import SCALARS, TIP_COLUMNS, RobotRows, rows_by_robot
-from softnlp.pressures import TIME_COLUMN
 from softnlp.ranges import noise_note
 from softnlp.reading import choices, read_text, shown
 from softnlp.robot import Robot

@@ -7,8 +7,10 @@ from collections.abc import Mapping
 import casadi as ca
 import numpy as np
 
-from softnlp.loadcase import Equation, LoadCase, RodFunctions, unpack_section
-from softnlp.quantities import Quantity, quantities
+from softnlp.case import Equation
+from softnlp.loadcase import LoadCase, RodFunctions, unpack_section
+from softnlp.quantities import quantities
+from softnlp.quantity import Quantity
 from softnlp.rod import STATE_SIZE
 from softnlp.transcription import Transcribed
 

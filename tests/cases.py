@@ -12,7 +12,8 @@ import numpy as np
 from softnlp.branch import branch_function, stretch_on_branch
 from softnlp.loadcase import LoadCase, RodFunctions, load_case, rod_functions
 from softnlp.problem import CompiledProblem, Constraint, compile_problem
-from softnlp.quantities import Model, Quantity, quantities
+from softnlp.quantities import Model, quantities
+from softnlp.quantity import Quantity
 from softnlp.solver import Engine, Solution, outputs
 from softnlp.transcription import MultipleShooting, Transcription
 

@@ -17,7 +17,8 @@ from witness_section import Section as WitnessSection
 from softnlp import rod
 from softnlp.conventions import AS_PRINTED, Coefficients
 from softnlp.loadcase import LoadCase, RodFunctions, load_case, rod_functions, unpack_section
-from softnlp.quantities import Model, Quantity, force_unit
+from softnlp.quantities import Model, force_unit
+from softnlp.quantity import Quantity
 from softnlp.robot import ROBOTS
 from softnlp.section import deform, stretch_balance
 from softnlp.tip import DEAD_LOADS, tip_conditions

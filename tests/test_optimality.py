@@ -12,7 +12,7 @@ import pytest
 from softnlp.errors import IllPosedError
 from softnlp.optimality import OPTIMAL, Bounds, kkt_error, misfit_slope, not_optimal, slopes
 from softnlp.problem import CompiledProblem, Constraint, compile_problem
-from softnlp.quantities import quantity
+from softnlp.quantity import quantity
 from softnlp.solver import Engine, Solution, certificate, violation
 from softnlp.studies.bounded import Limits, Measured, could_gain
 

@@ -13,7 +13,8 @@ from designs import silicone
 from softnlp.conventions import Coefficients
 from softnlp.errors import IllPosedError
 from softnlp.problem import Constraint
-from softnlp.quantities import Model, quantities, quantity
+from softnlp.quantities import Model, quantities
+from softnlp.quantity import quantity
 from softnlp.robot import ROBOTS
 from softnlp.rod import Loads
 from softnlp.solver import certificate

@@ -24,7 +24,8 @@ from softnlp.continuation import follow, straight_path
 from softnlp.conventions import Coefficients
 from softnlp.loadcase import rod_functions
 from softnlp.numerics import Numerics
-from softnlp.quantities import Model, quantity
+from softnlp.quantities import Model
+from softnlp.quantity import quantity
 from softnlp.robot import ROBOTS, Robot
 from softnlp.rod import Loads
 from softnlp.solver import Engine, Solution, SparseSolver, certificate, discretisation_correction, violation

@@ -26,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # benchmarks/ is not install
 from softnlp.cli import main
 from softnlp.errors import InputError
 from softnlp.rod import Loads
+from softnlp.runner_workspace import run_sweep
 from softnlp.scenario import load_scenario
 from softnlp.status import Status
 from softnlp.studies.statics import PoseSolver
@@ -35,7 +36,7 @@ from softnlp.workspace.dataset import data_hash, write_csv, write_workspace
 from softnlp.workspace.journal import Journal
 from softnlp.workspace.plan import Plan
 from softnlp.workspace.poses import Block
-from softnlp.workspace.run import CSV_FILE, JOURNAL_FILE, WORKSPACE_FILE, SweepError, SweepProgress, run_sweep
+from softnlp.workspace.run import CSV_FILE, JOURNAL_FILE, WORKSPACE_FILE, SweepError, SweepProgress
 
 VARIED = (
     "[workspace]\nlevels = 2\nto_bar = 0.9\nsets = [1]\n[workspace.vary]\n"

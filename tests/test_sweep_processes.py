@@ -18,12 +18,13 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # benchmarks/ is not install
 
 from benchmarks import sweep_kill
 from softnlp import __version__
+from softnlp.runner_workspace import run_sweep
 from softnlp.scenario import load_scenario
 from softnlp.workspace.chunk import ChunkSolver
 from softnlp.workspace.dataset import data_hash
 from softnlp.workspace.journal import Journal
 from softnlp.workspace.planning import plan_of
-from softnlp.workspace.run import JOURNAL_FILE, WORKSPACE_FILE, run_sweep
+from softnlp.workspace.run import JOURNAL_FILE, WORKSPACE_FILE
 
 
 def written(folder: Path, tables: str) -> Path:

@@ -11,6 +11,7 @@ import pytest
 from sweeps import HEAD, QUICK, made_up, plan
 
 from softnlp import load_scenario
+from softnlp.runner_workspace import run_sweep
 from softnlp.scenario import scenario_from_text
 from softnlp.schema_workspace import WorkspaceTable
 from softnlp.units import BAR
@@ -18,7 +19,6 @@ from softnlp.workspace.columns import columns
 from softnlp.workspace.dataset import write_workspace
 from softnlp.workspace.journal import Journal
 from softnlp.workspace.planning import plan_of
-from softnlp.workspace.run import run_sweep
 
 ROOT = Path(__file__).parents[1]
 DOCUMENT = (ROOT / "docs" / "workspace.md").read_text()

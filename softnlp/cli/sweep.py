@@ -91,8 +91,8 @@ def _run(
     csv: bool = False,
 ) -> SweepSummary:
     """Run a sweep with a progress bar, and write what goes beside its result."""
+    from softnlp.runner_workspace import run_sweep
     from softnlp.workspace.pool import cluster_executor
-    from softnlp.workspace.run import run_sweep
 
     with ExitStack() as stack:
         executor: Executor | None = None if cluster is None else stack.enter_context(cluster_executor(cluster))

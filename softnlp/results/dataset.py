@@ -33,7 +33,7 @@ from softnlp.results.inputs import (
 from softnlp.results.netcdf import dataset_bytes, said
 from softnlp.results.targets import INVERSE, TARGET_FIELDS, target_values
 from softnlp.solver import EquationResidual
-from softnlp.studies.step import STABLE_FLAGS, Run, Step, stable_flag
+from softnlp.studies.step import SELF_INTERSECTING_FLAGS, STABLE_FLAGS, Run, Step, stable_flag
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,7 +42,6 @@ Array = NDArray[np.float64]
 Variable = tuple[tuple[str, ...], Any, dict[str, Any]]
 
 AXES = ("x", "y", "z")
-SELF_INTERSECTING_FLAGS = {"not_solved": -1, "no": 0, "self_intersecting": 1}
 FLAGS = {STABLE: STABLE_FLAGS, SELF_INTERSECTING: SELF_INTERSECTING_FLAGS}
 
 

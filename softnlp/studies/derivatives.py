@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from softnlp.errors import InputError, nearest
 from softnlp.implicit import ImplicitDerivatives
 from softnlp.problem import CompiledProblem, compile_problem
-from softnlp.quantities import Quantity
+from softnlp.quantity import Quantity
 from softnlp.solver import Engine, Solution
 from softnlp.studies.blocked import BlockedSolver
 from softnlp.studies.blocked_grid import Blocked

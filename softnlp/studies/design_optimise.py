@@ -223,7 +223,7 @@ class Optimiser:
         fixed = {q.name for q in problem.fixed}
         p = problem.pack({name: value for name, value in values.items() if name in fixed})
         head = problem.pack_free({q.name: values[q.name] for q in problem.free})
-        x = np.concatenate([head, *(self._guess(case, begun, column) for case in problem.cases)])
+        x = np.concatenate([head, *(self._guess(case, begun, column) for case in posed.cases)])
         if posed.guard is not None:
             at_start, at_rest = float(posed.guard(x, p)), float(posed.guard(self._at_rest(posed, column), p))
             # A start nearer to a fold than designs may be is inside its own limit.
@@ -235,7 +235,7 @@ class Optimiser:
         """Return x of the straight robot without pressure or wall force."""
         head = posed.problem.pack_free({q.name: 0.0 if q.name == PRESSURE else q.nominal for q in posed.problem.free})
         parts = [head]
-        for case in posed.problem.cases:
+        for case in posed.cases:
             s, none = (
                 case.transcribed.points,
                 np.where(np.arange(column.size) < len(self.evaluator.direction), 0.0, column),

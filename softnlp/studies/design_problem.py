@@ -15,7 +15,8 @@ from softnlp.condensed import CondensedSolver
 from softnlp.loadcase import LoadCase, load_case
 from softnlp.optimality import Bounds, slopes
 from softnlp.problem import CompiledProblem, Constraint, compile_problem
-from softnlp.quantities import quantity, with_symbols
+from softnlp.quantities import with_symbols
+from softnlp.quantity import quantity
 from softnlp.robot import SELF_INTERSECTION, Robot
 from softnlp.rules import rules
 from softnlp.studies.design_evaluate import Evaluator, chamber_gaps, free_outputs, robot_outputs
@@ -59,6 +60,7 @@ class DesignProblem:
     """
 
     problem: CompiledProblem
+    cases: tuple[LoadCase, ...]
     limits: tuple[Limit, ...]
     guard: ca.Function | None
 
@@ -174,7 +176,8 @@ def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) ->
         constraints=constraints,
         objective=-task.sign * outputs[task.objective.name] / scale.symbol,
     )
-    return DesignProblem(problem, tuple(_limits(constraints, problem)), _guard(problem) if len(cases) > 1 else None)
+    guard = _guard(problem) if len(cases) > 1 else None
+    return DesignProblem(problem, tuple(cases), tuple(_limits(constraints, problem)), guard)
 
 
 def _guard(problem: CompiledProblem) -> ca.Function:

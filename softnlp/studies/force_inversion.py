@@ -15,7 +15,8 @@ from softnlp.loadcase import LoadCase, load_case
 from softnlp.materials import Material
 from softnlp.numerics import Numerics
 from softnlp.problem import CompiledProblem, Constraint, compile_problem
-from softnlp.quantities import Model, Quantity, quantity
+from softnlp.quantities import Model
+from softnlp.quantity import Quantity, quantity
 from softnlp.robot import LOWERABLE_RULES, Robot, check
 from softnlp.rod import Loads
 from softnlp.solver import Engine

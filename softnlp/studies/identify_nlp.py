@@ -20,7 +20,8 @@ from softnlp.loadcase import LoadCase, load_case, rod_functions
 from softnlp.materials import Material
 from softnlp.numerics import Numerics
 from softnlp.problem import CompiledProblem, compile_problem
-from softnlp.quantities import Model, Quantity
+from softnlp.quantities import Model
+from softnlp.quantity import Quantity
 from softnlp.rod import Loads
 from softnlp.solver import Engine
 from softnlp.status import Status

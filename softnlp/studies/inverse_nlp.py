@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from softnlp.loadcase import load_case
 from softnlp.problem import CompiledProblem, Constraint, compile_problem
-from softnlp.quantities import quantity
+from softnlp.quantity import quantity
 from softnlp.rod import Loads
 from softnlp.solver import Engine, Solution
 from softnlp.studies.aiming import Aim

@@ -68,6 +68,8 @@ class SectionRadii:
 
 STABLE_FLAGS = {"undefined": -1, "unstable": 0, "stable": 1}
 """What files of numbers hold for `Pose.stable`."""
+SELF_INTERSECTING_FLAGS = {"not_solved": -1, "no": 0, "self_intersecting": 1}
+"""What files of numbers hold for `Fit.self_intersecting`."""
 STABLE_MEANING = "no conjugate point on the rod; undefined under a dead tip moment and without a solution"
 
 

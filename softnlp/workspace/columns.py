@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.gravity import gravity_words
-from softnlp.results.dataset import SELF_INTERSECTING_FLAGS
 from softnlp.results.fields import SELF_INTERSECTING
 from softnlp.robot import DIMENSIONS
-from softnlp.studies.step import STABLE_FLAGS, STABLE_MEANING
+from softnlp.studies.step import SELF_INTERSECTING_FLAGS, STABLE_FLAGS, STABLE_MEANING
 from softnlp.units import BAR, DEGREE, MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.workspace.plan import Plan
 from softnlp.workspace.poses import STATUSES, Lane, Rows

@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.columns import read_columns
+from softnlp.columns import TIME_COLUMN, read_columns
 from softnlp.errors import InputError
-from softnlp.pressures import TIME_COLUMN
 from softnlp.ranges import noise_note, without_noise
 from softnlp.units import BAR, MILLIMETRE
 

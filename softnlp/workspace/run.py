@@ -19,13 +19,11 @@ from softnlp.errors import SoftnlpError
 from softnlp.reading import one_line
 from softnlp.results.files import make_folder
 from softnlp.results.inputs import package_version
-from softnlp.scenario import Scenario, scenario_of
 from softnlp.units import BAR
 from softnlp.workspace.chunk import ChunkSolver
 from softnlp.workspace.dataset import fingerprint_of, write_csv, write_workspace
 from softnlp.workspace.journal import Journal
 from softnlp.workspace.plan import Plan
-from softnlp.workspace.planning import plan_of
 from softnlp.workspace.pool import Crew, executor_crew, process_crew
 from softnlp.workspace.poses import STATUSES, Block
 
@@ -102,59 +100,20 @@ Stop = Callable[[], bool]
 _Tell = Callable[[], None]
 
 
-def run_sweep(
-    scenario: Scenario | Plan,
+def sweep(
+    plan: Plan,
     folder: str | PathLike[str],
+    about: Mapping[str, str],
     *,
     executor: Executor | None = None,
     workers: int = 1,
     resume: bool = False,
     progress: Report | None = None,
     stop: Stop | None = None,
-    about: Mapping[str, str] | None = None,
     csv: bool = False,
 ) -> SweepSummary:
-    """Solve every pose of a workspace and write `workspace.nc`: the same, whoever solves what and in how many runs.
-
-    Parameters
-    ----------
-    scenario
-        Of study "workspace", or a plan of one.
-    folder
-        Made where missing, for the journal and the result.
-    executor
-        Solves the chunks, such as that of a Dask client; None takes processes of this machine.
-    workers
-        Processes, which do not run a script again; this one alone for one worker or very few poses.
-    resume
-        Continue the sweep that has begun in the folder, if one has.
-    progress
-        Called where poses were confirmed, the first time after the workers have started.
-    stop
-        Asked now and then whether to stop; what is being solved is finished and kept.
-    about
-        Attributes of the result file beside those of a scenario, such as a title.
-    csv
-        Write `workspace.csv` as well; one that is there is replaced in any case.
-
-    Returns
-    -------
-    SweepSummary
-        Counts and files; `softnlp.workspace.read.load_workspace` reads the poses.
-
-    Raises
-    ------
-    InputError
-        For anything but such a scenario or a plan; where the folder holds another sweep, or cannot be written.
-    SweepError
-        Where workers die again and again, or a chunk cannot be solved. What was confirmed before is kept.
-    """
-    if isinstance(scenario, Plan):
-        plan, told = scenario, dict(about or {})
-    else:
-        plan = plan_of(scenario_of(scenario, "workspace", "softnlp.run_sweep"))
-        warnings = json.dumps(scenario.warnings)
-        told = {"title": scenario.title, "scenario": scenario.text, "warnings": warnings, **(about or {})}
+    """Solve every pose of a plan; as `softnlp.run_sweep`. about : attributes of the result file."""
+    told = dict(about)
     began = time.monotonic()
     folder = make_folder(folder)
     result, table = folder / WORKSPACE_FILE, folder / CSV_FILE

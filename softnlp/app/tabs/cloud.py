@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from softnlp.app.job import Progress, Stopped
 from softnlp.errors import InputError
+from softnlp.runner_workspace import run_sweep
 from softnlp.scenario import Scenario
 from softnlp.units import BAR, MILLIMETRE
 from softnlp.workspace.planning import plan_of
 from softnlp.workspace.read import Workspace, column_names, load_workspace, read_column
-from softnlp.workspace.run import WORKSPACE_FILE, SweepProgress, SweepSummary, run_sweep
+from softnlp.workspace.run import WORKSPACE_FILE, SweepProgress, SweepSummary
 from softnlp.workspace.summary import Summary, summarise
 from softnlp.workspace.task import WorkspaceTask
 

@@ -1,0 +1,43 @@
+"""A physical quantity as a named symbol."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+_INF = float("inf")
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """A named physical quantity.
+
+    symbol : MX column of `size` entries, SI. nominal : its value when fixed and its first guess when free.
+    scale : typical size, which makes the unknown of order one. lower, upper : bounds when free.
+    """
+
+    name: str
+    unit: str
+    symbol: ca.MX
+    nominal: Array
+    scale: float = 1.0
+    lower: float = -_INF
+    upper: float = _INF
+
+    @property
+    def size(self) -> int:
+        """The number of entries."""
+        return int(self.nominal.size)
+
+
+def quantity(
+    name: str, unit: str, nominal: Any, *, scale: float = 1.0, lower: float = -_INF, upper: float = _INF
+) -> Quantity:
+    """Declare a quantity; `nominal` is a number or a flat sequence in SI units."""
+    value = np.atleast_1d(np.asarray(nominal, dtype=float)).ravel()
+    return Quantity(name, unit, ca.MX.sym(name, value.size), value, scale, lower, upper)
