@@ -38,11 +38,11 @@ from benchmarks.numpy_field import numpy_field
 from benchmarks.paper_blocked import Weights, solve_blocked
 from benchmarks.rods import Rods
 from softnlp import BAR, Loads, Numerics, material, robot
-from softnlp.contact_settings import ContactSettings
-from softnlp.quantities import Model
-from softnlp.robot import ROBOTS
-from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.wall import standing_wall
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.quantities import Model
+from softnlp.model.robot import ROBOTS
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.wall import standing_wall
 
 NAMES = [name for name in ROBOTS if name.startswith("D")]
 SILICONE = material("Ecoflex 00-50")

@@ -18,12 +18,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.contact_settings import ClosureWeights, ContactSettings
-from softnlp.conventions import COEFFICIENT_SETS
-from softnlp.materials import material
-from softnlp.robot import robot
+from softnlp.base.units import BAR
+from softnlp.model.contact_settings import ClosureWeights, ContactSettings
+from softnlp.model.conventions import COEFFICIENT_SETS
+from softnlp.model.materials import material
+from softnlp.model.robot import robot
 from softnlp.studies.blocked_force import blocked_force
-from softnlp.units import BAR
 
 Array = NDArray[np.float64]
 

@@ -19,8 +19,8 @@ from benchmarks.paper_method import Array, Rod
 from benchmarks.race import Entry
 from benchmarks.rods import Rods
 from softnlp import Loads, Numerics, material, robot
-from softnlp.quantities import Model
-from softnlp.studies.statics import PoseSolver
+from softnlp.model.quantities import Model
+from softnlp.statics.solver import PoseSolver
 
 MODEL = Model(replace(robot("D10L60"), length=0.5), material("Ecoflex 00-50"))
 LOAD = 4.0  # F L^2 / EI

@@ -26,9 +26,9 @@ import numpy as np
 from scipy.optimize import minimize
 
 from softnlp import DesignTask, Numerics, at_least, design, forward, load_scenario
-from softnlp.quantities import Model
-from softnlp.robot import Robot
-from softnlp.scenario import Scenario
+from softnlp.model.quantities import Model
+from softnlp.model.robot import Robot
+from softnlp.scenario.read import Scenario
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.design_evaluate import Evaluator, broken_rules, chamber_gaps, missed, pose_outputs, robot_outputs
 from softnlp.studies.design_task import OUTPUTS, Setting

@@ -18,18 +18,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.conventions import Coefficients
-from softnlp.materials import material
-from softnlp.numerics import Numerics
-from softnlp.quantities import Model
-from softnlp.robot import robot
-from softnlp.rod import Loads
+from softnlp.base.units import BAR
+from softnlp.model.conventions import Coefficients
+from softnlp.model.materials import material
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.robot import robot
+from softnlp.model.rod import Loads
 from softnlp.studies.forward import forward
 from softnlp.studies.identify import identify
 from softnlp.studies.measurements import Measurements
 from softnlp.studies.predicted_pose import ArcPoses
 from softnlp.studies.trial import TrialPoses
-from softnlp.units import BAR
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.blocked_measured import MEASURED as FORCES
-from softnlp.materials import material
+from softnlp.model.materials import material
 
 ANGLES = {  # [deg] at 1.5 bar, one set and two sets
     **{"D25L60": (107.67, 147.05), "D20L60": (118.57, 161.03)},

@@ -27,10 +27,10 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from softnlp import BAR, Loads, Numerics, Status, material, robot
-from softnlp.quantities import Model
+from softnlp.model.quantities import Model
+from softnlp.statics.solver import PoseSolver, Solved
 from softnlp.studies.inverse_solver import InverseSolver
 from softnlp.studies.inverse_task import InverseTask, Target
-from softnlp.studies.statics import PoseSolver, Solved
 
 Array = NDArray[np.float64]
 TipOf = Callable[[Array, Any], tuple[Array, Any]]

@@ -23,17 +23,17 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from benchmarks.paper_method import Array
-from softnlp.branch import stretch_on_branch
-from softnlp.continuation import Path, follow, straight_path
-from softnlp.numerics import Numerics
-from softnlp.quantities import Model
-from softnlp.rod import STATE_SIZE, Loads
-from softnlp.solver import Engine, Solution, SparseSolver, violation
-from softnlp.stability import conjugate_points, transition_functions
-from softnlp.studies.attempts import LOADS
-from softnlp.studies.pose_grid import Grid, pose_distance
-from softnlp.studies.statics import PoseSolver
-from softnlp.transcription import RK4, rk_step
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.rod import STATE_SIZE, Loads
+from softnlp.nlp.continuation import Path, follow, straight_path
+from softnlp.nlp.solver import Engine, Solution, SparseSolver, violation
+from softnlp.nlp.transcription import RK4, rk_step
+from softnlp.statics.attempts import LOADS
+from softnlp.statics.branch import stretch_on_branch
+from softnlp.statics.pose_grid import Grid, pose_distance
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.stability import conjugate_points, transition_functions
 
 INTERVALS, COLLOCATION_INTERVALS = 40, 10
 MOST_ITERATIONS = 50

@@ -22,16 +22,16 @@ from statistics import median
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.branch import branch_function, stretch_on_branch
-from softnlp.errors import SoftnlpError
-from softnlp.materials import Material, load_materials
-from softnlp.quantities import Model, quantities
-from softnlp.robot import ROBOTS, Robot
-from softnlp.rod import Loads
-from softnlp.section import deform
-from softnlp.status import Status
+from softnlp.base.errors import SoftnlpError
+from softnlp.base.status import Status
+from softnlp.model.materials import Material, load_materials
+from softnlp.model.quantities import Model, quantities
+from softnlp.model.robot import ROBOTS, Robot
+from softnlp.model.rod import Loads
+from softnlp.model.section import deform
+from softnlp.statics.branch import branch_function, stretch_on_branch
+from softnlp.statics.step import Step
 from softnlp.studies.forward import forward
-from softnlp.studies.step import Step
 
 MOST_STRETCH = 1.8
 MOST_FORCE = 3.0  # EI / L^2

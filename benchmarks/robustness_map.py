@@ -30,7 +30,7 @@ from benchmarks.paper_method import Array
 from benchmarks.robust_methods import Methods, Pose
 from softnlp import BAR, Loads, material, robot
 from softnlp.cli.console import progress
-from softnlp.quantities import Model, force_unit
+from softnlp.model.quantities import Model, force_unit
 
 MODEL = Model(robot("D15L60"), material("Ecoflex 00-50"))
 BUCKLING = float(np.pi**2 / 4 * force_unit(MODEL))  # [N]

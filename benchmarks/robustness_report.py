@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softnlp.plots.style import GREY, INK, SMALL, in_own_style, new_figure, save_figure
+from softnlp.figures.style import GREY, INK, SMALL, in_own_style, new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

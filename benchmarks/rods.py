@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.paper_method import Array, Rod
-from softnlp.branch import branch_function, stretch_on_branch
-from softnlp.quantities import Model, quantities
-from softnlp.rod import Loads
-from softnlp.section import deform
-from softnlp.status import Status
+from softnlp.base.status import Status
+from softnlp.model.quantities import Model, quantities
+from softnlp.model.rod import Loads
+from softnlp.model.section import deform
+from softnlp.statics.branch import branch_function, stretch_on_branch
 
 NO_LOADS = Loads()
 

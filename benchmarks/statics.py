@@ -35,9 +35,9 @@ from benchmarks.numpy_field import numpy_field
 from benchmarks.paper_method import Array, Rod, solve_pose
 from benchmarks.rods import Rods
 from softnlp import BAR, Loads, Numerics, material, robot
-from softnlp.quantities import Model
-from softnlp.studies.statics import PoseSolver
-from softnlp.units import STANDARD_GRAVITY
+from softnlp.base.units import STANDARD_GRAVITY
+from softnlp.model.quantities import Model
+from softnlp.statics.solver import PoseSolver
 
 MODEL = Model(robot("D25L60"), material("Ecoflex 00-50"))
 PRESSURES = np.linspace(0, 1.5 * BAR, 11)[:, None] * np.array([1.0, 0.0, 0.0])

@@ -23,14 +23,14 @@ from benchmarks.paper_method import Array, solve_pose
 from benchmarks.race import Entry, Judge
 from benchmarks.rods import Rods
 from softnlp import Loads, Numerics, robot
-from softnlp.contact_settings import ClosureWeights, ContactSettings
-from softnlp.quantities import Model
-from softnlp.studies.blocked import BlockedSolver
+from softnlp.batch.chunk import ChunkSolver
+from softnlp.model.contact_settings import ClosureWeights, ContactSettings
+from softnlp.model.quantities import Model
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.wall import standing_wall
 from softnlp.studies.inverse_solver import InverseSolver
 from softnlp.studies.inverse_task import Target
-from softnlp.studies.statics import PoseSolver
-from softnlp.studies.wall import standing_wall
-from softnlp.workspace.chunk import ChunkSolver
 
 REFERENCE = Numerics(intervals=160)
 LEVELS = 13  # of each set in the sweep

@@ -15,9 +15,9 @@ from benchmarks.rods import NO_LOADS, Rods
 from benchmarks.studies import Task, paper_tip_state
 from softnlp import DesignTask, load_scenario
 from softnlp import design as our_design
-from softnlp.conventions import Coefficients
-from softnlp.quantities import Model
-from softnlp.robot import Robot
+from softnlp.model.conventions import Coefficients
+from softnlp.model.quantities import Model
+from softnlp.model.robot import Robot
 from softnlp.studies.design_evaluate import chamber_gaps, robot_outputs
 
 

@@ -36,14 +36,14 @@ from benchmarks.numpy_field import numpy_field
 from benchmarks.paper_method import solve_pose
 from benchmarks.statics import rod_at
 from softnlp import BAR, Loads, Numerics, material, robot
-from softnlp.contact_settings import ContactSettings
-from softnlp.quantities import Model
-from softnlp.runner_workspace import run_sweep
-from softnlp.units import STANDARD_GRAVITY
-from softnlp.workspace.chunk import ChunkSolver
-from softnlp.workspace.dataset import data_hash
-from softnlp.workspace.plan import Plan, cells
-from softnlp.workspace.run import WORKSPACE_FILE
+from softnlp.base.units import STANDARD_GRAVITY
+from softnlp.batch.chunk import ChunkSolver
+from softnlp.batch.plan import Plan, cells
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.quantities import Model
+from softnlp.scenario.run_workspace import run_sweep
+from softnlp.sweep.dataset import data_hash
+from softnlp.sweep.run import WORKSPACE_FILE
 
 MODEL = Model(robot("D25L60"), material("Ecoflex 00-50"))
 LOADS = Loads(tip_force=(0.02, 0.0, -0.01), gravity=(0.0, 0.0, -STANDARD_GRAVITY))

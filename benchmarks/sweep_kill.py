@@ -20,12 +20,12 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from softnlp.runner_workspace import run_sweep
-from softnlp.scenario import scenario_from_text
-from softnlp.workspace.dataset import data_hash
-from softnlp.workspace.plan import Plan
-from softnlp.workspace.planning import plan_of
-from softnlp.workspace.run import WORKSPACE_FILE, SweepProgress
+from softnlp.batch.plan import Plan
+from softnlp.scenario.planning import plan_of
+from softnlp.scenario.read import scenario_from_text
+from softnlp.scenario.run_workspace import run_sweep
+from softnlp.sweep.dataset import data_hash
+from softnlp.sweep.run import WORKSPACE_FILE, SweepProgress
 
 SCENARIO = """study = "workspace"
 robot = { name = "D25L60" }

@@ -11,43 +11,50 @@ from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from softnlp.base.old_paths import install as install_old_paths
+
 if TYPE_CHECKING:
-    from softnlp.contact_settings import Closure as Closure
-    from softnlp.contact_settings import ClosureWeights as ClosureWeights
-    from softnlp.contact_settings import ContactSettings as ContactSettings
-    from softnlp.conventions import AS_PRINTED as AS_PRINTED
-    from softnlp.conventions import COEFFICIENT_SETS as COEFFICIENT_SETS
-    from softnlp.conventions import REPRODUCTION as REPRODUCTION
-    from softnlp.conventions import Coefficients as Coefficients
-    from softnlp.conventions import Conventions as Conventions
-    from softnlp.errors import IllPosedError as IllPosedError
-    from softnlp.errors import InputError as InputError
-    from softnlp.errors import MaterialError as MaterialError
-    from softnlp.errors import RobotError as RobotError
-    from softnlp.errors import SoftnlpError as SoftnlpError
-    from softnlp.evaluation.compare import compare as compare
-    from softnlp.evaluation.variants import Variant as Variant
-    from softnlp.laws import formula_law as formula_law
-    from softnlp.laws import function_law as function_law
-    from softnlp.materials import Material as Material
-    from softnlp.materials import load_materials as load_materials
-    from softnlp.materials import material as material
-    from softnlp.numerics import Numerics as Numerics
+    from softnlp.base.errors import IllPosedError as IllPosedError
+    from softnlp.base.errors import InputError as InputError
+    from softnlp.base.errors import MaterialError as MaterialError
+    from softnlp.base.errors import RobotError as RobotError
+    from softnlp.base.errors import SoftnlpError as SoftnlpError
+    from softnlp.base.status import Status as Status
+    from softnlp.base.units import BAR as BAR
+    from softnlp.base.units import DEGREE as DEGREE
+    from softnlp.base.units import MILLIMETRE as MILLIMETRE
+    from softnlp.base.units import NEWTON_MILLIMETRE as NEWTON_MILLIMETRE
+    from softnlp.model.contact_settings import Closure as Closure
+    from softnlp.model.contact_settings import ClosureWeights as ClosureWeights
+    from softnlp.model.contact_settings import ContactSettings as ContactSettings
+    from softnlp.model.conventions import AS_PRINTED as AS_PRINTED
+    from softnlp.model.conventions import COEFFICIENT_SETS as COEFFICIENT_SETS
+    from softnlp.model.conventions import REPRODUCTION as REPRODUCTION
+    from softnlp.model.conventions import Coefficients as Coefficients
+    from softnlp.model.conventions import Conventions as Conventions
+    from softnlp.model.laws import formula_law as formula_law
+    from softnlp.model.laws import function_law as function_law
+    from softnlp.model.materials import Material as Material
+    from softnlp.model.materials import load_materials as load_materials
+    from softnlp.model.materials import material as material
+    from softnlp.model.numerics import Numerics as Numerics
+    from softnlp.model.robot import ROBOTS as ROBOTS
+    from softnlp.model.robot import Robot as Robot
+    from softnlp.model.robot import robot as robot
+    from softnlp.model.rod import Loads as Loads
     from softnlp.results import save as save
     from softnlp.results import to_dataset as to_dataset
     from softnlp.results import to_json as to_json
-    from softnlp.robot import ROBOTS as ROBOTS
-    from softnlp.robot import Robot as Robot
-    from softnlp.robot import robot as robot
-    from softnlp.rod import Loads as Loads
-    from softnlp.runner import run_scenario as run_scenario
-    from softnlp.runner_design import run_design as run_design
-    from softnlp.runner_workspace import run_sweep as run_sweep
-    from softnlp.scenario import load_scenario as load_scenario
-    from softnlp.status import Status as Status
+    from softnlp.scenario.read import load_scenario as load_scenario
+    from softnlp.scenario.run import run_scenario as run_scenario
+    from softnlp.scenario.run_design import run_design as run_design
+    from softnlp.scenario.run_workspace import run_sweep as run_sweep
+    from softnlp.statics.step import Run as Run
+    from softnlp.statics.step import Step as Step
     from softnlp.studies.blocked_force import blocked_force as blocked_force
     from softnlp.studies.blocked_force import constrained_pose as constrained_pose
     from softnlp.studies.blocked_force import force_against_offset as force_against_offset
+    from softnlp.studies.compare import compare as compare
     from softnlp.studies.design import Design as Design
     from softnlp.studies.design import design as design
     from softnlp.studies.design_task import DesignTask as DesignTask
@@ -67,34 +74,31 @@ if TYPE_CHECKING:
     from softnlp.studies.sensitivity import sensitivities as sensitivities
     from softnlp.studies.sensitivity import tip_compliance as tip_compliance
     from softnlp.studies.sensitivity import tip_jacobian as tip_jacobian
-    from softnlp.studies.step import Run as Run
-    from softnlp.studies.step import Step as Step
     from softnlp.studies.tensile import fit_tensile as fit_tensile
     from softnlp.studies.tolerances import error_bars as error_bars
     from softnlp.studies.tolerances import monte_carlo as monte_carlo
+    from softnlp.studies.variants import Variant as Variant
     from softnlp.studies.weight_sensitivity import weight_sensitivity as weight_sensitivity
-    from softnlp.units import BAR as BAR
-    from softnlp.units import DEGREE as DEGREE
-    from softnlp.units import MILLIMETRE as MILLIMETRE
-    from softnlp.units import NEWTON_MILLIMETRE as NEWTON_MILLIMETRE
 
 _HOMES = {
-    "contact_settings": ("Closure", "ClosureWeights", "ContactSettings"),
-    "conventions": ("AS_PRINTED", "COEFFICIENT_SETS", "REPRODUCTION", "Coefficients", "Conventions"),
-    "errors": ("IllPosedError", "InputError", "MaterialError", "RobotError", "SoftnlpError"),
-    "evaluation.compare": ("compare",),
-    "evaluation.variants": ("Variant",),
-    "laws": ("formula_law", "function_law"),
-    "materials": ("Material", "load_materials", "material"),
-    "numerics": ("Numerics",),
+    "base.errors": ("IllPosedError", "InputError", "MaterialError", "RobotError", "SoftnlpError"),
+    "base.status": ("Status",),
+    "base.units": ("BAR", "DEGREE", "MILLIMETRE", "NEWTON_MILLIMETRE"),
+    "model.contact_settings": ("Closure", "ClosureWeights", "ContactSettings"),
+    "model.conventions": ("AS_PRINTED", "COEFFICIENT_SETS", "REPRODUCTION", "Coefficients", "Conventions"),
+    "model.laws": ("formula_law", "function_law"),
+    "model.materials": ("Material", "load_materials", "material"),
+    "model.numerics": ("Numerics",),
+    "model.robot": ("ROBOTS", "Robot", "robot"),
+    "model.rod": ("Loads",),
     "results": ("save", "to_dataset", "to_json"),
-    "robot": ("ROBOTS", "Robot", "robot"),
-    "rod": ("Loads",),
-    "runner": ("run_scenario",),
-    "runner_design": ("run_design",),
-    "scenario": ("load_scenario",),
-    "status": ("Status",),
+    "scenario.read": ("load_scenario",),
+    "scenario.run": ("run_scenario",),
+    "scenario.run_design": ("run_design",),
+    "scenario.run_workspace": ("run_sweep",),
+    "statics.step": ("Run", "Step"),
     "studies.blocked_force": ("blocked_force", "constrained_pose", "force_against_offset"),
+    "studies.compare": ("compare",),
     "studies.design": ("Design", "design"),
     "studies.design_task": ("DesignTask", "PressureSteps", "Range", "at_least", "at_most"),
     "studies.ellipsoids": ("compliance_ellipsoid", "manipulability", "stiffness_ellipsoid"),
@@ -105,12 +109,10 @@ _HOMES = {
     "studies.measurements": ("Measurements",),
     "studies.report": ("sensitivity_report",),
     "studies.sensitivity": ("sensitivities", "tip_compliance", "tip_jacobian"),
-    "studies.step": ("Run", "Step"),
     "studies.tensile": ("fit_tensile",),
     "studies.tolerances": ("error_bars", "monte_carlo"),
+    "studies.variants": ("Variant",),
     "studies.weight_sensitivity": ("weight_sensitivity",),
-    "units": ("BAR", "DEGREE", "MILLIMETRE", "NEWTON_MILLIMETRE"),
-    "runner_workspace": ("run_sweep",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -118,7 +120,7 @@ __all__ = sorted([*_HOME_OF, "__version__"])
 
 
 class _Package(ModuleType):
-    """The package: `robot` stays the function when the submodule of that name is imported, in whatever order."""
+    """The package: `robot` stays the function when the module that had this name is imported, in whatever order."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in _HOME_OF or not isinstance(value, ModuleType):
@@ -126,6 +128,7 @@ class _Package(ModuleType):
 
 
 sys.modules[__name__].__class__ = _Package
+install_old_paths()
 
 
 def __getattr__(name: str) -> Any:

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from softnlp.contact_settings import ClosureWeights, ContactSettings
-from softnlp.conventions import REPRODUCTION, Coefficients
-from softnlp.materials import material
-from softnlp.robot import Robot, robot
-from softnlp.rod import Loads
-from softnlp.solver import EquationResidual
-from softnlp.status import Status
-from softnlp.studies.step import Contact, Pose, Run, SectionRadii, Shape, Step
+from softnlp.base.status import Status
+from softnlp.model.contact_settings import ClosureWeights, ContactSettings
+from softnlp.model.conventions import REPRODUCTION, Coefficients
+from softnlp.model.materials import material
+from softnlp.model.robot import Robot, robot
+from softnlp.model.rod import Loads
+from softnlp.nlp.solver import EquationResidual
+from softnlp.statics.step import Contact, Pose, Run, SectionRadii, Shape, Step
 
 POINTS = 31
 BENDING_STIFFNESS = 7.1e-4  # [N m^2], of the order of a D25 robot's

@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from softnlp.conventions import REPRODUCTION, Coefficients
-from softnlp.loadcase import rod_functions
-from softnlp.materials import material
-from softnlp.quantities import Model, quantities
-from softnlp.results.inputs import coefficients_table, conventions_table, loads_table, material_table, robot_table
-from softnlp.robot import robot
-from softnlp.rod import Loads
-from softnlp.units import BAR, DEGREE, MILLIMETRE
+from softnlp.base.units import BAR, DEGREE, MILLIMETRE
+from softnlp.model.conventions import REPRODUCTION, Coefficients
+from softnlp.model.inputs import coefficients_table, conventions_table, loads_table, material_table, robot_table
+from softnlp.model.materials import material
+from softnlp.model.quantities import Model, quantities
+from softnlp.model.robot import robot
+from softnlp.model.rod import Loads
+from softnlp.statics.loadcase import rod_functions
 
 MODEL = Model(robot("D25L60"), material("Ecoflex 00-50"), Coefficients(), REPRODUCTION)
 

@@ -9,13 +9,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from softnlp.branch import branch_function, stretch_on_branch
-from softnlp.loadcase import LoadCase, RodFunctions, load_case, rod_functions
-from softnlp.problem import CompiledProblem, Constraint, compile_problem
-from softnlp.quantities import Model, quantities
-from softnlp.quantity import Quantity
-from softnlp.solver import Engine, Solution, outputs
-from softnlp.transcription import MultipleShooting, Transcription
+from softnlp.base.quantity import Quantity
+from softnlp.model.quantities import Model, quantities
+from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
+from softnlp.nlp.solver import Engine, Solution, outputs
+from softnlp.nlp.transcription import MultipleShooting, Transcription
+from softnlp.statics.branch import branch_function, stretch_on_branch
+from softnlp.statics.loadcase import LoadCase, RodFunctions, load_case, rod_functions
 
 Build = Callable[[Sequence[LoadCase], Mapping[str, Quantity]], Any]
 METHOD = MultipleShooting(24)

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from softnlp import COEFFICIENT_SETS, ContactSettings, material, robot
-from softnlp.evaluation.comparison import Comparison
-from softnlp.evaluation.observed import Observed
-from softnlp.evaluation.simulated import Solved
-from softnlp.evaluation.variants import every_variant
-from softnlp.status import Status
+from softnlp.base.status import Status
+from softnlp.studies.comparison import Comparison
+from softnlp.studies.observed import Observed
+from softnlp.studies.simulated import Solved
+from softnlp.studies.variants import every_variant
 
 ECOFLEX = material("Ecoflex 00-50")
 

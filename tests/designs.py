@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from witness_section import LAWS, Body, Choices, NoRoot, Rubber, Section, Unstable, balance_pressure, section
 
-from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
-from softnlp.materials import Material, load_materials
-from softnlp.robot import Robot, violations
-from softnlp.rod import Loads
+from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.model.materials import Material, load_materials
+from softnlp.model.robot import Robot, violations
+from softnlp.model.rod import Loads
 
 SILICONES = ("Dragon Skin 10", "Ecoflex 00-50", "Ecoflex 00-30", "Ecoflex 00-20", "Ecoflex 00-10")
 LAW_NAMES = tuple(LAWS)

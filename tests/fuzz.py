@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from softnlp.base.reading import DEEPEST, LARGEST_TOML
 from softnlp.cli import main
-from softnlp.reading import DEEPEST, LARGEST_TOML
 
 SHIPPED = Path(__file__).parents[1] / "scenarios"
 COMPARED = ("compare/angles", "compare/forces")

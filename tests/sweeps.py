@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from softnlp.scenario import Scenario, scenario_from_text
-from softnlp.status import Status
-from softnlp.workspace.plan import Plan, cells
-from softnlp.workspace.planning import plan_of
-from softnlp.workspace.poses import STATUSES, Block, unsolved_rows
+from softnlp.base.status import Status
+from softnlp.batch.plan import Plan, cells
+from softnlp.batch.poses import STATUSES, Block, unsolved_rows
+from softnlp.scenario.planning import plan_of
+from softnlp.scenario.read import Scenario, scenario_from_text
 
 HEAD = """study = "workspace"
 [robot]

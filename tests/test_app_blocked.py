@@ -28,9 +28,9 @@ from softnlp.app.tabs.contact_table import (
     with_mode,
     with_wall,
 )
-from softnlp.contact_settings import CLOSURES as KNOWN
-from softnlp.errors import InputError
-from softnlp.units import BAR
+from softnlp.base.errors import InputError
+from softnlp.base.units import BAR
+from softnlp.model.contact_settings import CLOSURES as KNOWN
 
 
 def test_every_closure_says_what_it_is_good_for() -> None:

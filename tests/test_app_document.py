@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from softnlp.app.document import Document
-from softnlp.errors import InputError
-from softnlp.scenario import scenario_from_text
-from softnlp.scenario_check import SCHEMAS
+from softnlp.base.errors import InputError
+from softnlp.scenario.check import SCHEMAS
+from softnlp.scenario.read import scenario_from_text
 
 COMMENTED = """\
 # what I tried on Monday

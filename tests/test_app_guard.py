@@ -18,8 +18,8 @@ pytest.importorskip("nicegui", reason="the extra gui is not installed")
 from benchmarks.app import served
 from softnlp.app.guard import Guard, authority, inside, refusal, root_path, trusted_host
 from softnlp.app.server import address_of, free_port, url_of
+from softnlp.base.errors import InputError
 from softnlp.cli import main
-from softnlp.errors import InputError
 
 HERE = ("127.0.0.1", 8080)
 OWN_HOSTS = ["127.0.0.1:8080", "localhost:8080", "LocalHost:8080", "localhost.:8080", "127.0.0.1.", "[::1]:8080"]

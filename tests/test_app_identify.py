@@ -21,9 +21,9 @@ from softnlp.app.session import LARGEST_FILE
 from softnlp.app.stage import Stage
 from softnlp.app.tabs.identify import identify_tab
 from softnlp.app.tabs.identify_table import LETTERS, bounds_of, first_free, with_bound, with_free
-from softnlp.scenario import scenario_from_text
+from softnlp.base.units import DEGREE, MILLIMETRE
+from softnlp.scenario.read import scenario_from_text
 from softnlp.studies.free_constants import COEFFICIENTS
-from softnlp.units import DEGREE, MILLIMETRE
 
 FILES = Path(__file__).parents[1] / "scenarios" / "files"
 TRUE = Coefficients(elongation=0.5, bending=1.0)

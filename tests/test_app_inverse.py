@@ -25,7 +25,7 @@ from softnlp.app.tabs.target_table import (
     with_picked,
     without,
 )
-from softnlp.units import MILLIMETRE
+from softnlp.base.units import MILLIMETRE
 
 
 def test_targets_stay_paired_whatever_is_chosen() -> None:

@@ -30,9 +30,9 @@ from softnlp.app.panels.material import material_panel
 from softnlp.app.session import Session
 from softnlp.app.stretch import PoseStretch
 from softnlp.app.theme import figure_config, on_dark
-from softnlp.laws import LAWS
-from softnlp.materials import load_materials, material, material_from_table
-from softnlp.scenario import scenario_from_text
+from softnlp.model.laws import LAWS
+from softnlp.model.materials import load_materials, material, material_from_table
+from softnlp.scenario.read import scenario_from_text
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 ECOFLEX = "Ecoflex 00-50"

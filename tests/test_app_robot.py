@@ -16,10 +16,10 @@ from softnlp.app.panels.robot import robot_panel
 from softnlp.app.robot_state import OWN, RULE_FIELDS, changed_keys, library_table, own_table, robot_state
 from softnlp.app.section_svg import section_svg
 from softnlp.app.session import Session
-from softnlp.errors import InputError
-from softnlp.robot import DIMENSIONS, ROBOTS, Violation
-from softnlp.scenario import scenario_from_text
-from softnlp.units import MILLIMETRE
+from softnlp.base.errors import InputError
+from softnlp.base.units import MILLIMETRE
+from softnlp.model.robot import DIMENSIONS, ROBOTS, Violation
+from softnlp.scenario.read import scenario_from_text
 
 KEYS = [d.file_key for d in DIMENSIONS]
 WILD = [-1, 0, 1e300, 10**400, float("nan"), float("inf"), 1e-5, 2.5, True, "wide", [1.0], {"a": 1}]

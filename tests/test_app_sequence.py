@@ -22,8 +22,8 @@ from softnlp.app.asking import scenario_with
 from softnlp.app.parts import MOST_MARKS, csv_text, line, number_text
 from softnlp.app.tabs.sequence import sequence_tab
 from softnlp.app.tabs.sequence_table import rows_of_text, rows_text, source_of
-from softnlp.errors import InputError
-from softnlp.units import BAR, DEGREE
+from softnlp.base.errors import InputError
+from softnlp.base.units import BAR, DEGREE
 
 BARS = st.floats(0, 100).map(lambda p: float(f"{p:.12g}"))
 

@@ -16,11 +16,11 @@ from app_stage import done, enter, field, opened
 from softnlp.app.numbers import certificate_words, step_lines
 from softnlp.app.panels.loads import loads_panel
 from softnlp.app.session import LARGEST_FILE, Session
-from softnlp.errors import InputError
+from softnlp.base.errors import InputError
+from softnlp.base.units import BAR
 from softnlp.results import to_json
-from softnlp.runner import run_scenario
-from softnlp.scenario import load_scenario
-from softnlp.units import BAR
+from softnlp.scenario.read import load_scenario
+from softnlp.scenario.run import run_scenario
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 

@@ -19,9 +19,9 @@ from softnlp.app.job import Progress
 from softnlp.app.session import Session
 from softnlp.app.tabs import cloud
 from softnlp.app.tabs.workspace import workspace_tab
+from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.studies.ellipsoids import manipulability
 from softnlp.studies.sensitivity import tip_jacobian
-from softnlp.units import BAR, MILLIMETRE
 
 
 def swept(folder: Path, workspace: dict[str, object], progress: Progress | None = None) -> cloud.Swept:

@@ -30,16 +30,16 @@ from softnlp import (
     robot,
     weight_sensitivity,
 )
-from softnlp.condensed import CondensedSolver
-from softnlp.contact_settings import ClosureWeights, ContactSettings
-from softnlp.loadcase import load_case, rod_functions
-from softnlp.problem import compile_problem
-from softnlp.quantities import Model
-from softnlp.status import Status
+from softnlp.base.status import Status
+from softnlp.model.contact_settings import ClosureWeights, ContactSettings
+from softnlp.model.quantities import Model
+from softnlp.model.tip import tip_conditions
+from softnlp.nlp.problem import compile_problem
+from softnlp.nlp.transcription import MultipleShooting
+from softnlp.statics.condensed import CondensedSolver
+from softnlp.statics.loadcase import load_case, rod_functions
+from softnlp.statics.step import Run, Step
 from softnlp.studies.forward import forward
-from softnlp.studies.step import Run, Step
-from softnlp.tip import tip_conditions
-from softnlp.transcription import MultipleShooting
 
 ECOFLEX = material("Ecoflex 00-50")
 WITNESS_ECOFLEX = published("Ecoflex 00-50")

@@ -13,20 +13,20 @@ import numpy as np
 import pytest
 
 from softnlp import BAR, Loads, Numerics, material, pressure_for_force, robot
-from softnlp.contact_settings import ClosureWeights, ContactSettings
-from softnlp.quantities import Model
-from softnlp.solver import Solution
-from softnlp.status import Status
+from softnlp.base.status import Status
+from softnlp.model.contact_settings import ClosureWeights, ContactSettings
+from softnlp.model.quantities import Model
+from softnlp.nlp.solver import Solution
+from softnlp.statics.blocked import BlockedSolver, _Ended
+from softnlp.statics.blocked_grid import Blocked, BlockedGrid
+from softnlp.statics.blocked_step import solved_step
+from softnlp.statics.free_shape import FreeShapes
+from softnlp.statics.multistart import other_equilibria
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.step import Step
+from softnlp.statics.wall import Situation, Wall, standing_wall
+from softnlp.statics.weighted import Weighted
 from softnlp.studies import force_inversion, weighted
-from softnlp.studies.blocked import BlockedSolver, _Ended
-from softnlp.studies.blocked_grid import Blocked, BlockedGrid
-from softnlp.studies.blocked_step import solved_step
-from softnlp.studies.free_shape import FreeShapes
-from softnlp.studies.multistart import other_equilibria
-from softnlp.studies.statics import PoseSolver
-from softnlp.studies.step import Step
-from softnlp.studies.wall import Situation, Wall, standing_wall
-from softnlp.studies.weighted import Weighted
 
 D25, ECOFLEX = robot("D25L60"), material("Ecoflex 00-50")
 OGDEN = material("Ecoflex 00-50", "ogden")

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 from softnlp import BAR, Loads, Numerics, material, robot
-from softnlp.contact_settings import ClosureWeights, ContactSettings
-from softnlp.loadcase import load_case
-from softnlp.problem import compile_problem
-from softnlp.quantities import Model
-from softnlp.solver import Engine
-from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.blocked_grid import Blocked
+from softnlp.model.contact_settings import ClosureWeights, ContactSettings
+from softnlp.model.quantities import Model
+from softnlp.nlp.problem import compile_problem
+from softnlp.nlp.solver import Engine
+from softnlp.nlp.transcription import MultipleShooting
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.loadcase import load_case
+from softnlp.statics.step import Step
+from softnlp.statics.wall import Wall
 from softnlp.studies.force_inversion import joint_problem
-from softnlp.studies.step import Step
-from softnlp.studies.wall import Wall
-from softnlp.transcription import MultipleShooting
 
 ECOFLEX = material("Ecoflex 00-50")
 WALL = Wall(np.zeros(3), np.array([1.0, 0.0, 0.0]))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from softnlp import BAR, DEGREE, forward, material, robot
-from softnlp.body import Fit, fit_of, overlapping
 from softnlp.results import to_dataset, to_json
+from softnlp.statics.body import Fit, fit_of, overlapping
 
 
 def helix(turn: float, radius: float, pitch: float = 0.0, points: int = 61) -> tuple[np.ndarray, np.ndarray]:

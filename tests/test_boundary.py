@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softnlp.workspace.boundary import WIDENING, Extent, alpha_shape, convex_hull, reach, thinned
+from softnlp.sweep.boundary import WIDENING, Extent, alpha_shape, convex_hull, reach, thinned
 
 RNG = np.random.default_rng(4)
 

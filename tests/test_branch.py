@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 from witness_section import NoRoot, Unstable, balance_pressure, section
 
-from softnlp.branch import BranchPoint, _crossing, branch_function, stretch_on_branch
-from softnlp.conventions import AS_PRINTED, REPRODUCTION, Coefficients, Conventions
-from softnlp.quantities import Model, quantities
-from softnlp.robot import ROBOTS, Robot
-from softnlp.status import Status
+from softnlp.base.status import Status
+from softnlp.model.conventions import AS_PRINTED, REPRODUCTION, Coefficients, Conventions
+from softnlp.model.quantities import Model, quantities
+from softnlp.model.robot import ROBOTS, Robot
+from softnlp.statics.branch import BranchPoint, _crossing, branch_function, stretch_on_branch
 
 
 def branch_of(model: Model) -> Callable[[np.ndarray], BranchPoint]:

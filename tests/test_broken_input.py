@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from broken_files import BROKEN, CSV_PRESSURE, HEADER, Broken, scenario
 
-from softnlp.errors import InputError
-from softnlp.scenario import load_scenario, scenario_from_text
+from softnlp.base.errors import InputError
+from softnlp.scenario.read import load_scenario, scenario_from_text
 
 
 def test_the_files_are_broken_only_where_they_say(tmp_path: Path) -> None:

@@ -19,10 +19,10 @@ from broken_files import BROKEN, Broken
 import softnlp
 from softnlp.cli import console, main
 from softnlp.cli.run import _COMMANDS
+from softnlp.model.robot import ROBOTS
 from softnlp.results import load_run
-from softnlp.robot import ROBOTS
-from softnlp.runner import STUDIES
-from softnlp.scenario_check import SCHEMAS
+from softnlp.scenario.check import SCHEMAS
+from softnlp.scenario.run import STUDIES
 
 PROGRAM = [sys.executable, "-m", "softnlp"]
 FILES = {"results.nc", "table.csv", "results.json", "versions.json", "figure.png", "scenario.toml"}
@@ -273,7 +273,7 @@ def test_a_file_in_the_place_of_the_folder_is_refused_before_the_solve(
     def solve(*_: Any) -> None:
         raise AssertionError("solved")
 
-    monkeypatch.setattr("softnlp.runner.solve_steps", solve)
+    monkeypatch.setattr("softnlp.scenario.run.solve_steps", solve)
     Path("taken").write_text("a file")
     path = scenario()
     assert "expected a folder, got a file" in complaint(*cli("run", path, "--out", out))
@@ -391,7 +391,7 @@ def test_ctrl_c_before_the_first_step_writes_nothing(cli: Run, monkeypatch: pyte
     def load(path: Path) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("softnlp.scenario.load_scenario", load)
+    monkeypatch.setattr("softnlp.scenario.read.load_scenario", load)
     assert cli("run", scenario()) == (130, "", "softnlp: stopped\n")
     assert written() == {"quick.toml"}
 

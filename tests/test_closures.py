@@ -21,8 +21,8 @@ from softnlp import (
     sensitivities,
     to_dataset,
 )
+from softnlp.model.tip import length_error
 from softnlp.results import to_json
-from softnlp.tip import length_error
 
 D15, ECOFLEX = robot("D15L60"), material("Ecoflex 00-50")
 PRESSURES = [[0.4 * BAR, 0, 0], [0.8 * BAR, 0, 0]]

@@ -30,13 +30,13 @@ from softnlp import (
     robot,
     run_scenario,
 )
+from softnlp.base.errors import InputError
+from softnlp.base.status import Status
+from softnlp.base.units import BAR, DEGREE, MILLIMETRE
 from softnlp.cli import main
-from softnlp.errors import InputError
-from softnlp.evaluation.variants import every_variant, labels
 from softnlp.results.csv_table import write_table
-from softnlp.runner_compare import Asked, compare_task
-from softnlp.status import Status
-from softnlp.units import BAR, DEGREE, MILLIMETRE
+from softnlp.scenario.compare import Asked, compare_task
+from softnlp.studies.variants import every_variant, labels
 
 ROOT = Path(__file__).parents[1]
 ANGLES, FORCES = (ROOT / "scenarios" / "compare" / f"{name}.toml" for name in ("angles", "forces"))

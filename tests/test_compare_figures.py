@@ -16,14 +16,14 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from softnlp.base.units import BAR, DEGREE, MILLIMETRE
 from softnlp.cli import main
-from softnlp.evaluation.comparison import Comparison
-from softnlp.evaluation.observed import OBSERVABLES
-from softnlp.plots import observable_figure, tips_figure
-from softnlp.plots.compare_parts import looks
+from softnlp.figures import observable_figure, tips_figure
+from softnlp.figures.compare_parts import looks
 from softnlp.results.comparison import STATISTICS
-from softnlp.runner_compare import ALIASES, MEASURED_COLUMNS
-from softnlp.units import BAR, DEGREE, MILLIMETRE
+from softnlp.scenario.compare import ALIASES, MEASURED_COLUMNS
+from softnlp.studies.comparison import Comparison
+from softnlp.studies.observed import OBSERVABLES
 
 ROOT = Path(__file__).parents[1]
 DOCUMENT = (ROOT / "docs" / "compare.md").read_text()

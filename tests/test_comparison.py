@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 from arc_workspaces import MODEL, arcs, grid, workspace_dataset, write_workspace
 
+from softnlp.base.errors import InputError
+from softnlp.base.statistics import groups, statistics
+from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.cli import main
-from softnlp.errors import InputError
-from softnlp.evaluation.statistics import groups, statistics
-from softnlp.plots import comparison_figure
-from softnlp.units import BAR, MILLIMETRE
-from softnlp.workspace.again import model_of
-from softnlp.workspace.comparison import (
+from softnlp.figures import comparison_figure
+from softnlp.sweep.again import model_of
+from softnlp.sweep.comparison import (
     compare_measured,
     compare_workspaces,
     comparison_rows,
 )
-from softnlp.workspace.measured import load_measured
-from softnlp.workspace.read import Workspace, column_names, load_workspace, read_column
+from softnlp.sweep.measured import load_measured
+from softnlp.sweep.read import Workspace, column_names, load_workspace, read_column
 
 HEADER = "t_s,p1_bar,p2_bar,p3_bar,x_mm,y_mm,z_mm"
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from softnlp.continuation import _corrected, _Tangent, around_folds, follow
-from softnlp.solver import Solution
+from softnlp.nlp.continuation import _corrected, _Tangent, around_folds, follow
+from softnlp.nlp.solver import Solution
 
 START, END = np.array([0.0]), np.array([1.0])
 ONE = np.ones(1)

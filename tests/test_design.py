@@ -32,12 +32,12 @@ from softnlp import (
     robot,
 )
 from softnlp.cli import main
-from softnlp.contact_settings import ContactSettings
-from softnlp.conventions import AS_PRINTED
-from softnlp.quantities import Model
-from softnlp.runner_design import run_design
-from softnlp.scenario import scenario_from_text
-from softnlp.schema_design import (
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.conventions import AS_PRINTED
+from softnlp.model.quantities import Model
+from softnlp.scenario.read import scenario_from_text
+from softnlp.scenario.run_design import run_design
+from softnlp.scenario.schema_design import (
     ActuationTable,
     LimitsTable,
     MaterialChoices,
@@ -45,15 +45,15 @@ from softnlp.schema_design import (
     RequirementsTable,
     RobotChoices,
 )
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.wall import standing_wall
 from softnlp.studies import design as design_module
-from softnlp.studies.blocked import BlockedSolver
 from softnlp.studies.design import Design
 from softnlp.studies.design_evaluate import Evaluator, broken_rules, unmet
 from softnlp.studies.design_optimise import Optimiser, spread
 from softnlp.studies.design_problem import FOLD
 from softnlp.studies.design_task import OUTPUTS, Setting
-from softnlp.studies.statics import PoseSolver
-from softnlp.studies.wall import standing_wall
 
 FOLDER = Path(__file__).parents[1] / "scenarios" / "design"
 D25, SOFT = robot("D25L60"), material("Ecoflex 00-50")

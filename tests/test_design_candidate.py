@@ -25,10 +25,10 @@ from softnlp import (
     material,
     robot,
 )
-from softnlp.contact_settings import ContactSettings
-from softnlp.materials import Material
-from softnlp.quantities import Model
-from softnlp.status import Status
+from softnlp.base.status import Status
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.materials import Material
+from softnlp.model.quantities import Model
 from softnlp.studies import design_optimise, design_problem
 from softnlp.studies.design_candidate import Candidate, Workshop
 from softnlp.studies.design_evaluate import Evaluation, Evaluator, chamber_gaps, unmet

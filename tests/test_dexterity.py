@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
-from softnlp.errors import InputError
-from softnlp.plots.dexterity import dexterity_figure
-from softnlp.units import DEGREE
-from softnlp.workspace.dexterity import dexterity, nearest_direction, seen_along, spread_directions
+from softnlp.base.errors import InputError
+from softnlp.base.units import DEGREE
+from softnlp.figures.dexterity import dexterity_figure
+from softnlp.sweep.dexterity import dexterity, nearest_direction, seen_along, spread_directions
 
 UP = np.array([0.0, 0.0, 1.0])
 

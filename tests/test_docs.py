@@ -19,15 +19,15 @@ from sybil import Document, Example
 from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser
 
 from softnlp import load_materials
+from softnlp.base.ranges import RANGES
+from softnlp.base.status import Status
 from softnlp.cli import main
-from softnlp.conventions import COEFFICIENT_SETS, CONVENTIONS
-from softnlp.formula import FUNCTIONS
-from softnlp.laws import LAWS
-from softnlp.ranges import RANGES
-from softnlp.scenario import scenario_from_text
-from softnlp.scenario_check import SCHEMAS
-from softnlp.scenario_schema import BlockedForceFile, OffsetRampTable, RampTable
-from softnlp.status import Status
+from softnlp.model.conventions import COEFFICIENT_SETS, CONVENTIONS
+from softnlp.model.formula import FUNCTIONS
+from softnlp.model.laws import LAWS
+from softnlp.scenario.check import SCHEMAS
+from softnlp.scenario.read import scenario_from_text
+from softnlp.scenario.schema import BlockedForceFile, OffsetRampTable, RampTable
 
 ROOT = Path(__file__).parents[1]
 README, SCENARIO, MODEL = ROOT / "README.md", ROOT / "docs" / "scenario.md", ROOT / "docs" / "model.md"

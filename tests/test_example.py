@@ -8,7 +8,7 @@ import pytest
 
 from softnlp.cli import main
 from softnlp.cli.example import shipped_scenarios
-from softnlp.scenario import load_scenario
+from softnlp.scenario.read import load_scenario
 
 CHECKOUT = Path(__file__).parents[1] / "scenarios"
 

@@ -19,9 +19,9 @@ from matplotlib.figure import Figure
 
 from softnlp import ROBOTS, InputError
 from softnlp.cli.figures import draw
-from softnlp.plots import save_figure, section_figure
-from softnlp.plots.canvas import EAST_ASIAN, MissingGlyphs, OwnFigure, own_settings
-from softnlp.plots.style import in_own_style, new_figure
+from softnlp.figures import save_figure, section_figure
+from softnlp.figures.canvas import EAST_ASIAN, MissingGlyphs, OwnFigure, own_settings
+from softnlp.figures.style import in_own_style, new_figure
 
 THEIRS: dict[Any, Any] = {
     "text.usetex": True,

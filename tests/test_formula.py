@@ -11,8 +11,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from softnlp.errors import MaterialError
-from softnlp.formula import (
+from softnlp.base.errors import MaterialError
+from softnlp.model.formula import (
     FUNCTIONS,
     MAX_EXPONENT,
     MAX_LENGTH,

@@ -24,16 +24,16 @@ from slow import some_slow
 from witness import Witnessed, arc, shoot
 from witness_section import section
 
-from softnlp.conventions import AS_PRINTED, COEFFICIENT_SETS, REPRODUCTION, Coefficients, Conventions
-from softnlp.errors import InputError
-from softnlp.materials import Material
-from softnlp.numerics import Numerics
-from softnlp.robot import ROBOTS, Robot
-from softnlp.rod import Loads
-from softnlp.status import Status
+from softnlp.base.errors import InputError
+from softnlp.base.status import Status
+from softnlp.model.conventions import AS_PRINTED, COEFFICIENT_SETS, REPRODUCTION, Coefficients, Conventions
+from softnlp.model.materials import Material
+from softnlp.model.numerics import Numerics
+from softnlp.model.robot import ROBOTS, Robot
+from softnlp.model.rod import Loads
+from softnlp.statics.step import Pose, Step
 from softnlp.studies import statics
 from softnlp.studies.forward import forward
-from softnlp.studies.step import Pose, Step
 
 ECOFLEX_50 = silicone("Ecoflex 00-50")
 COLLOCATION = Numerics(transcription="collocation")

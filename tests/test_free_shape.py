@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from softnlp import Coefficients, Loads, Numerics, Status, material, robot
-from softnlp.contact_settings import ContactSettings
-from softnlp.quantities import Model
-from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.free_shape import FreeShapes
-from softnlp.studies.wall import Situation
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.quantities import Model
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.free_shape import FreeShapes
+from softnlp.statics.wall import Situation
 
 
 def test_a_free_shape_that_is_not_found_is_not_a_number() -> None:

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from softnlp import Loads, forward, load_scenario, material, robot
-from softnlp.errors import InputError
-from softnlp.gravity import DIRECTIONS, gravity_lines, gravity_named, gravity_words, is_hanging
-from softnlp.plots.body import Camera, side_camera
-from softnlp.plots.run import run_figure
+from softnlp.base.errors import InputError
+from softnlp.figures.body import Camera, side_camera
+from softnlp.figures.run import run_figure
+from softnlp.model.gravity import DIRECTIONS, gravity_lines, gravity_named, gravity_words, is_hanging
 from softnlp.results import to_dataset, to_json
 from softnlp.results.terminal import table_lines
 from softnlp.results.view import view_of_run

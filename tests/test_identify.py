@@ -31,16 +31,16 @@ from softnlp import (
     robot,
 )
 from softnlp.cli import main
-from softnlp.contact_settings import ContactSettings
-from softnlp.materials import Material
-from softnlp.plots import identified_figure
-from softnlp.quantities import Model
-from softnlp.robot import Robot
-from softnlp.runner_identify import run_robots
-from softnlp.scenario import load_scenario, scenario_from_text
+from softnlp.figures import identified_figure
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.materials import Material
+from softnlp.model.quantities import Model
+from softnlp.model.robot import Robot
+from softnlp.scenario.read import load_scenario, scenario_from_text
+from softnlp.scenario.run_identify import run_robots
+from softnlp.statics.blocked_grid import BlockedGrid
 from softnlp.studies import predicted_force, predicted_pose
 from softnlp.studies.blocked_force import blocked_force
-from softnlp.studies.blocked_grid import BlockedGrid
 from softnlp.studies.fit_statistics import uncertainty
 from softnlp.studies.identified import Identified
 from softnlp.studies.identify import _Fit

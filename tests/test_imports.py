@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import ast
-import importlib
 import subprocess
 import sys
-from fnmatch import fnmatch
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -16,95 +14,9 @@ import softnlp
 
 PACKAGE = Path(softnlp.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
-# A module imports only what stands above it; the modules of MIXED may import each other within their package.
-LAYERS = (
-    *("errors", "status", "units", "conventions", "numerics", "reading", "ranges", "gravity"),
-    *("contact_settings", "processes"),
-    *("formula", "laws", "material_reading", "materials", "rules", "robot", "section", "rod", "turning", "tip"),
-    "transcription",
-    *(
-        "quantities",
-        "loadcase",
-        "unloaded",
-        "optimality",
-        "problem",
-        "branch",
-        "solver",
-        "condensed",
-        "continuation",
-        "stability",
-    ),
-    *("body", "implicit"),
-    *("evaluation", "evaluation.statistics"),
-    *(
-        "studies",
-        "studies.step",
-        "studies.pose",
-        "studies.pose_grid",
-        "studies.attempts",
-        "studies.statics",
-        "studies.arc",
-        "studies.forward",
-        "studies.wall",
-        "studies.weighted",
-    ),
-    *(
-        "studies.fit_statistics",
-        "studies.plausibility",
-        "studies.law_curve",
-        "studies.tensile",
-        "studies.measurements",
-        "studies.free_constants",
-        "studies.implicit",
-    ),
-    *("studies.free_shape", "studies.blocked_grid", "studies.blocked_step", "studies.blocked", "studies.multistart"),
-    *(
-        "studies.trial",
-        "studies.predicted_pose",
-        "studies.predicted_force",
-        "studies.identify_task",
-        "studies.identified",
-    ),
-    *(
-        "studies.force_inversion",
-        "studies.derivatives",
-        "studies.sensitivity",
-        "studies.tolerances",
-        "studies.ellipsoids",
-    ),
-    *("studies.tip_map", "studies.bounded", "studies.inverse_task", "studies.aiming", "studies.inverse_nlp"),
-    *("studies.inverse_solver", "studies.weight_sensitivity"),
-    *("studies.design_task", "studies.design_evaluate", "studies.design_problem", "studies.design_optimise"),
-    *("studies.design_candidate", "studies.design_search", "studies.design", "studies.*"),
-    *("batch", "batch.arrays", "batch.predictor", "batch.csource", "batch.interpreted", "batch.compiled"),
-    *("batch.shooting", "batch.grids", "batch.reduced", "batch.reduced_contact", "batch.stretches", "batch.*"),
-    *("workspace", "workspace.poses", "workspace.plan", "workspace.pose_lane", "workspace.blocked_lane"),
-    *("workspace.chunk", "workspace.task", "workspace.table", "workspace.manufacture"),
-    *("evaluation.variants", "evaluation.observed", "evaluation.simulated", "evaluation.comparison"),
-    "evaluation.compare",
-    "scenario_schema",
-    *("schema_workspace", "schema_inverse", "schema_identify", "schema_design"),
-    *("scenario_check", "pressures", "columns", "measured_rows", "scenario_contact"),
-    *("scenario_workspace", "scenario_inverse", "scenario_identify", "scenario_design"),
-    "scenario",
-    *("workspace.planning", "workspace.journal", "workspace.worker", "workspace.pool"),
-    *(
-        "runner_run",
-        "runner_blocked",
-        "runner_inverse",
-        "runner_design",
-        "runner_identify",
-        "runner_compare",
-        "results",
-    ),
-    *("workspace.columns", "workspace.sink", "workspace.dataset", "workspace.run"),
-    *("workspace.read", "runner", "workspace.boundary", "workspace.dexterity", "workspace.summary", "workspace.export"),
-    *("workspace.measured", "workspace.again", "workspace.comparison"),
-    "palette",
-    "mesh",
-    *("plots", "app", "cli", "__main__"),
-)
-MIXED = ("results", "mesh", "plots", "app", "cli")
+# A package imports only what stands before it, and itself.
+PACKAGES = ("base", "model", "nlp", "statics", "batch", "studies", "sweep", "scenario", "results", "figures")
+PACKAGES += ("app", "cli")
 LONGEST_FILE = 400
 HEAVY = ("casadi", "numpy", "scipy", "matplotlib", "pydantic", "cyclopts", "rich", "xarray", "h5netcdf", "h5py")
 
@@ -126,7 +38,7 @@ def imported(file: Path) -> set[str]:
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{file}: relative import"
-            # `from softnlp import rod` names a module, `from softnlp.rod import Loads` does not
+            # `from softnlp import rod` names a module, `from softnlp.model.rod import Loads` does not
             names = [f"{node.module}.{alias.name}" for alias in node.names]
         else:
             continue
@@ -141,22 +53,16 @@ IMPORTS = {name: imported(file) for name, file in MODULES.items() if name}
 
 
 def rank(module: str) -> int:
-    """Return the line of a module in the layers."""
-    name = next((package for package in MIXED if module.split(".")[0] == package), module)
-    lines = [k for k, line in enumerate(LAYERS) if line == name] or [
-        k for k, p in enumerate(LAYERS) if fnmatch(name, p)
-    ]
-    assert lines, f"{module} is new: give it a place in LAYERS"
-    return lines[0]
+    """Return the place of a module's package; the package itself, and what starts the command, stand after all."""
+    package = module.split(".")[0]
+    return len(PACKAGES) if package == "__main__" else PACKAGES.index(package)
 
 
 @pytest.mark.parametrize("module", sorted(IMPORTS))
 def test_a_module_imports_only_from_above(module: str) -> None:
-    assert rank(module) >= 0
     for other in IMPORTS[module]:
         assert other, "import from the module, not from the package"
-        same = module.split(".")[0] == other.split(".")[0] and module.split(".")[0] in MIXED
-        assert same or rank(other) < rank(module), f"{module} imports {other}"
+        assert rank(other) <= rank(module), f"{module} imports {other}"
 
 
 def test_there_is_no_cycle() -> None:
@@ -165,13 +71,13 @@ def test_there_is_no_cycle() -> None:
 
 def test_the_order_was_read_from_the_files() -> None:
     """The tests above would pass without imports; these are known."""
-    assert {"materials", "robot"} <= IMPORTS["section"]
-    assert "section" in IMPORTS["rod"]
-    assert "rod" in IMPORTS["loadcase"]  # from softnlp import rod
-    assert {"runner", "results", "scenario", "cli.console"} <= IMPORTS["cli.run"]  # within functions
+    assert {"model.materials", "model.robot"} <= IMPORTS["model.section"]
+    assert "model.section" in IMPORTS["model.rod"]
+    assert "model.rod" in IMPORTS["statics.loadcase"]  # from softnlp.model import rod
+    assert {"scenario.run", "results", "cli.console"} <= IMPORTS["cli.run"]  # within functions
 
 
-@pytest.mark.parametrize("module", ["section", "rod"])
+@pytest.mark.parametrize("module", ["model.section", "model.rod"])
 def test_physics_uses_no_function_that_a_symbol_cannot_pass(module: str) -> None:
     """math.sqrt of a symbol is nan without a word."""
     tree = ast.parse(MODULES[module].read_text())
@@ -184,7 +90,10 @@ def test_physics_uses_no_function_that_a_symbol_cannot_pass(module: str) -> None
 
 @pytest.mark.parametrize(
     ("module", "owner"),
-    [("robot", "Robot"), *(("laws", f) for f in ("_linear", "_neo_hookean", "_mooney_rivlin", "_yeoh", "_ogden"))],
+    [
+        ("model.robot", "Robot"),
+        *(("model.laws", f) for f in ("_linear", "_neo_hookean", "_mooney_rivlin", "_yeoh", "_ogden")),
+    ],
 )
 def test_what_may_hold_symbols_uses_numbers_of_math_only(module: str, owner: str) -> None:
     tree = ast.parse(MODULES[module].read_text())
@@ -228,14 +137,6 @@ def test_solving_needs_neither_figures_nor_files() -> None:
 def test_every_name_of_the_interface_is_there(name: str) -> None:
     assert getattr(softnlp, name) is not None
     assert name in dir(softnlp)
-
-
-def test_the_interface_wins_over_a_submodule_of_the_same_name() -> None:
-    importlib.import_module("softnlp.robot")
-    assert callable(softnlp.robot)
-    code = "import softnlp.section; from softnlp import Loads, robot; print(robot('D25L60').name)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stdout == "D25L60\n", done.stderr
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:

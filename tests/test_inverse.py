@@ -15,16 +15,16 @@ from numpy.typing import NDArray
 
 from softnlp import BAR, InputError, Loads, Numerics, Run, Status, forward, inverse, load_scenario, material, robot
 from softnlp.cli import main
-from softnlp.conventions import COEFFICIENT_SETS, Coefficients
-from softnlp.quantities import Model
+from softnlp.model.conventions import COEFFICIENT_SETS, Coefficients
+from softnlp.model.quantities import Model
+from softnlp.model.robot import Robot
+from softnlp.nlp.bounded import Limits, Measured, least_norm, nearest, quadratic_step
 from softnlp.results import load_run, to_json
-from softnlp.robot import Robot
+from softnlp.statics.solver import PoseSolver
 from softnlp.studies.aiming import Aim, aim_of, spread
-from softnlp.studies.bounded import Limits, Measured, least_norm, nearest, quadratic_step
 from softnlp.studies.derivatives import PoseDerivatives
 from softnlp.studies.inverse_solver import InverseSolver
 from softnlp.studies.inverse_task import InverseTask, Target
-from softnlp.studies.statics import PoseSolver
 from softnlp.studies.tip_map import ArcMap, GridMap
 
 Array = NDArray[np.float64]
@@ -387,7 +387,7 @@ def test_the_misfit_of_a_direction_grows_with_the_angle() -> None:
 
 @cache
 def load_and_run(name: str, folder: str | None = None) -> dict[str, object]:
-    from softnlp.runner import run_scenario
+    from softnlp.scenario.run import run_scenario
 
     return to_json(run_scenario(load_scenario(FOLDER / f"{name}.toml")))  # type: ignore[return-value]
 

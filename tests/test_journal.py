@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from sweeps import GRID, in_child, made_up, plan, read_only
 
-from softnlp.errors import InputError
-from softnlp.workspace.journal import Journal
-from softnlp.workspace.plan import Plan
-from softnlp.workspace.poses import STATUSES, Block
+from softnlp.base.errors import InputError
+from softnlp.batch.plan import Plan
+from softnlp.batch.poses import STATUSES, Block
+from softnlp.sweep.journal import Journal
 
 PLAN = plan()  # 27 poses in 7 chunks, the last of 3
 VERSION = "1.2.3"
@@ -107,7 +107,7 @@ def test_an_error_while_it_is_open_keeps_what_was_added(tmp_path: Path) -> None:
 
 def test_it_commits_by_itself_as_time_passes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     now = 0.0
-    monkeypatch.setattr("softnlp.workspace.journal.time.monotonic", lambda: now)
+    monkeypatch.setattr("softnlp.sweep.journal.time.monotonic", lambda: now)
     with opened(tmp_path) as journal:
         journal.add(made_up(PLAN, 0))
         assert not journal.tick()

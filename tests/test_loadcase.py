@@ -14,15 +14,15 @@ from designs import Design, random_design, silicone
 from scipy.spatial.transform import Rotation
 from witness_section import Section as WitnessSection
 
-from softnlp import rod
-from softnlp.conventions import AS_PRINTED, Coefficients
-from softnlp.loadcase import LoadCase, RodFunctions, load_case, rod_functions, unpack_section
-from softnlp.quantities import Model, force_unit
-from softnlp.quantity import Quantity
-from softnlp.robot import ROBOTS
-from softnlp.section import deform, stretch_balance
-from softnlp.tip import DEAD_LOADS, tip_conditions
-from softnlp.transcription import Collocation, MultipleShooting
+from softnlp.base.quantity import Quantity
+from softnlp.model import rod
+from softnlp.model.conventions import AS_PRINTED, Coefficients
+from softnlp.model.quantities import Model, force_unit
+from softnlp.model.robot import ROBOTS
+from softnlp.model.section import deform, stretch_balance
+from softnlp.model.tip import DEAD_LOADS, tip_conditions
+from softnlp.nlp.transcription import Collocation, MultipleShooting
+from softnlp.statics.loadcase import LoadCase, RodFunctions, load_case, rod_functions, unpack_section
 
 CONDITIONS = {
     "dead": DEAD_LOADS,

@@ -10,10 +10,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from softnlp.errors import MaterialError
-from softnlp.formula import Formula, parse_formula, shown
-from softnlp.laws import LAWS, formula_law, function_law
-from softnlp.materials import Material, load_materials, material, material_from_table
+from softnlp.base.errors import MaterialError
+from softnlp.model.formula import Formula, parse_formula, shown
+from softnlp.model.laws import LAWS, formula_law, function_law
+from softnlp.model.materials import Material, load_materials, material, material_from_table
 
 ADVICE = "use operators and casadi functions such as casadi.exp, no numpy or math functions, no branch on a value"
 ALLOWED = (

@@ -22,8 +22,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from softnlp.errors import MaterialError
-from softnlp.materials import (
+from softnlp.base.errors import MaterialError
+from softnlp.model.materials import (
     LAWS,
     Constant,
     Law,
@@ -310,7 +310,8 @@ def test_constants_cannot_change_behind_the_checks() -> None:
 
 def test_importing_materials_is_cheap() -> None:
     heavy = {"simpleeval", "scipy", "matplotlib", "pydantic", "tomlkit", "xarray", "pandas"}
-    code = f"import sys, softnlp.materials as m; m.material('Ecoflex 00-50'); print(sorted({heavy} & set(sys.modules)))"
+    code = "import sys, softnlp.model.materials as m; m.material('Ecoflex 00-50'); "
+    code += f"print(sorted({heavy} & set(sys.modules)))"
     root = Path(__file__).parents[1]
     done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

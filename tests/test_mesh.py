@@ -16,9 +16,9 @@ from sybil import Document
 from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser
 
 from softnlp import robot
+from softnlp.base.errors import InputError
 from softnlp.cli import main
-from softnlp.errors import InputError
-from softnlp.mesh import (
+from softnlp.figures.mesh import (
     body_solid,
     cores,
     display_mesh,
@@ -27,9 +27,9 @@ from softnlp.mesh import (
     resampled,
     write_solids,
 )
-from softnlp.mesh.solid import Solid
+from softnlp.figures.mesh.solid import Solid
+from softnlp.model.robot import ROBOTS, Robot
 from softnlp.results import Body, save
-from softnlp.robot import ROBOTS, Robot
 
 trimesh = pytest.importorskip("trimesh", reason="the extra mesh is not installed")
 pytest.importorskip("manifold3d", reason="the extra mesh is not installed")

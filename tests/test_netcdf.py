@@ -19,12 +19,12 @@ import xarray as xr
 from arc_runs import arc_step, ramp_run, run_of, weighted_run
 from sweeps import made_up, plan
 
-from softnlp.materials import Material, formula_law
+from softnlp.model.materials import Material, formula_law
+from softnlp.model.robot import robot
 from softnlp.results import load_run, netcdf_bytes, to_dataset, view_of_run
-from softnlp.robot import robot
-from softnlp.workspace.dataset import write_workspace
-from softnlp.workspace.journal import Journal
-from softnlp.workspace.read import load_workspace, read_column
+from softnlp.sweep.dataset import write_workspace
+from softnlp.sweep.journal import Journal
+from softnlp.sweep.read import load_workspace, read_column
 
 UNITS = pint.UnitRegistry()
 TITLE = "Übung № 1, ∂x"

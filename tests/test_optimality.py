@@ -9,12 +9,12 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from softnlp.errors import IllPosedError
-from softnlp.optimality import OPTIMAL, Bounds, kkt_error, misfit_slope, not_optimal, slopes
-from softnlp.problem import CompiledProblem, Constraint, compile_problem
-from softnlp.quantity import quantity
-from softnlp.solver import Engine, Solution, certificate, violation
-from softnlp.studies.bounded import Limits, Measured, could_gain
+from softnlp.base.errors import IllPosedError
+from softnlp.base.quantity import quantity
+from softnlp.nlp.bounded import Limits, Measured, could_gain
+from softnlp.nlp.optimality import OPTIMAL, Bounds, kkt_error, misfit_slope, not_optimal, slopes
+from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
+from softnlp.nlp.solver import Engine, Solution, certificate, violation
 
 SCALES = [1e-6, 1e-3, 1.0, 50.0, 1e3]
 

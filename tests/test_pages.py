@@ -15,7 +15,7 @@ import pytest
 import softnlp
 from softnlp import load_materials, load_scenario
 from softnlp.cli import main
-from softnlp.scenario import scenario_from_text
+from softnlp.scenario.read import scenario_from_text
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

@@ -45,8 +45,8 @@ from softnlp import (
     material,
     robot,
 )
-from softnlp.scenario import load_scenario
-from softnlp.studies.blocked import BlockedSolver
+from softnlp.scenario.read import load_scenario
+from softnlp.statics.blocked import BlockedSolver
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "scenarios" / "paper"
@@ -341,7 +341,7 @@ def test_the_digest_follows_every_source(tmp_path: Path, monkeypatch: pytest.Mon
     before = cache.digest()
     assert cache.digest() == before
     names = {file.relative_to(ROOT).as_posix() for file in cache.sources()}
-    assert {"materials.toml", "softnlp/section.py", "docs/paper/text.py", "benchmarks/paper_method.py"} <= names
+    assert {"materials.toml", "softnlp/model/section.py", "docs/paper/text.py", "benchmarks/paper_method.py"} <= names
     assert {"scenarios/files/published.toml", "scenarios/files/measured_forces.csv"} <= names
     (tmp_path / "docs" / "paper").mkdir(parents=True)
     (tmp_path / "materials.toml").write_text("")

@@ -11,7 +11,7 @@ import pytest
 
 from softnlp import fit_tensile, load_materials, material
 from softnlp.cli import main
-from softnlp.scenario import load_scenario
+from softnlp.scenario.read import load_scenario
 from softnlp.studies.identify_task import TensileTask
 from softnlp.studies.plausibility import Check, area_check, curve_checks, law_checks, messages
 

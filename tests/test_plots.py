@@ -19,18 +19,18 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
 from matplotlib.text import Text
 
-from softnlp.conventions import Coefficients
-from softnlp.errors import InputError
-from softnlp.materials import Material, formula_law, material
-from softnlp.plots import material_figure, run_figure, save_figure, section_figure
-from softnlp.plots.body import tube
-from softnlp.plots.section import stretched_radii
-from softnlp.plots.style import WRONG, colour
+from softnlp.base.errors import InputError
+from softnlp.figures import material_figure, run_figure, save_figure, section_figure
+from softnlp.figures.body import tube
+from softnlp.figures.section import stretched_radii
+from softnlp.figures.style import WRONG, colour
+from softnlp.model.conventions import Coefficients
+from softnlp.model.materials import Material, formula_law, material
+from softnlp.model.robot import ROBOTS, Robot, robot, violations
+from softnlp.model.rod import Loads
+from softnlp.model.section import deform
 from softnlp.results import Body, to_dataset, view_of_dataset, view_of_run
-from softnlp.robot import ROBOTS, Robot, robot, violations
-from softnlp.rod import Loads
-from softnlp.section import deform
-from softnlp.studies.step import Run
+from softnlp.statics.step import Run
 
 
 def drawn(run: Run) -> Figure:

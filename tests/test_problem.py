@@ -10,16 +10,16 @@ import pytest
 from cases import Posed, equals, pose
 from designs import silicone
 
-from softnlp.conventions import Coefficients
-from softnlp.errors import IllPosedError
-from softnlp.problem import Constraint
-from softnlp.quantities import Model, quantities
-from softnlp.quantity import quantity
-from softnlp.robot import ROBOTS
-from softnlp.rod import Loads
-from softnlp.solver import certificate
+from softnlp.base.errors import IllPosedError
+from softnlp.base.quantity import quantity
+from softnlp.model.conventions import Coefficients
+from softnlp.model.quantities import Model, quantities
+from softnlp.model.robot import ROBOTS
+from softnlp.model.rod import Loads
+from softnlp.nlp.problem import Constraint
+from softnlp.nlp.solver import certificate
+from softnlp.nlp.transcription import Collocation
 from softnlp.studies.forward import forward
-from softnlp.transcription import Collocation
 
 ECOFLEX_50 = silicone("Ecoflex 00-50")
 MODEL = Model(ROBOTS["D20L60"], ECOFLEX_50)

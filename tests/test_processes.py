@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 from sweeps import HEAD, QUICK
 
-from softnlp import processes
+from softnlp.base import processes
 
 LIGHT = """
 import threading, time
 from concurrent.futures import ProcessPoolExecutor
-from softnlp.processes import begin_worker, process_context
+from softnlp.base.processes import begin_worker, process_context
 threading.Thread(target=time.sleep, args=(60,), daemon=True).start()  # as an editor or a notebook has
 print("top level", flush=True)
 with ProcessPoolExecutor(2, mp_context=process_context(), initializer=begin_worker) as pool:
@@ -27,8 +27,8 @@ STUDIES = f"""
 import threading, time
 from dataclasses import replace
 from softnlp import BAR, DesignTask, Material, at_most, design, function_law, material, robot, run_sweep
-from softnlp.scenario import scenario_from_text
-from softnlp.workspace.planning import plan_of
+from softnlp.scenario.read import scenario_from_text
+from softnlp.scenario.planning import plan_of
 threading.Thread(target=time.sleep, args=(60,), daemon=True).start()
 print("top level", flush=True)
 asked = scenario_from_text({TABLES!r}, "x.toml")

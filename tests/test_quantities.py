@@ -13,10 +13,10 @@ from designs import body_of, random_design, rubber_of, silicone
 from witness_section import REPRODUCTION as PLAIN
 from witness_section import section as witness_section
 
-from softnlp.conventions import AS_PRINTED, Coefficients
-from softnlp.laws import function_law
-from softnlp.materials import Material
-from softnlp.quantities import (
+from softnlp.model.conventions import AS_PRINTED, Coefficients
+from softnlp.model.laws import function_law
+from softnlp.model.materials import Material
+from softnlp.model.quantities import (
     Model,
     Quantity,
     contact_quantities,
@@ -26,9 +26,9 @@ from softnlp.quantities import (
     section_function,
     with_symbols,
 )
-from softnlp.robot import ROBOTS
-from softnlp.section import deform
-from softnlp.tip import Given
+from softnlp.model.robot import ROBOTS
+from softnlp.model.section import deform
+from softnlp.model.tip import Given
 
 COEFFICIENTS = Coefficients(0.3, 1.1, 0.97, 1.02, 0.2, 1.4)
 MODEL = Model(ROBOTS["D15L60"], replace(silicone("Ecoflex 00-30", "ogden"), density=1040.0), COEFFICIENTS)

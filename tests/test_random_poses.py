@@ -13,8 +13,8 @@ from designs import Design, body_of, random_design, rubber_of
 from witness import integrate, scaled
 from witness_section import section
 
+from softnlp.base.units import BAR, DEGREE
 from softnlp.cli import main
-from softnlp.units import BAR, DEGREE
 
 BACKWARD = 1e-6  # of the length and of unity: the accuracy that a scenario asks for by default
 LENGTHS = ("outer_diameter", "lumen_diameter", "chamber_circle_diameter", "chamber_diameter", "chamber_wall", "length")

@@ -12,13 +12,13 @@ import pytest
 from broken_files import MATERIAL, PRESSURE, ROBOT, STUDY, scenario
 
 from softnlp import BAR, ContactSettings, InputError, Loads, Material, blocked_force, forward, material, robot
+from softnlp.base.ranges import FORCE, RANGES, READING, Range, noise_note, range_of, without_noise
 from softnlp.cli import main
-from softnlp.laws import LAWS
-from softnlp.ranges import FORCE, RANGES, READING, Range, noise_note, range_of, without_noise
-from softnlp.runner_compare import compare_task
-from softnlp.scenario import load_scenario, scenario_from_text
+from softnlp.model.laws import LAWS
+from softnlp.scenario.compare import compare_task
+from softnlp.scenario.read import load_scenario, scenario_from_text
 from softnlp.studies.identify_task import RobotTask
-from softnlp.workspace.measured import load_measured
+from softnlp.sweep.measured import load_measured
 
 D25L60, SOFT = robot("D25L60"), material("Ecoflex 00-50")
 

@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 from broken_files import MATERIAL, ROBOT, STUDY
 
+from softnlp.base.errors import InputError
+from softnlp.base.reading import DEEPEST, LARGEST_DATA, LARGEST_TOML, read_bytes, read_text, toml_tables
 from softnlp.cli import main
-from softnlp.errors import InputError
-from softnlp.materials import load_materials
-from softnlp.reading import DEEPEST, LARGEST_DATA, LARGEST_TOML, read_bytes, read_text, toml_tables
-from softnlp.scenario import load_scenario, scenario_from_text
+from softnlp.model.materials import load_materials
+from softnlp.scenario.read import load_scenario, scenario_from_text
 
 
 def pipe(path: Path) -> None:

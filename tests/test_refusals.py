@@ -31,7 +31,7 @@ from softnlp import (
     stiffness_ellipsoid,
     weight_sensitivity,
 )
-from softnlp.robot import ROBOTS
+from softnlp.model.robot import ROBOTS
 
 ROBOT, SOFT = ROBOTS["D20L40"], silicone("Ecoflex 00-50")
 ONE = [1e5, 0.0, 0.0]

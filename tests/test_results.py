@@ -35,9 +35,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from softnlp.contact_settings import ClosureWeights, ContactSettings
-from softnlp.errors import InputError
-from softnlp.materials import Material, formula_law, material_from_table
+from softnlp.base.errors import InputError
+from softnlp.base.status import Status
+from softnlp.model.contact_settings import ClosureWeights, ContactSettings
+from softnlp.model.materials import Material, formula_law, material_from_table
+from softnlp.model.robot import DIMENSIONS, robot
+from softnlp.model.rod import Loads
 from softnlp.results import (
     json_text,
     load_run,
@@ -52,12 +55,9 @@ from softnlp.results import (
     write_table,
     write_whole,
 )
-from softnlp.robot import DIMENSIONS, robot
-from softnlp.rod import Loads
-from softnlp.scenario_contact import contact_settings
-from softnlp.scenario_schema import ContactTable
-from softnlp.status import Status
-from softnlp.studies.step import Run, WeightSensitivity
+from softnlp.scenario.contact import contact_settings
+from softnlp.scenario.schema import ContactTable
+from softnlp.statics.step import Run, WeightSensitivity
 
 STEP_KEYS = {
     *(
@@ -326,7 +326,7 @@ def test_table_and_json_agree(mixed: Run) -> None:
 
 
 def test_save_writes_every_file_whole(mixed: Run, tmp_path: Path) -> None:
-    from softnlp.plots import run_figure
+    from softnlp.figures import run_figure
 
     folder = tmp_path / "made" / "here"
     written = save(mixed, folder, scenario_text='title = "µ"\n', figure=run_figure)
@@ -687,7 +687,7 @@ from softnlp.results import to_json, view_of_run
 run = ramp_run(3)
 to_json(run)
 assert not {"xarray", "matplotlib", "rich"} & sys.modules.keys()
-from softnlp.plots import run_figure
+from softnlp.figures import run_figure
 
 run_figure(view_of_run(run))
 assert not {"xarray", "matplotlib.pyplot"} & sys.modules.keys()

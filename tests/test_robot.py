@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softnlp.errors import RobotError
-from softnlp.robot import DIMENSIONS, MINIMUM_WALL, ROBOTS, Robot, check, robot, touching_stretch, violations
-from softnlp.units import DEGREE, MILLIMETRE
+from softnlp.base.errors import RobotError
+from softnlp.base.units import DEGREE, MILLIMETRE
+from softnlp.model.robot import DIMENSIONS, MINIMUM_WALL, ROBOTS, Robot, check, robot, touching_stretch, violations
 
 D25 = ROBOTS["D25L60"]
 

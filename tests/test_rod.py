@@ -16,10 +16,10 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from witness_section import Section as WitnessSection
 
-from softnlp import rod
-from softnlp.conventions import Coefficients
-from softnlp.rod import RodSection
-from softnlp.section import deform
+from softnlp.model import rod
+from softnlp.model.conventions import Coefficients
+from softnlp.model.rod import RodSection
+from softnlp.model.section import deform
 
 NO_WEIGHT = np.zeros(3)
 

@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from softnlp.robot import DIMENSIONS, ROBOTS, robot, violations
-from softnlp.rules import RULES, neighbours, rules
+from softnlp.model.robot import DIMENSIONS, ROBOTS, robot, violations
+from softnlp.model.rules import RULES, neighbours, rules
 
 DELTA_S = 0.8e-3
 MOVED, GIVEN = {"outer_wall": True, "inner_wall": True}, {"outer_wall": False, "inner_wall": False}

@@ -12,11 +12,11 @@ from sweeps import QUICK, plan, scenario
 
 import softnlp
 from softnlp import InputError, load_scenario, run_design, run_scenario, run_sweep
-from softnlp.runner import STUDIES
-from softnlp.scenario import Scenario, scenario_from_text
-from softnlp.scenario_check import SCHEMAS
-from softnlp.workspace.planning import plan_of
-from softnlp.workspace.read import Workspace, load_workspace, read_column
+from softnlp.scenario.check import SCHEMAS
+from softnlp.scenario.planning import plan_of
+from softnlp.scenario.read import Scenario, scenario_from_text
+from softnlp.scenario.run import STUDIES
+from softnlp.sweep.read import Workspace, load_workspace, read_column
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 SWEEP = scenario("[workspace]\nlevels = 2\nto_bar = 0.5\n" + QUICK)
@@ -108,7 +108,7 @@ def test_a_wrong_call_names_the_function_to_use(case: str, tmp_path: Path) -> No
 
 
 def test_the_old_places_still_have_them() -> None:
-    from softnlp.runner_design import run_design as old_design
-    from softnlp.workspace.run import run_sweep as old_sweep
+    from softnlp.scenario.run_design import run_design as old_design
+    from softnlp.sweep.run import run_sweep as old_sweep
 
     assert (softnlp.run_design, softnlp.run_sweep) == (old_design, old_sweep)

@@ -12,14 +12,14 @@ from broken_files import MATERIAL, OWN_ROBOT, PRESSURE, ROBOT, scenario
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softnlp.contact_settings import ClosureWeights, ContactSettings, ContactTask
-from softnlp.conventions import AS_PRINTED, COEFFICIENT_SETS, REPRODUCTION
-from softnlp.errors import InputError, MaterialError, RobotError
-from softnlp.materials import material
-from softnlp.numerics import Numerics
-from softnlp.robot import DIMENSIONS, ROBOTS
-from softnlp.scenario import Scenario, load_scenario, scenario_from_text
-from softnlp.units import BAR, DEGREE
+from softnlp.base.errors import InputError, MaterialError, RobotError
+from softnlp.base.units import BAR, DEGREE
+from softnlp.model.contact_settings import ClosureWeights, ContactSettings, ContactTask
+from softnlp.model.conventions import AS_PRINTED, COEFFICIENT_SETS, REPRODUCTION
+from softnlp.model.materials import material
+from softnlp.model.numerics import Numerics
+from softnlp.model.robot import DIMENSIONS, ROBOTS
+from softnlp.scenario.read import Scenario, load_scenario, scenario_from_text
 
 COEFFICIENTS = ("elongation", "bending", "area", "inertia", "bore_fraction", "chamber_reaction")
 

@@ -12,13 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from witness_section import NoRoot, Unstable, balance_pressure, section
 
-from softnlp.branch import branch_function, stretch_on_branch
-from softnlp.conventions import AS_PRINTED, COEFFICIENT_SETS, REPRODUCTION, Coefficients, Conventions
-from softnlp.materials import Material
-from softnlp.quantities import Model, quantities
-from softnlp.robot import ROBOTS, Robot
-from softnlp.section import Section, deform, reference_area, stretch_balance
-from softnlp.status import Status
+from softnlp.base.status import Status
+from softnlp.model.conventions import AS_PRINTED, COEFFICIENT_SETS, REPRODUCTION, Coefficients, Conventions
+from softnlp.model.materials import Material
+from softnlp.model.quantities import Model, quantities
+from softnlp.model.robot import ROBOTS, Robot
+from softnlp.model.section import Section, deform, reference_area, stretch_balance
+from softnlp.statics.branch import branch_function, stretch_on_branch
 
 OWN_PRESSURE = Conventions("own pressure", True, 0.0, False)
 THICK_FIBRE = Conventions("thick fibre", True, 0.1e-3, True)

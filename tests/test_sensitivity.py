@@ -16,16 +16,18 @@ from sybil import Document
 from sybil.parsers.markdown import PythonCodeBlockParser
 
 from softnlp import BAR, MILLIMETRE, Loads, Numerics, forward, material, robot
+from softnlp.base.errors import IllPosedError, InputError
+from softnlp.base.status import Status
 from softnlp.cli import main
-from softnlp.contact_settings import ContactSettings
-from softnlp.conventions import Coefficients
-from softnlp.errors import IllPosedError, InputError
-from softnlp.implicit import ImplicitDerivatives
-from softnlp.problem import compile_problem
-from softnlp.quantities import Model, quantities
-from softnlp.section import deform
-from softnlp.status import Status
-from softnlp.studies.blocked import BlockedSolver
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.conventions import Coefficients
+from softnlp.model.quantities import Model, quantities
+from softnlp.model.section import deform
+from softnlp.nlp.implicit import ImplicitDerivatives
+from softnlp.nlp.problem import compile_problem
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.wall import standing_wall
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.derivatives import (
     UNITS,
@@ -39,9 +41,7 @@ from softnlp.studies.derivatives import (
 from softnlp.studies.ellipsoids import compliance_ellipsoid, manipulability, stiffness_ellipsoid
 from softnlp.studies.report import named_tolerances, sensitivity_report
 from softnlp.studies.sensitivity import TIP, Sensitivities, sensitivities, tip_compliance, tip_jacobian
-from softnlp.studies.statics import PoseSolver
 from softnlp.studies.tolerances import error_bars, monte_carlo
-from softnlp.studies.wall import standing_wall
 
 Array = NDArray[np.float64]
 
@@ -597,7 +597,7 @@ def test_every_output_and_quantity_is_documented() -> None:
 
 def test_every_key_of_a_target_is_documented() -> None:
     from softnlp.results.targets import TARGET_FIELDS
-    from softnlp.schema_inverse import BoundsTable, TargetTable
+    from softnlp.scenario.schema_inverse import BoundsTable, TargetTable
 
     text = (ROOT / "docs" / "inverse.md").read_text()
     for key in (*TargetTable.model_fields, *BoundsTable.model_fields, *(field.name for field in TARGET_FIELDS)):

@@ -17,25 +17,25 @@ from slow import some_slow
 from witness import Witnessed, shoot
 from witness_section import section
 
-from softnlp import solver
-from softnlp.branch import stretch_on_branch
-from softnlp.condensed import CondensedSolver
-from softnlp.continuation import follow, straight_path
-from softnlp.conventions import Coefficients
-from softnlp.loadcase import rod_functions
-from softnlp.numerics import Numerics
-from softnlp.quantities import Model
-from softnlp.quantity import quantity
-from softnlp.robot import ROBOTS, Robot
-from softnlp.rod import Loads
-from softnlp.solver import Engine, Solution, SparseSolver, certificate, discretisation_correction, violation
-from softnlp.status import Status
+from softnlp.base.quantity import quantity
+from softnlp.base.status import Status
+from softnlp.model.conventions import Coefficients
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.robot import ROBOTS, Robot
+from softnlp.model.rod import Loads
+from softnlp.nlp import solver
+from softnlp.nlp.continuation import follow, straight_path
+from softnlp.nlp.solver import Engine, Solution, SparseSolver, certificate, discretisation_correction, violation
+from softnlp.nlp.transcription import Collocation, MultipleShooting, Transcription
+from softnlp.statics.attempts import Attempt
+from softnlp.statics.branch import stretch_on_branch
+from softnlp.statics.condensed import CondensedSolver
+from softnlp.statics.loadcase import rod_functions
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.step import Step
 from softnlp.studies import statics
-from softnlp.studies.attempts import Attempt
 from softnlp.studies.forward import forward
-from softnlp.studies.statics import PoseSolver
-from softnlp.studies.step import Step
-from softnlp.transcription import Collocation, MultipleShooting, Transcription
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # benchmarks/ is not installed
 

@@ -13,17 +13,17 @@ from slow import some_slow
 from witness import NoConvergence, shoot
 from witness_section import Section, section
 
-from softnlp.materials import Material
-from softnlp.numerics import Numerics
-from softnlp.quantities import Model
-from softnlp.robot import ROBOTS, Robot
-from softnlp.rod import Loads
-from softnlp.stability import conjugate_points, transition_functions
-from softnlp.status import Status
+from softnlp.base.status import Status
+from softnlp.model.materials import Material
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.robot import ROBOTS, Robot
+from softnlp.model.rod import Loads
+from softnlp.nlp.transcription import MultipleShooting
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.stability import conjugate_points, transition_functions
+from softnlp.statics.step import Step
 from softnlp.studies.forward import forward
-from softnlp.studies.statics import PoseSolver
-from softnlp.studies.step import Step
-from softnlp.transcription import MultipleShooting
 
 SOFT, FIRM = silicone("Ecoflex 00-10"), silicone("Ecoflex 00-50")
 GREENHILL = 7.8373  # rho A g L^3 / EI of a column that buckles under its weight

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from softnlp.evaluation.statistics import statistics
+from softnlp.base.statistics import statistics
 
 NUMBERS = st.floats(-1e3, 1e3).filter(lambda x: x == 0 or abs(x) > 1e-3)
 ERRORS = st.integers(1, 12).flatmap(lambda n: st.tuples(*[arrays(float, n, elements=NUMBERS)] * 2))

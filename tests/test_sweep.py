@@ -23,20 +23,20 @@ from sweeps import GRID, HEAD, QUICK, MadeUpSolver, in_child, made_up, plan, rea
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # benchmarks/ is not installed
 
+from softnlp.base.errors import InputError
+from softnlp.base.status import Status
+from softnlp.base.units import BAR, MILLIMETRE
+from softnlp.batch.plan import Plan
+from softnlp.batch.poses import Block
 from softnlp.cli import main
-from softnlp.errors import InputError
-from softnlp.rod import Loads
-from softnlp.runner_workspace import run_sweep
-from softnlp.scenario import load_scenario
-from softnlp.status import Status
-from softnlp.studies.statics import PoseSolver
-from softnlp.units import BAR, MILLIMETRE
-from softnlp.workspace import pool
-from softnlp.workspace.dataset import data_hash, write_csv, write_workspace
-from softnlp.workspace.journal import Journal
-from softnlp.workspace.plan import Plan
-from softnlp.workspace.poses import Block
-from softnlp.workspace.run import CSV_FILE, JOURNAL_FILE, WORKSPACE_FILE, SweepError, SweepProgress
+from softnlp.model.rod import Loads
+from softnlp.scenario.read import load_scenario
+from softnlp.scenario.run_workspace import run_sweep
+from softnlp.statics.solver import PoseSolver
+from softnlp.sweep import pool
+from softnlp.sweep.dataset import data_hash, write_csv, write_workspace
+from softnlp.sweep.journal import Journal
+from softnlp.sweep.run import CSV_FILE, JOURNAL_FILE, WORKSPACE_FILE, SweepError, SweepProgress
 
 VARIED = (
     "[workspace]\nlevels = 2\nto_bar = 0.9\nsets = [1]\n[workspace.vary]\n"
@@ -54,9 +54,9 @@ def no_solving(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def use(monkeypatch: pytest.MonkeyPatch, solver: type[Any]) -> None:
-    monkeypatch.setattr("softnlp.workspace.run.ChunkSolver", solver)
-    monkeypatch.setattr("softnlp.workspace.worker.ChunkSolver", solver)
-    monkeypatch.setattr("softnlp.workspace.worker._solvers", {})
+    monkeypatch.setattr("softnlp.sweep.run.ChunkSolver", solver)
+    monkeypatch.setattr("softnlp.sweep.worker.ChunkSolver", solver)
+    monkeypatch.setattr("softnlp.sweep.worker._solvers", {})
     monkeypatch.setattr(pool, "process_context", lambda: multiprocessing.get_context("fork"))
 
 
@@ -176,7 +176,7 @@ def filled(folder: Path, plan: Plan) -> Journal:
 def test_rows_stand_in_the_order_of_the_plan(
     tables: str, memory: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("softnlp.workspace.dataset.MEMORY", memory)
+    monkeypatch.setattr("softnlp.sweep.dataset.MEMORY", memory)
     wanted = plan(tables)
     assert not np.array_equal(wanted.order, np.arange(wanted.poses))
     with filled(tmp_path, wanted) as journal:
@@ -471,7 +471,7 @@ def test_a_sweep_goes_on_with_another_casadi_and_says_so(
 ) -> None:
     path, out = written(tmp_path), tmp_path / "out"
     for casadi in ("3.8.0", "3.9.0"):
-        monkeypatch.setattr("softnlp.workspace.run.package_version", {"casadi": casadi, "numpy": "2.4.0"}.get)
+        monkeypatch.setattr("softnlp.sweep.run.package_version", {"casadi": casadi, "numpy": "2.4.0"}.get)
         run_sweep(load_scenario(path), out, resume=True, stop=lambda: True)
     status, told, _ = cli("sweep", path, "--out", out, "--resume")
     assert status == 3  # every fifth pose is made up as failed

@@ -11,8 +11,8 @@ import pytest
 
 from softnlp import InputError, fit_tensile, formula_law, load_materials, material
 from softnlp.cli import main
-from softnlp.laws import LAWS
-from softnlp.scenario import load_scenario, scenario_from_text
+from softnlp.model.laws import LAWS
+from softnlp.scenario.read import load_scenario, scenario_from_text
 from softnlp.studies.identify_task import TensileTask
 from softnlp.studies.law_curve import LawCurve
 from softnlp.studies.tensile import LawFit

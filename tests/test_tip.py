@@ -11,9 +11,9 @@ import witness
 from designs import random_design
 from scipy.spatial.transform import Rotation
 
-from softnlp.errors import InputError
-from softnlp.rod import RodSection
-from softnlp.tip import (
+from softnlp.base.errors import InputError
+from softnlp.model.rod import RodSection
+from softnlp.model.tip import (
     DEAD_LOADS,
     AtTip,
     Closure,

@@ -10,7 +10,7 @@ import pytest
 from scipy.sparse.linalg import spsolve
 from scipy.special import ellipj, ellipk
 
-from softnlp.transcription import (
+from softnlp.nlp.transcription import (
     Collocation,
     MultipleShooting,
     Tableau,

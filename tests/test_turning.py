@@ -7,11 +7,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from softnlp import BAR, Loads, material, robot
-from softnlp.numerics import Numerics
-from softnlp.quantities import Model
-from softnlp.solver import Engine
-from softnlp.studies.statics import PoseSolver
-from softnlp.turning import carried, change, moved
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.turning import carried, change, moved
+from softnlp.nlp.solver import Engine
+from softnlp.statics.solver import PoseSolver
 
 POINTS = 5
 RNG = np.random.default_rng(3)

@@ -19,11 +19,11 @@ from matplotlib.text import Text
 from softnlp.cli import main
 from softnlp.cli.console import say_rows
 from softnlp.cli.sweep import _bar
-from softnlp.plots import run_figure
-from softnlp.plots.canvas import MissingGlyphs, OwnFigure
-from softnlp.plots.style import user_text
+from softnlp.figures import run_figure
+from softnlp.figures.canvas import MissingGlyphs, OwnFigure
+from softnlp.figures.style import user_text
 from softnlp.results import view_of_run
-from softnlp.workspace.run import SweepProgress
+from softnlp.sweep.run import SweepProgress
 
 MARKS = r"$a^{ $b_ %# & ~ \alpha <b>&lt; [red]{x}[/bold]"
 ROBOT, SILICONE, LAW = f"_D25 {MARKS}", f"_batch {MARKS}", f"_law {MARKS}"
@@ -151,7 +151,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Told]]:
     found: dict[str, Told] = {}
     with pytest.MonkeyPatch.context() as patch, mpl.rc_context({"text.usetex": True, "text.parse_math": True}):
         patch.chdir(folder)
-        patch.setattr("softnlp.plots.style.DPI", 24)
+        patch.setattr("softnlp.figures.style.DPI", 24)
 
         def unsaved(figure: OwnFigure, *_: Any, **__: Any) -> None:
             figure.canvas.draw()

@@ -23,11 +23,11 @@ from softnlp import robot
 from softnlp.app.view import Frame, frame_of
 from softnlp.app.view.frame import ARROW, quaternions
 from softnlp.app.view.message import cloud_message, frame_message, layout_of, packed, robot_message
-from softnlp.mesh import display_mesh
-from softnlp.mesh.display import STATIONS
-from softnlp.palette import colour
+from softnlp.base.palette import colour
+from softnlp.figures.mesh import display_mesh
+from softnlp.figures.mesh.display import STATIONS
 from softnlp.results import Body
-from softnlp.studies.wall import Wall
+from softnlp.statics.wall import Wall
 
 ARM = robot("D25L60")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")

@@ -11,14 +11,14 @@ import pytest
 from sweeps import HEAD, QUICK, made_up, plan
 
 from softnlp import load_scenario
-from softnlp.runner_workspace import run_sweep
-from softnlp.scenario import scenario_from_text
-from softnlp.schema_workspace import WorkspaceTable
-from softnlp.units import BAR
-from softnlp.workspace.columns import columns
-from softnlp.workspace.dataset import write_workspace
-from softnlp.workspace.journal import Journal
-from softnlp.workspace.planning import plan_of
+from softnlp.base.units import BAR
+from softnlp.scenario.planning import plan_of
+from softnlp.scenario.read import scenario_from_text
+from softnlp.scenario.run_workspace import run_sweep
+from softnlp.scenario.schema_workspace import WorkspaceTable
+from softnlp.sweep.columns import columns
+from softnlp.sweep.dataset import write_workspace
+from softnlp.sweep.journal import Journal
 
 ROOT = Path(__file__).parents[1]
 DOCUMENT = (ROOT / "docs" / "workspace.md").read_text()

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from arc_workspaces import arcs, grid, write_workspace
 
+from softnlp.base.units import MILLIMETRE
 from softnlp.cli import main
 from softnlp.cli.workspace import _body
 from softnlp.cli.workspace import workspace as command
-from softnlp.units import MILLIMETRE
-from softnlp.workspace.boundary import alpha_shape, convex_hull, reach
+from softnlp.sweep.boundary import alpha_shape, convex_hull, reach
 
 DOCUMENT = Path(__file__).parents[1] / "docs" / "workspace_figures.md"
 
@@ -26,7 +26,7 @@ def blocks(language: str) -> list[str]:
 
 def test_the_document_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("softnlp.plots.style.DPI", 30)  # quicker, and as good here
+    monkeypatch.setattr("softnlp.figures.style.DPI", 30)  # quicker, and as good here
     write_workspace(Path("results/D25L60"), grid(4))
     write_workspace(Path("results/D25L60_loaded"), grid(4), move=np.array([1e-3, 0, 0]))
     Path("measured.csv").write_text(blocks("csv")[0])

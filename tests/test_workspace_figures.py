@@ -12,13 +12,13 @@ from arc_workspaces import grid, workspace_dataset, write_workspace
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from softnlp.errors import InputError
-from softnlp.plots import workspace_figure
-from softnlp.plots.cloud import VIEWS, mark_size, outline, seen
-from softnlp.units import BAR, DEGREE, MILLIMETRE
-from softnlp.workspace.boundary import Extent
-from softnlp.workspace.read import Workspace, load_workspace
-from softnlp.workspace.summary import parameters, summarise
+from softnlp.base.errors import InputError
+from softnlp.base.units import BAR, DEGREE, MILLIMETRE
+from softnlp.figures import workspace_figure
+from softnlp.figures.cloud import VIEWS, mark_size, outline, seen
+from softnlp.sweep.boundary import Extent
+from softnlp.sweep.read import Workspace, load_workspace
+from softnlp.sweep.summary import parameters, summarise
 
 
 @pytest.fixture(scope="module")
@@ -115,9 +115,9 @@ def test_a_large_cloud_is_thinned_by_what_is_nearest(space: Workspace) -> None:
 
 
 def test_a_thinned_figure_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("softnlp.plots.cloud.MOST_SHOWN", 150)
-    monkeypatch.setattr("softnlp.plots.cloud.shown.__defaults__", (150,))
-    monkeypatch.setattr("softnlp.plots.cloud.seen.__defaults__", (150,))
+    monkeypatch.setattr("softnlp.figures.cloud.MOST_SHOWN", 150)
+    monkeypatch.setattr("softnlp.figures.cloud.shown.__defaults__", (150,))
+    monkeypatch.setattr("softnlp.figures.cloud.seen.__defaults__", (150,))
     figure = workspace_figure(load_workspace(write_workspace(tmp_path, grid(7))))
     counts = [len(cloud.get_array()) for cloud in labelled(figure, "poses")]
     assert max(counts) <= 150

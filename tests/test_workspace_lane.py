@@ -9,27 +9,27 @@ import numpy as np
 import pytest
 
 from softnlp import BAR, Loads, Numerics, material, robot
+from softnlp.base.status import Status
 from softnlp.batch import newton, shooting, stretches
+from softnlp.batch.chunk import ChunkSolver
 from softnlp.batch.compiled import compiler
 from softnlp.batch.contact_newton import PATH, BlockedShot, ContactBatch, Stage
 from softnlp.batch.grids import MOST_INTERVALS
 from softnlp.batch.newton import Batch, BatchSolver, Shot
+from softnlp.batch.plan import Plan, cells
+from softnlp.batch.pose_lane import PoseLane
+from softnlp.batch.poses import STATUSES, Lane, Rows
 from softnlp.batch.reduced import reduced_rod
-from softnlp.branch import branch_function, stretch_on_branch
-from softnlp.contact_settings import ContactSettings
-from softnlp.conventions import COEFFICIENT_SETS, Coefficients
-from softnlp.loadcase import rod_functions
-from softnlp.quantities import Model
-from softnlp.status import Status
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.conventions import COEFFICIENT_SETS, Coefficients
+from softnlp.model.quantities import Model
+from softnlp.model.tip import tip_conditions
+from softnlp.statics.branch import branch_function, stretch_on_branch
+from softnlp.statics.loadcase import rod_functions
+from softnlp.statics.solver import PoseSolver
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.forward import forward
-from softnlp.studies.statics import PoseSolver
-from softnlp.tip import tip_conditions
-from softnlp.workspace import pose_lane
-from softnlp.workspace.chunk import ChunkSolver
-from softnlp.workspace.plan import Plan, cells
-from softnlp.workspace.pose_lane import PoseLane
-from softnlp.workspace.poses import STATUSES, Lane, Rows
+from softnlp.sweep import pose_lane
 
 REPRODUCTION_SET = Coefficients()
 LOADED = Loads(tip_force=(0.02, 0.01, -0.015), tip_moment=(1e-4, -2e-4, 1e-4), gravity=(0.0, 0.0, -9.80665))
@@ -43,7 +43,7 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monk
     folder.mkdir(exist_ok=True)
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
     monkeypatch.setattr(pose_lane, "WORTH_COMPILING", 0)
-    monkeypatch.setattr("softnlp.workspace.blocked_lane.WORTH_COMPILING", 0)
+    monkeypatch.setattr("softnlp.batch.blocked_lane.WORTH_COMPILING", 0)
 
 
 def plan(

@@ -17,16 +17,16 @@ from hypothesis import strategies as st
 from scipy.stats import qmc
 from sweeps import GRID, HEAD, scenario
 
-from softnlp.errors import InputError, RobotError
-from softnlp.laws import Law, formula_law, function_law
-from softnlp.materials import Material
-from softnlp.robot import ROBOTS, check
-from softnlp.scenario_workspace import MOST_POSES
-from softnlp.units import BAR
-from softnlp.workspace.manufacture import check_many
-from softnlp.workspace.plan import CHUNK, Plan, cells
-from softnlp.workspace.planning import plan_of
-from softnlp.workspace.table import unit_samples
+from softnlp.base.errors import InputError, RobotError
+from softnlp.base.units import BAR
+from softnlp.batch.plan import CHUNK, Plan, cells
+from softnlp.model.laws import Law, formula_law, function_law
+from softnlp.model.materials import Material
+from softnlp.model.robot import ROBOTS, check
+from softnlp.scenario.planning import plan_of
+from softnlp.scenario.workspace import MOST_POSES
+from softnlp.sweep.manufacture import check_many
+from softnlp.sweep.table import unit_samples
 
 SEQUENCE = "[pressure]\nsequence_bar = [[0.1, 0.0, 0.0], [0.0, 0.2, 0.0], [0.3, 0.3, 0.0], [0.1, 0.0, 0.0]]\n"
 
@@ -224,7 +224,8 @@ def test_a_fingerprint_is_the_same_in_another_process_and_after_pickling() -> No
     plan = planned(GRID, formula)
     assert pickle.loads(pickle.dumps(plan)).fingerprint() == plan.fingerprint()
     code = (
-        "import sys; from softnlp.scenario import scenario_from_text; from softnlp.workspace.planning import plan_of; "
+        "import sys; from softnlp.scenario.planning import plan_of; "
+        "from softnlp.scenario.read import scenario_from_text; "
         "print(plan_of(scenario_from_text(sys.stdin.read(), 'x.toml')).fingerprint())"
     )
     told = subprocess.run(

@@ -10,10 +10,10 @@ from arc_runs import arc_pose
 from nicegui import ui
 
 from softnlp.app.view import Frame, RobotView, frame_of
-from softnlp.plots.style import step_colours
+from softnlp.figures.style import step_colours
+from softnlp.model.robot import robot
 from softnlp.results import Body
-from softnlp.robot import robot
-from softnlp.studies.wall import Wall
+from softnlp.statics.wall import Wall
 
 ARM = robot("D25L60")
 FULL = 1.5e5

@@ -15,7 +15,7 @@ from typing import Any
 
 from softnlp import BAR, load_scenario, run_scenario
 from softnlp.cli import main
-from softnlp.plots import run_figure
+from softnlp.figures import run_figure
 from softnlp.results import view_of_run
 
 ROOT = Path(__file__).parents[2]

@@ -6,9 +6,9 @@ import numpy as np
 
 from docs.figures._shared import markdown
 from softnlp import REPRODUCTION, Coefficients, Loads, Numerics, material, robot
-from softnlp.quantities import Model
-from softnlp.section import deform
-from softnlp.studies.statics import PoseSolver
+from softnlp.model.quantities import Model
+from softnlp.model.section import deform
+from softnlp.statics.solver import PoseSolver
 
 GRAVITY = 9.80665
 ROBOTS = ("D25L60", "D20L60", "D15L60", "D10L60")

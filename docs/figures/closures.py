@@ -6,7 +6,7 @@ import numpy as np
 
 from docs.figures._shared import measured
 from softnlp import BAR, COEFFICIENT_SETS, ClosureWeights, ContactSettings, blocked_force, material, robot
-from softnlp.plots.style import INK, SMALL, colour, in_own_style, new_figure, plain
+from softnlp.figures.style import INK, SMALL, colour, in_own_style, new_figure, plain
 
 WEIGHTS = ClosureWeights(force=10.0, moment=10.0, length=20.0)  # [1/N], [1/(N m)], [1/m]
 MODELS = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from softnlp import BAR, Loads, Numerics, forward, material, robot
-from softnlp.plots.style import GREY, SMALL, colour, in_own_style, new_figure, plain
+from softnlp.figures.style import GREY, SMALL, colour, in_own_style, new_figure, plain
 
 INTERVALS = (4, 8, 16, 32, 64)
 LOADS = Loads(tip_force=(0.05, 0.02, -0.05), gravity=(0.0, 0.0, -9.80665))

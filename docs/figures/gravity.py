@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from docs.figures._shared import SCENARIOS
 from softnlp import BAR, DEGREE, Loads, load_scenario, run_scenario
-from softnlp.plots.style import SMALL, colour, in_own_style, new_figure, plain
+from softnlp.figures.style import SMALL, colour, in_own_style, new_figure, plain
 
 
 @in_own_style

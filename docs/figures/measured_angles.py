@@ -6,9 +6,9 @@ import numpy as np
 
 from docs.figures._shared import MEASURED_ELONGATION, markdown, measured
 from softnlp import BAR, COEFFICIENT_SETS, DEGREE, MILLIMETRE, Numerics, material, robot
-from softnlp.quantities import Model
-from softnlp.studies.arc import arc_pose, unloaded_arc
-from softnlp.studies.statics import PoseSolver
+from softnlp.model.quantities import Model
+from softnlp.statics.arc import arc_pose, unloaded_arc
+from softnlp.statics.solver import PoseSolver
 
 SILICONE = material("Ecoflex 00-50")
 

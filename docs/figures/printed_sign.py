@@ -8,9 +8,9 @@ import numpy as np
 
 from docs.figures._shared import MEASURED_ELONGATION, markdown
 from softnlp import BAR, REPRODUCTION, Numerics, material, robot
-from softnlp.quantities import Model
-from softnlp.studies.arc import unloaded_arc
-from softnlp.studies.statics import PoseSolver
+from softnlp.model.quantities import Model
+from softnlp.statics.arc import unloaded_arc
+from softnlp.statics.solver import PoseSolver
 
 PRINTED = replace(REPRODUCTION, name="printed sign", stiffening_opposes_pressure=False)
 LAWS = ("mooney-rivlin", "neo-hookean", "yeoh", "ogden")

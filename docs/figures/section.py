@@ -1,7 +1,7 @@
 """The cross-section of D25L60 at rest and stretched."""
 
 from softnlp import robot
-from softnlp.plots import section_figure
+from softnlp.figures import section_figure
 
 
 def figure():

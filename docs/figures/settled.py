@@ -12,7 +12,7 @@ from scipy.optimize import brentq, least_squares
 
 from docs.figures._shared import PUBLISHED, Simulated, markdown
 from softnlp import BAR, DEGREE, REPRODUCTION, Coefficients, Conventions, Material, material, robot
-from softnlp.section import deform, stretch_balance
+from softnlp.model.section import deform, stretch_balance
 
 LAPAROSCOPE = robot("laparoscope-6")
 

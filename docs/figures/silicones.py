@@ -1,7 +1,7 @@
 """The five laws of Ecoflex 00-50."""
 
 from softnlp import load_materials
-from softnlp.plots import material_figure
+from softnlp.figures import material_figure
 
 
 def figure():

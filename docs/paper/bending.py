@@ -15,12 +15,12 @@ from docs.paper.figures import MEASURED, label_outer, legend, named, panels, sav
 from docs.paper.published import elongation_range, mean_error, measured_angles, measured_pressure
 from docs.paper.text import between, figure, fixed, page_text, scenario_link, table, worded
 from softnlp import COEFFICIENT_SETS, DEGREE, MILLIMETRE, Coefficients, Loads, Material, material
-from softnlp.laws import LAWS
-from softnlp.plots.style import INK, colour
-from softnlp.scenario import Scenario
+from softnlp.figures.style import INK, colour
+from softnlp.model.laws import LAWS
+from softnlp.scenario.read import Scenario
+from softnlp.statics.solver import PoseSolver
 from softnlp.studies.identify import identify
 from softnlp.studies.identify_task import RobotTask
-from softnlp.studies.statics import PoseSolver
 
 Array = NDArray[np.float64]
 

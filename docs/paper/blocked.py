@@ -16,11 +16,11 @@ from docs.paper.published import measured_forces, measured_pressure
 from docs.paper.text import NONE, figure, fixed, page_text, scenario_link, table, worded
 from docs.paper.weights import ROUGH, length_weight_for, with_length_weight
 from softnlp import BAR, COEFFICIENT_SETS, Coefficients, ContactSettings
-from softnlp.contact_settings import CLOSURES
-from softnlp.plots.style import COLOURS, GREY, INK, PALE, SMALL, colour
-from softnlp.quantities import Model
-from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.wall import standing_wall
+from softnlp.figures.style import COLOURS, GREY, INK, PALE, SMALL, colour
+from softnlp.model.contact_settings import CLOSURES
+from softnlp.model.quantities import Model
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.wall import standing_wall
 
 Array = NDArray[np.float64]
 

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from docs.paper.published import ROOT
 from softnlp import BAR, COEFFICIENT_SETS, ROBOTS, Coefficients, Loads, material
-from softnlp.branch import stretch_on_branch
-from softnlp.laws import LAWS
-from softnlp.quantities import Model
-from softnlp.scenario import Scenario, load_scenario
-from softnlp.studies.statics import PoseSolver
+from softnlp.model.laws import LAWS
+from softnlp.model.quantities import Model
+from softnlp.scenario.read import Scenario, load_scenario
+from softnlp.statics.branch import stretch_on_branch
+from softnlp.statics.solver import PoseSolver
 
 Array = NDArray[np.float64]
 

@@ -15,13 +15,13 @@ from docs.paper.published import measured_forces, measured_pressure, published
 from docs.paper.text import NONE, figure, fixed, page_text, scenario_link, table
 from docs.paper.weights import ROUGH, force_at, length_weight_for, with_length_weight
 from softnlp import MILLIMETRE, Conventions, Loads, run_scenario
-from softnlp.plots.style import GREY, colour
-from softnlp.quantities import Model
-from softnlp.scenario import Scenario
-from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.step import Step
-from softnlp.studies.wall import Wall
-from softnlp.units import STANDARD_GRAVITY
+from softnlp.base.units import STANDARD_GRAVITY
+from softnlp.figures.style import GREY, colour
+from softnlp.model.quantities import Model
+from softnlp.scenario.read import Scenario
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.step import Step
+from softnlp.statics.wall import Wall
 
 Array = NDArray[np.float64]
 

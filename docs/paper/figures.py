@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softnlp.plots.style import INK, SMALL, TEXT, in_own_style, new_figure, plain, save_figure
+from softnlp.figures.style import INK, SMALL, TEXT, in_own_style, new_figure, plain, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

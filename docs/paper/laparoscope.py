@@ -14,12 +14,12 @@ from docs.paper.figures import MEASURED, label_outer, legend, panels, saved
 from docs.paper.published import published
 from docs.paper.text import NONE, figure, fixed, page_text, scenario_link, table, worded
 from softnlp import BAR, DEGREE, Design
-from softnlp.plots.design import design_figure
-from softnlp.plots.style import colour
-from softnlp.runner_design import run_design
+from softnlp.figures.design import design_figure
+from softnlp.figures.style import colour
+from softnlp.scenario.run_design import run_design
+from softnlp.statics.step import Step
 from softnlp.studies.design_candidate import Candidate
 from softnlp.studies.design_task import DesignTask
-from softnlp.studies.step import Step
 
 _HALF_DIGIT = 0.005
 

@@ -24,11 +24,11 @@ from docs.paper.figures import legend, named, panels, saved
 from docs.paper.published import published
 from docs.paper.text import figure, fixed, page_text, table
 from softnlp import ContactSettings, Loads
-from softnlp.plots.style import COLOURS, INK, PALE, SMALL, plain
-from softnlp.quantities import Model
-from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.statics import PoseSolver
-from softnlp.studies.wall import standing_wall
+from softnlp.figures.style import COLOURS, INK, PALE, SMALL, plain
+from softnlp.model.quantities import Model
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.wall import standing_wall
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp import Loads
-from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.wall import standing_wall
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.wall import standing_wall
 
 Array = NDArray[np.float64]
 

@@ -14,15 +14,15 @@ from docs.paper.cases import BARE, Solvers, case, law_of, model_of
 from docs.paper.figures import label_outer, legend, named, panels, saved
 from docs.paper.text import between, figure, fixed, page_text, scenario_link, table
 from softnlp import BAR, COEFFICIENT_SETS, MILLIMETRE, Loads, Status
-from softnlp.laws import LAWS
-from softnlp.plots.style import GREY, SMALL, colour, plain
-from softnlp.quantities import Model
-from softnlp.studies.arc import unloaded_arc
-from softnlp.units import STANDARD_GRAVITY
-from softnlp.workspace.boundary import alpha_shape, convex_hull, reach
-from softnlp.workspace.chunk import ChunkSolver
-from softnlp.workspace.plan import Plan
-from softnlp.workspace.poses import STATUSES, Rows
+from softnlp.base.units import STANDARD_GRAVITY
+from softnlp.batch.chunk import ChunkSolver
+from softnlp.batch.plan import Plan
+from softnlp.batch.poses import STATUSES, Rows
+from softnlp.figures.style import GREY, SMALL, colour, plain
+from softnlp.model.laws import LAWS
+from softnlp.model.quantities import Model
+from softnlp.statics.arc import unloaded_arc
+from softnlp.sweep.boundary import alpha_shape, convex_hull, reach
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ from typing import Any
 from softnlp.app.document import Document
 from softnlp.app.job import Progress, Stopped
 from softnlp.app.session import Session
-from softnlp.errors import InputError
-from softnlp.runner import partial_run, solve_steps
-from softnlp.scenario import Scenario, scenario_from_text
-from softnlp.studies.step import Run, Step
-from softnlp.units import BAR
+from softnlp.base.errors import InputError
+from softnlp.base.units import BAR
+from softnlp.scenario.read import Scenario, scenario_from_text
+from softnlp.scenario.run import partial_run, solve_steps
+from softnlp.statics.step import Run, Step
 
 MOST_STEPS = 10_000
 """Of a run on the page, which keeps every shape in memory; `softnlp run` takes more."""

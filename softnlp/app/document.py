@@ -10,12 +10,12 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable, Table
 
-from softnlp.errors import InputError
-from softnlp.reading import one_line
-from softnlp.robot import ROBOTS
-from softnlp.scenario import parse_toml
-from softnlp.scenario_check import SCHEMAS
-from softnlp.scenario_identify import UNUSED_BY_TENSILE
+from softnlp.base.errors import InputError
+from softnlp.base.reading import one_line
+from softnlp.model.robot import ROBOTS
+from softnlp.scenario.check import SCHEMAS
+from softnlp.scenario.identify import UNUSED_BY_TENSILE
+from softnlp.scenario.read import parse_toml
 
 START = """\
 title = "D25L60, one chamber set"

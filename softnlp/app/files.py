@@ -11,10 +11,10 @@ from nicegui import events, ui
 
 from softnlp.app.parts import while_open
 from softnlp.app.session import LARGEST_FILE, Session
-from softnlp.errors import InputError, SoftnlpError
+from softnlp.base.errors import InputError, SoftnlpError
+from softnlp.model.robot import Robot
 from softnlp.results import Body
-from softnlp.robot import Robot
-from softnlp.studies.step import Pose
+from softnlp.statics.step import Pose
 
 
 def saved(session: Session) -> tuple[str, bytes]:
@@ -118,7 +118,7 @@ def mesh_bytes(robot: Robot, pose: Pose | None, file: Path) -> bytes:
     InputError
         Where the extra mesh is not installed, or the body passes through itself so that it cannot be made solid.
     """
-    from softnlp.mesh import body_solid, mould_body, write_solids
+    from softnlp.figures.mesh import body_solid, mould_body, write_solids
 
     if pose is None:
         solid = mould_body(robot)

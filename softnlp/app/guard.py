@@ -13,8 +13,8 @@ from ipaddress import ip_address
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
-from softnlp.errors import InputError
-from softnlp.reading import shown
+from softnlp.base.errors import InputError
+from softnlp.base.reading import shown
 
 if TYPE_CHECKING:
     from starlette.types import ASGIApp, Receive, Scope, Send

@@ -12,7 +12,7 @@ from starlette.responses import Response
 
 from softnlp.app.redraw import Redraw
 from softnlp.app.session import Session
-from softnlp.errors import SoftnlpError
+from softnlp.base.errors import SoftnlpError
 
 _KEPT, _FILES = "softnlp.scenario", "softnlp.files"
 _PIECE = 400_000  # characters; a browser sends no message of more than a million bytes

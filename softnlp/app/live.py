@@ -9,16 +9,16 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.contact_settings import ContactSettings, ContactTask
-from softnlp.rod import Loads
-from softnlp.runner_run import run_of
-from softnlp.scenario import Scenario
-from softnlp.studies.arc import arc_pose, unloaded_arc
-from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.pose_grid import Solved
-from softnlp.studies.statics import PoseSolver
-from softnlp.studies.step import Pose, Run, Step
-from softnlp.studies.wall import standing_wall
+from softnlp.model.contact_settings import ContactSettings, ContactTask
+from softnlp.model.rod import Loads
+from softnlp.scenario.partial import run_of
+from softnlp.scenario.read import Scenario
+from softnlp.statics.arc import arc_pose, unloaded_arc
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.pose_grid import Solved
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.step import Pose, Run, Step
+from softnlp.statics.wall import standing_wall
 
 Array = NDArray[np.float64]
 

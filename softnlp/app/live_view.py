@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from softnlp.app.stage import Stage
 from softnlp.app.view import frame_of
-from softnlp.errors import InputError
+from softnlp.base.errors import InputError
+from softnlp.base.units import BAR
 from softnlp.results import Body
-from softnlp.scenario import Scenario
-from softnlp.studies.step import Contact, Pose, Run, Step
-from softnlp.studies.wall import Wall
-from softnlp.units import BAR
+from softnlp.scenario.read import Scenario
+from softnlp.statics.step import Contact, Pose, Run, Step
+from softnlp.statics.wall import Wall
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.app.theme import figure_config, figure_layout, figure_text
-from softnlp.materials import Material
-from softnlp.plots.style import colour
+from softnlp.figures.style import colour
+from softnlp.model.materials import Material
 
 KILOPASCAL = 1e3
 MEASURES = {

@@ -13,9 +13,9 @@ import tomlkit
 from tomlkit.items import InlineTable
 
 from softnlp.app.document import Document
-from softnlp.errors import InputError
-from softnlp.laws import LAWS
-from softnlp.materials import FITTED_STRETCH, Material, MaterialEntry, load_materials, material_from_table
+from softnlp.base.errors import InputError
+from softnlp.model.laws import LAWS
+from softnlp.model.materials import FITTED_STRETCH, Material, MaterialEntry, load_materials, material_from_table
 
 Form = Literal["library", "constants", "formula"]
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from softnlp.base.units import MILLIMETRE
 from softnlp.results import to_json
-from softnlp.studies.step import Run
-from softnlp.units import MILLIMETRE
+from softnlp.statics.step import Run
 
 NOTHING = "–"
 _STABILITY = {

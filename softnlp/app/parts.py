@@ -13,7 +13,7 @@ from nicegui import events, ui
 from softnlp.app.job import Progress, Stopped, in_background
 from softnlp.app.session import LARGEST_FILE
 from softnlp.app.theme import darkness, figure_config, figure_layout, figure_text, on_dark
-from softnlp.errors import InputError, SoftnlpError
+from softnlp.base.errors import InputError, SoftnlpError
 
 T = TypeVar("T")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from softnlp.units import BAR
+from softnlp.base.units import BAR
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,11 @@ from math import inf
 from typing import Any
 
 from softnlp.app.document import Document
-from softnlp.errors import RobotError
-from softnlp.ranges import SIZE
-from softnlp.reading import shown
-from softnlp.robot import (
+from softnlp.base.errors import RobotError
+from softnlp.base.ranges import SIZE
+from softnlp.base.reading import shown
+from softnlp.base.units import MILLIMETRE
+from softnlp.model.robot import (
     ALLOWABLE,
     DIMENSIONS,
     LENGTH_LIMITS,
@@ -24,7 +25,6 @@ from softnlp.robot import (
     touching_stretch,
     violations,
 )
-from softnlp.units import MILLIMETRE
 
 OWN = "own robot"
 """The name that a robot of one's own starts with."""

@@ -6,10 +6,10 @@ from collections.abc import Collection
 from html import escape
 from math import cos, floor, log10, sin
 
-from softnlp.plots.section import stretched_radii
-from softnlp.plots.style import colour, ink_on
-from softnlp.robot import Robot
-from softnlp.units import MILLIMETRE
+from softnlp.base.units import MILLIMETRE
+from softnlp.figures.section import stretched_radii
+from softnlp.figures.style import colour, ink_on
+from softnlp.model.robot import Robot
 
 WIDTH, HEIGHT = 316.0, 258.0
 """Of the drawing [px]."""

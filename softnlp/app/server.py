@@ -19,8 +19,8 @@ from softnlp.app.guard import Guard, root_path, trusted_host
 from softnlp.app.kept import CLOSED, close_all, closed, keep, recall, tell_when_closed
 from softnlp.app.page import build_page
 from softnlp.app.session import Session
-from softnlp.errors import InputError, SoftnlpError
-from softnlp.reading import shown
+from softnlp.base.errors import InputError, SoftnlpError
+from softnlp.base.reading import shown
 
 HOST = "127.0.0.1"
 FIRST_PORT, LAST_PORT = 8080, 8179

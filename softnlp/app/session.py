@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from softnlp.app.document import START, Document
 from softnlp.app.live import LivePoses
-from softnlp.errors import InputError
-from softnlp.reading import LARGEST_TOML, one_line, read_bytes, read_text, shown
-from softnlp.scenario import Scenario, load_scenario, placed, scenario_from_text
-from softnlp.units import BAR
+from softnlp.base.errors import InputError
+from softnlp.base.reading import LARGEST_TOML, one_line, read_bytes, read_text, shown
+from softnlp.base.units import BAR
+from softnlp.scenario.read import Scenario, load_scenario, placed, scenario_from_text
 
 Array = NDArray[np.float64]
 Listener = Callable[[], None]

@@ -8,9 +8,9 @@ import casadi as ca
 import numpy as np
 
 from softnlp.app.session import Session
-from softnlp.branch import branch_function, stretch_on_branch
-from softnlp.quantities import quantities
-from softnlp.status import Status
+from softnlp.base.status import Status
+from softnlp.model.quantities import quantities
+from softnlp.statics.branch import branch_function, stretch_on_branch
 
 
 class PoseStretch:

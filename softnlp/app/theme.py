@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ElementFilter, ui
 
-from softnlp.plots.style import COLOURS, WRONG, user_text
+from softnlp.figures.style import COLOURS, WRONG, user_text
 
 _BLUE, _VERMILION, _GREEN, _, _ORANGE, _SKY, _ = COLOURS
 _STYLE = f"""

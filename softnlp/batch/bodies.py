@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from softnlp.batch.reduced import POSITION
 from softnlp.batch.shooting import Shooting
-from softnlp.body import TURN, overlapping
+from softnlp.statics.body import TURN, overlapping
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -27,7 +27,7 @@ def self_intersecting(
     radius: Array,
     intervals: NDArray[np.int64],
 ) -> Mask:
-    """Return which of n poses pass through themselves, as `softnlp.body.Fit` says it.
+    """Return which of n poses pass through themselves, as `softnlp.statics.body.Fit` says it.
 
     onward : the map of a step. start, data : as it takes them, (fields, n). curvature, radius : the largest and the
     outer one, scaled. bending : [rad]. intervals : of each pose. Axes that turn little are not followed, so most poses

@@ -14,8 +14,8 @@ from softnlp.batch.grids import MOST_INTERVALS, grid_level, whole_groups
 from softnlp.batch.reduced import MOMENT, POSITION, ROTATION, STATE
 from softnlp.batch.reduced_contact import UNKNOWN
 from softnlp.batch.shooting import Shooting
-from softnlp.condensed import plane_directions
-from softnlp.loadcase import RodFunctions
+from softnlp.statics.condensed import plane_directions
+from softnlp.statics.loadcase import RodFunctions
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

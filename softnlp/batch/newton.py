@@ -13,8 +13,8 @@ from softnlp.batch.grids import MOST_INTERVALS, grid_level, whole_groups
 from softnlp.batch.predictor import predicted
 from softnlp.batch.reduced import MOMENT, POSITION, ROTATION, STATE
 from softnlp.batch.shooting import Shooting
-from softnlp.loadcase import RodFunctions
-from softnlp.rod import STATE_SIZE
+from softnlp.model.rod import STATE_SIZE
+from softnlp.statics.loadcase import RodFunctions
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -61,7 +61,7 @@ class Shot:
 
     @property
     def refinement_error(self) -> Array:
-        """What refinement holds against the accuracy, as `softnlp.studies.statics` does."""
+        """What refinement holds against the accuracy, as `softnlp.statics.solver` does."""
         return np.maximum(self.error, self.turn_error / 5)
 
 

@@ -4,8 +4,8 @@ Without contact the internal force is known in closed form, n(s) = F_P R e3 + F_
 for n into an identity. A Runge-Kutta step is linear in the rates, so it keeps the identity to round-off: nodes found
 with three unknowns solve the multiple-shooting equations of all eighteen states. They are judged by those.
 
-States are in the units of `softnlp.loadcase`. A step is a function (state, data, s, h) -> state a step h further, where
-data stacks the constants c of the load case and the scaled tip force and moment.
+States are in the units of `softnlp.statics.loadcase`. A step is a function (state, data, s, h) -> state a step h
+further, where data stacks the constants c of the load case and the scaled tip force and moment.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import Any
 
 import casadi as ca
 
-from softnlp import rod
-from softnlp.loadcase import RodFunctions, unpack_section
-from softnlp.transcription import RK4, rk_step
+from softnlp.model import rod
+from softnlp.nlp.transcription import RK4, rk_step
+from softnlp.statics.loadcase import RodFunctions, unpack_section
 
 POSITION, ROTATION, MOMENT = slice(0, 3), slice(3, 12), slice(12, 15)
 STATE = 15

@@ -12,10 +12,10 @@ from typing import Any
 
 import casadi as ca
 
-from softnlp import rod
 from softnlp.batch.reduced import MOMENT, ROTATION, STATE, larger_curvature, rk_integral
-from softnlp.loadcase import RodFunctions, unpack_section
-from softnlp.transcription import RK4, rk_step
+from softnlp.model import rod
+from softnlp.nlp.transcription import RK4, rk_step
+from softnlp.statics.loadcase import RodFunctions, unpack_section
 
 UNKNOWN = 6
 """Directions of a shooting: N_0, then m(0)."""
@@ -28,7 +28,7 @@ class ReducedContact:
     value : state (15 + N). directions : [state, its derivatives by N_0 and m(0) ((15 + N) x 6)]. check : [state, gap,
     bending angle, backbone length, curvature]; gap and curvature are as in `softnlp.batch.reduced`, as is onward.
     tip : [state, derivatives, data, tip force, tip moment, y, a, units] -> [residual (6 + ny), its derivatives by N_0,
-    m(0) and y, column by column]; a is what the conditions take (`softnlp.loadcase.RodFunctions`).
+    m(0) and y, column by column]; a is what the conditions take (`softnlp.statics.loadcase.RodFunctions`).
     arc : [quantities, stretch] -> the unloaded state.
     """
 

@@ -2,7 +2,7 @@
 
 Every chamber has the same bore, so the balance of Eq. (10) depends on the sum of the pressures alone, and solved for
 that sum it is a curve over the stretch. Up to the first stretch where the curve turns or the unpressurised section
-loses a stiffness (pressure only adds to them) a root is on the branch; beyond it `softnlp.branch` decides.
+loses a stiffness (pressure only adds to them) a root is on the branch; beyond it `softnlp.statics.branch` decides.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.units import BAR
 from softnlp.batch.shooting import Shooting
-from softnlp.branch import SILICONE, branch_function
-from softnlp.loadcase import RodFunctions
-from softnlp.units import BAR
+from softnlp.statics.branch import SILICONE, branch_function
+from softnlp.statics.loadcase import RodFunctions
 
 Array = NDArray[np.float64]
 
@@ -26,8 +26,8 @@ _NEWTON_STEPS = 8
 def stretch_maps(functions: RodFunctions) -> dict[str, ca.Function]:
     """Return the maps of [every quantity, stretch] that `Stretches` needs, and the section itself.
 
-    branch : rows of `softnlp.branch.branch_function`. balance : the scaled imbalance and its slope. section : the
-    constants of the load case, the imbalance, the units of length and force.
+    branch : rows of `softnlp.statics.branch.branch_function`. balance : the scaled imbalance and its slope. section :
+    the constants of the load case, the imbalance, the units of length and force.
     """
     size = functions.section.size1_in(0)
     column, stretch = ca.SX.sym("column", size), ca.SX.sym("stretch")
@@ -42,7 +42,7 @@ def stretch_maps(functions: RodFunctions) -> dict[str, ca.Function]:
 
 
 class Stretches:
-    """Finds stretches of poses given as columns of every quantity (see `softnlp.quantities`), SI.
+    """Finds stretches of poses given as columns of every quantity (see `softnlp.model.quantities`), SI.
 
     shared : whether the poses differ in pressure and loads only, so that one curve serves all.
     """

@@ -38,7 +38,7 @@ def _run(words: list[str]) -> int:
     """Run one command; what is wrong with its input is one line on standard error."""
     from cyclopts import CycloptsError
 
-    from softnlp.errors import SoftnlpError
+    from softnlp.base.errors import SoftnlpError
 
     try:
         return int(_app()(words, exit_on_error=False, print_error=False) or SOLVED)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
 from softnlp.cli.figures import draw
-from softnlp.gravity import gravity_lines
+from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
-    from softnlp.evaluation.comparison import Comparison
-    from softnlp.runner_compare import CompareTask
+    from softnlp.scenario.compare import CompareTask
+    from softnlp.studies.comparison import Comparison
 
 
 def compare(
@@ -59,8 +59,8 @@ def compare(
     from softnlp.cli.folder import require_writable
     from softnlp.results.comparison import comparison_document, require_free_names
     from softnlp.results.identify_document import document_text
-    from softnlp.runner_compare import Asked, compare_task
-    from softnlp.scenario import load_scenario
+    from softnlp.scenario.compare import Asked, compare_task
+    from softnlp.scenario.read import load_scenario
 
     asked = load_scenario(scenario)
     task = compare_task(asked, measured, Asked(law, coefficients, conventions, closure, shape))
@@ -84,7 +84,7 @@ def compare(
 
 def _compared(task: CompareTask) -> Comparison:
     """Compare with a progress bar."""
-    from softnlp.runner_compare import run_compare
+    from softnlp.scenario.compare import run_compare
 
     rows, variants = len(task.columns.rows), len(task.variants)
     with progress(rows * variants, task.scenario.title) as (advance, stop_asked):
@@ -99,7 +99,7 @@ def _compared(task: CompareTask) -> Comparison:
 
 def _say(task: CompareTask, found: Comparison) -> None:
     """Print the statistics of each variant, and the mean error by robot where there are several."""
-    from softnlp.evaluation.observed import OBSERVABLES
+    from softnlp.studies.observed import OBSERVABLES
 
     robots = ", ".join(o.label for o in found.observed)
     say(f"{task.scenario.title}: {robots}; {task.scenario.material.name}; {len(task.columns.rows)} rows measured")
@@ -128,7 +128,7 @@ def _say(task: CompareTask, found: Comparison) -> None:
 
 
 def _cells(found: Comparison, v: int, name: str) -> list[str]:
-    from softnlp.evaluation.observed import OBSERVABLES
+    from softnlp.studies.observed import OBSERVABLES
 
     s, scale = found.statistics(v, name), OBSERVABLES[name].scale
     numbers = [_text(x / scale) for x in (s.mean, s.median, s.largest, s.bias)]
@@ -152,10 +152,10 @@ def _complain_of_lost(found: Comparison) -> None:
 
 def _write(folder: Path, task: CompareTask, found: Comparison, document: str) -> None:
     """Write the numbers, each file whole, after all of them are made, and then the figures."""
-    from softnlp.plots.compare import figure_makers
+    from softnlp.base.files import make_folder, write_whole
+    from softnlp.figures.compare import figure_makers
+    from softnlp.model.inputs import versions
     from softnlp.results.comparison import rows_text, summary_text
-    from softnlp.results.files import make_folder, write_whole
-    from softnlp.results.inputs import versions
 
     contents: dict[str, Any] = {
         "comparison.json": document.encode(),

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
-from softnlp.errors import InputError
-from softnlp.reading import one_line
+from softnlp.base.errors import InputError
+from softnlp.base.reading import one_line
 
 SOLVED, BAD_INPUT, SOME_UNSOLVED, STOPPED = 0, 2, 3, 130
 """Exit statuses."""

@@ -8,13 +8,13 @@ import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say
 from softnlp.cli.figures import draw
 from softnlp.cli.folder import require_writable
-from softnlp.errors import InputError
 
 if TYPE_CHECKING:
-    from softnlp.scenario import Scenario
+    from softnlp.scenario.read import Scenario
     from softnlp.studies.design import Design
     from softnlp.studies.design_candidate import Candidate
 
@@ -44,7 +44,7 @@ def design(scenario: Path, /, *, out: Path | None = None, json: bool = False, wo
     workers
         Processes; by default one for a few candidates, else one for each processor.
     """
-    from softnlp.scenario import load_scenario
+    from softnlp.scenario.read import load_scenario
 
     asked = load_scenario(scenario)
     if asked.study != "design":
@@ -80,7 +80,7 @@ def run_study(asked: Scenario, out: Path | None, json: bool, workers: int | None
 
 def _solve(asked: Scenario, workers: int | None) -> tuple[Design, bool]:
     """Run the study with a progress bar; return it and whether it was stopped before the end."""
-    from softnlp.runner_design import finished_design, run_design
+    from softnlp.scenario.run_design import finished_design, run_design
 
     total = asked.step_count
     done: list[Candidate] = []
@@ -102,10 +102,10 @@ def _solve(asked: Scenario, workers: int | None) -> tuple[Design, bool]:
 
 def _write(done: Design, folder: Path, asked: Scenario) -> None:
     """Write the numbers, made before the first file is written so that an error leaves no half, and the figure."""
-    from softnlp.plots.design import design_figure
+    from softnlp.base.files import make_folder, write_whole
+    from softnlp.figures.design import design_figure
+    from softnlp.model.inputs import versions
     from softnlp.results.design import best_scenario, design_csv, design_json
-    from softnlp.results.files import make_folder, write_whole
-    from softnlp.results.inputs import versions
 
     given = tomllib.loads(asked.text)
     if "file" in given["material"]:  # its path counted from the folder of the scenario

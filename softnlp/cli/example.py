@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from softnlp.base.errors import InputError, nearest
 from softnlp.cli.console import say, say_rows
 from softnlp.cli.folder import require_writable
-from softnlp.errors import InputError, nearest
 
 
 def example(name: str | None = None, /, *, out: Path = Path("scenarios"), all: bool = False) -> None:

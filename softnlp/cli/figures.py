@@ -8,8 +8,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from softnlp.base.errors import SoftnlpError
 from softnlp.cli.console import complain
-from softnlp.errors import SoftnlpError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,7 +39,7 @@ def draw(figures: Mapping[Path, Callable[[], Figure]], results: Path | None = No
 
 
 def _saved(figure: Callable[[], Figure], path: Path) -> Path:
-    from softnlp.plots.style import import_alone, save_figure
+    from softnlp.figures.style import import_alone, save_figure
 
     import_alone()
     return save_figure(figure(), path)
@@ -49,7 +49,7 @@ def _say_warnings(heard: list[Warning | str]) -> None:
     """Say each warning once, the characters without a font of all figures in one."""
     if not heard:
         return
-    from softnlp.plots.canvas import MissingGlyphs
+    from softnlp.figures.canvas import MissingGlyphs
 
     missing = "".join(w.characters for w in heard if isinstance(w, MissingGlyphs))
     others = [str(w) for w in heard if not isinstance(w, MissingGlyphs)]

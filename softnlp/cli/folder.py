@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from softnlp.errors import InputError
+from softnlp.base.errors import InputError
 
 
 def require_writable(folder: Path) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
+from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED
-from softnlp.errors import InputError
 
 
 def gui(
@@ -42,7 +42,7 @@ def gui(
     missing = [name for name in ("nicegui", "plotly", "tomlkit") if find_spec(name) is None]
     if missing:
         raise InputError(f"the app needs {', '.join(missing)}: pip install 'softnlp[gui]'")
-    from softnlp.plots.style import import_alone
+    from softnlp.figures.style import import_alone
 
     import_alone()
     from softnlp.app.server import serve

@@ -8,15 +8,15 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say, say_rows
 from softnlp.cli.figures import draw
-from softnlp.errors import InputError
-from softnlp.gravity import gravity_lines
+from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from softnlp.scenario import Scenario
+    from softnlp.scenario.read import Scenario
     from softnlp.studies.identified import Identified
     from softnlp.studies.identify_task import TensileTask
     from softnlp.studies.tensile import TensileFit
@@ -43,7 +43,7 @@ def identify(scenario: Path, /, *, out: Path | None = None, json: bool = False) 
     json
         Print one JSON document and nothing else; no files are written unless --out is given.
     """
-    from softnlp.scenario import load_scenario
+    from softnlp.scenario.read import load_scenario
 
     asked = load_scenario(scenario)
     if asked.study != "identify":
@@ -72,7 +72,7 @@ def _tensile(asked: Scenario, folder: Path | None, json: bool) -> int:
         tensile_document,
         tensile_table_text,
     )
-    from softnlp.runner_identify import run_tensile
+    from softnlp.scenario.run_identify import run_tensile
     from softnlp.studies.identify_task import TensileTask
 
     task = asked.task
@@ -80,7 +80,7 @@ def _tensile(asked: Scenario, folder: Path | None, json: bool) -> int:
     fit = run_tensile(asked)
     document = document_text(tensile_document(asked, task, fit))
     if folder is not None:
-        from softnlp.plots import tensile_figure
+        from softnlp.figures import tensile_figure
 
         texts = {
             "identified.json": document,
@@ -127,8 +127,8 @@ def _say_tensile(task: TensileTask, fit: TensileFit) -> None:
 
 
 def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
+    from softnlp.base.status import Status
     from softnlp.results.identify_document import document_text, identified_text, robot_document, robot_table_text
-    from softnlp.status import Status
     from softnlp.studies.identify_task import RobotTask
 
     task = asked.task
@@ -144,7 +144,7 @@ def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
         texts = {"identified.json": document, "table.csv": robot_table_text(task, found)}
         figure = None
         if solved:
-            from softnlp.plots import identified_figure
+            from softnlp.figures import identified_figure
 
             texts["identified.toml"] = identified_text(asked, found)
             figure = partial(identified_figure, found, asked.title)
@@ -160,7 +160,7 @@ def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
 
 def _identified(asked: Scenario) -> Identified:
     """Identify with a progress bar, which counts evaluations up to a guess of how many there will be."""
-    from softnlp.runner_identify import run_robots
+    from softnlp.scenario.run_identify import run_robots
 
     with progress(_GUESS, asked.title) as (advance, stop_asked):
 
@@ -225,8 +225,8 @@ def _sigma_text(found: Identified, key: str) -> str:
 
 def _write(folder: Path, asked: Scenario, texts: Mapping[str, str], figure: Callable[[], Figure] | None) -> None:
     """Write the numbers, each file whole, after all of them are made, and then the figure."""
-    from softnlp.results.files import make_folder, write_whole
-    from softnlp.results.inputs import versions
+    from softnlp.base.files import make_folder, write_whole
+    from softnlp.model.inputs import versions
 
     contents: dict[str, Any] = {name: text.encode() for name, text in texts.items()}
     contents["versions.json"] = (json_module.dumps(versions(), indent=2) + "\n").encode()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from softnlp.errors import InputError
+from softnlp.base.errors import InputError
 
 
 def inverse(scenario: Path, /, *, out: Path | None = None, json: bool = False) -> int:
@@ -24,7 +24,7 @@ def inverse(scenario: Path, /, *, out: Path | None = None, json: bool = False) -
         Print one JSON document and nothing else; no files are written unless --out is given.
     """
     from softnlp.cli.run import run
-    from softnlp.scenario import load_scenario
+    from softnlp.scenario.read import load_scenario
 
     asked = load_scenario(scenario)
     if asked.study != "inverse":

@@ -9,7 +9,7 @@ from softnlp.cli.console import say_rows
 
 def robots() -> None:
     """List the robots of the library with their dimensions."""
-    from softnlp.robot import DIMENSIONS, ROBOTS
+    from softnlp.model.robot import DIMENSIONS, ROBOTS
 
     rows = []
     for robot in ROBOTS.values():
@@ -26,7 +26,7 @@ def materials(*, file: Path | None = None) -> None:
     file
         A materials file of your own; the shipped one by default.
     """
-    from softnlp.materials import load_materials
+    from softnlp.model.materials import load_materials
 
     rows = []
     for entry in load_materials(file).values():

@@ -6,16 +6,16 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say
 from softnlp.cli.folder import require_writable
-from softnlp.errors import InputError
 
 if TYPE_CHECKING:
-    from softnlp.mesh import Solid
+    from softnlp.figures.mesh import Solid
+    from softnlp.model.robot import Robot
     from softnlp.results import RunView
-    from softnlp.robot import Robot
-    from softnlp.scenario import Scenario
-    from softnlp.studies.step import Step
+    from softnlp.scenario.read import Scenario
+    from softnlp.statics.step import Step
 
 _WITH_STEPS = ("forward", "blocked-force", "inverse")
 
@@ -56,8 +56,8 @@ def mesh(
     out
         STL or GLB file; NAME.stl by default.
     """
-    from softnlp.mesh import FACETS, HOLES, body_solid, format_of, mould_body, require
-    from softnlp.mesh import cores as core_solids
+    from softnlp.figures.mesh import FACETS, HOLES, body_solid, format_of, mould_body, require
+    from softnlp.figures.mesh import cores as core_solids
 
     target = out or Path(f"{_stem(scenario)}.stl")
     format_of(target)
@@ -91,8 +91,8 @@ def mesh(
 
 def _write(solid: Solid, inside: tuple[Solid, ...], robot: Robot, target: Path) -> None:
     """Write the files and say what is in them."""
-    from softnlp.mesh import format_of, write_solids
-    from softnlp.results.files import make_folder
+    from softnlp.base.files import make_folder
+    from softnlp.figures.mesh import format_of, write_solids
 
     make_folder(target.parent)
     for warning in solid.warnings:
@@ -121,7 +121,7 @@ def _is_run(path: Path) -> bool:
 
 def _robot(path: Path) -> Robot:
     from softnlp.results import load_run
-    from softnlp.scenario import load_scenario
+    from softnlp.scenario.read import load_scenario
 
     return load_run(path).robot if _is_run(path) else load_scenario(path).robot
 
@@ -129,12 +129,12 @@ def _robot(path: Path) -> Robot:
 def _view_of(path: Path, step: int | None) -> tuple[RunView | None, int]:
     """Return the view up to a step, and its number; None where Ctrl-C came before it."""
     from softnlp.results import load_run, view_of_run
-    from softnlp.runner import partial_run
+    from softnlp.scenario.run import partial_run
 
     if _is_run(path):
         view = load_run(path)
         return view, _number(step, len(view.bodies))
-    from softnlp.scenario import load_scenario
+    from softnlp.scenario.read import load_scenario
 
     asked = load_scenario(path)
     if asked.study not in _WITH_STEPS:
@@ -158,7 +158,7 @@ def _number(step: int | None, count: int) -> int:
 
 def _solved(asked: Scenario, number: int) -> list[Step]:
     """Solve the steps up to a number, each from the last, with a progress bar."""
-    from softnlp.runner import solve_steps
+    from softnlp.scenario.run import solve_steps
 
     steps: list[Step] = []
     with progress(number, asked.title) as (advance, stop_asked):

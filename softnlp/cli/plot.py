@@ -25,10 +25,10 @@ def plot_section(robot: str, /, *, stretch: float = 1.0, out: Path | None = None
     out
         PNG, PDF or SVG file; section-ROBOT.png by default.
     """
-    from softnlp.plots import section_figure
-    from softnlp.robot import robot as library_robot
-    from softnlp.robot import violations
-    from softnlp.scenario import robot_of_scenario
+    from softnlp.figures import section_figure
+    from softnlp.model.robot import robot as library_robot
+    from softnlp.model.robot import violations
+    from softnlp.scenario.read import robot_of_scenario
 
     if robot.endswith(".toml"):
         made, broken = robot_of_scenario(robot)
@@ -61,8 +61,8 @@ def plot_material(
     out
         PNG, PDF or SVG file.
     """
-    from softnlp.materials import load_materials, material
-    from softnlp.plots import material_figure
+    from softnlp.figures import material_figure
+    from softnlp.model.materials import load_materials, material
 
     entries = load_materials(file)
     chosen = []
@@ -82,7 +82,7 @@ def plot_run(results: Path, /, *, out: Path | None = None) -> int:
     out
         PNG, PDF or SVG file; figure.png beside the results by default.
     """
-    from softnlp.plots import run_figure
+    from softnlp.figures import run_figure
     from softnlp.results import load_run
 
     folder = results if results.is_dir() else results.parent

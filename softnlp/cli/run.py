@@ -7,15 +7,15 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say
 from softnlp.cli.figures import draw
 from softnlp.cli.folder import require_writable
-from softnlp.contact_settings import ContactTask
-from softnlp.errors import InputError
+from softnlp.model.contact_settings import ContactTask
 
 if TYPE_CHECKING:
-    from softnlp.scenario import Scenario
-    from softnlp.studies.step import Run, Step
+    from softnlp.scenario.read import Scenario
+    from softnlp.statics.step import Run, Step
 
 _COMMANDS: Mapping[str, str] = {
     "workspace": "sweep",
@@ -51,7 +51,7 @@ def run(scenario: Path, /, *, out: Path | None = None, json: bool = False, branc
         equilibrium. The result stays the one followed from zero pressure.
     """
     from softnlp.results import json_text
-    from softnlp.scenario import load_scenario
+    from softnlp.scenario.read import load_scenario
 
     asked = load_scenario(scenario)
     _require_branches(asked, branches)
@@ -96,7 +96,7 @@ def _require_branches(asked: Scenario, branches: int) -> None:
 
 def _solve(asked: Scenario, branches: int) -> tuple[Run, bool]:
     """Run a scenario with a progress bar; return the steps that were done and whether it was stopped before the end."""
-    from softnlp.runner import partial_run, solve_steps
+    from softnlp.scenario.run import partial_run, solve_steps
 
     total = asked.step_count
     steps: list[Step] = []
@@ -116,7 +116,7 @@ def _solve(asked: Scenario, branches: int) -> tuple[Run, bool]:
 
 def _write(done: Run, folder: Path, asked: Scenario) -> None:
     """Write results and figure."""
-    from softnlp.plots import run_figure
+    from softnlp.figures import run_figure
     from softnlp.results import save, view_of_run
 
     save(done, folder, scenario_text=asked.text)

@@ -7,10 +7,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
 from softnlp.cli.figures import draw
-from softnlp.errors import InputError
-from softnlp.gravity import gravity_lines
+from softnlp.model.gravity import gravity_lines
 
 
 def sensitivity(
@@ -47,7 +47,7 @@ def sensitivity(
         Print one JSON document and nothing else; no files are written unless --out is given.
     """
     from softnlp.results.sensitivity import document_text, sensitivity_document, table_rows
-    from softnlp.scenario import load_scenario
+    from softnlp.scenario.read import load_scenario
     from softnlp.studies.report import named_tolerances, sensitivity_report
 
     asked = load_scenario(scenario)
@@ -78,8 +78,8 @@ def sensitivity(
     document = sensitivity_document(report, asked.title, chosen)
     folder = out if out is not None or json else Path("results") / scenario.stem
     if folder is not None:
-        from softnlp.plots.sensitivity import sensitivity_figure
-        from softnlp.results.files import make_folder, write_whole
+        from softnlp.base.files import make_folder, write_whole
+        from softnlp.figures.sensitivity import sensitivity_figure
 
         kept = make_folder(folder)
         write_whole(kept / "sensitivity.json", document_text(document).encode())

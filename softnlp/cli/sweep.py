@@ -12,15 +12,15 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, interrupt_asked, say
-from softnlp.errors import InputError
-from softnlp.gravity import gravity_lines
+from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from softnlp.scenario import Scenario
-    from softnlp.workspace.run import SweepProgress, SweepSummary
+    from softnlp.scenario.read import Scenario
+    from softnlp.sweep.run import SweepProgress, SweepSummary
 
 
 def sweep(
@@ -55,7 +55,7 @@ def sweep(
     csv
         Write workspace.csv as well.
     """
-    from softnlp.scenario import load_scenario
+    from softnlp.scenario.read import load_scenario
 
     if workers is not None and workers < 1:
         raise InputError(f"expected a number of at least 1, got {workers}", key="--workers")
@@ -91,8 +91,8 @@ def _run(
     csv: bool = False,
 ) -> SweepSummary:
     """Run a sweep with a progress bar, and write what goes beside its result."""
-    from softnlp.runner_workspace import run_sweep
-    from softnlp.workspace.pool import cluster_executor
+    from softnlp.scenario.run_workspace import run_sweep
+    from softnlp.sweep.pool import cluster_executor
 
     with ExitStack() as stack:
         executor: Executor | None = None if cluster is None else stack.enter_context(cluster_executor(cluster))
@@ -115,8 +115,8 @@ def _run(
 
 def _write_beside(asked: Scenario, folder: Path, *, replace: bool) -> None:
     """Write what was asked and what computed it beside a finished result; without `replace` only what is missing."""
+    from softnlp.model.inputs import versions
     from softnlp.results import write_whole
-    from softnlp.results.inputs import versions
 
     contents = {
         "scenario.toml": asked.text.encode(),
@@ -158,7 +158,7 @@ def _status(summary: SweepSummary) -> int:
 def _document(asked: Scenario, folder: Path, summary: SweepSummary, *, kept: bool) -> dict[str, Any]:
     """Return the JSON document of a sweep."""
     from softnlp import __version__
-    from softnlp.workspace.run import WORKSPACE_FILE
+    from softnlp.sweep.run import WORKSPACE_FILE
 
     return {
         "softnlp": __version__,

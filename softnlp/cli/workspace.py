@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softnlp.base.errors import InputError
+from softnlp.base.units import BAR, DEGREE, MILLIMETRE
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, progress, say
 from softnlp.cli.figures import draw
-from softnlp.errors import InputError
-from softnlp.gravity import gravity_lines
-from softnlp.units import BAR, DEGREE, MILLIMETRE
+from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from softnlp.workspace.boundary import Boundary
-    from softnlp.workspace.comparison import Comparison
-    from softnlp.workspace.measured import Measured
-    from softnlp.workspace.read import Workspace
-    from softnlp.workspace.summary import Summary
+    from softnlp.sweep.boundary import Boundary
+    from softnlp.sweep.comparison import Comparison
+    from softnlp.sweep.measured import Measured
+    from softnlp.sweep.read import Workspace
+    from softnlp.sweep.summary import Summary
 
 CM = 1e-2
 _FIGURES = (".png", ".pdf", ".svg")
@@ -65,12 +65,12 @@ def workspace(
     csv
         Write all poses to this CSV file as well.
     """
-    from softnlp.plots.comparison import comparison_figure
-    from softnlp.plots.dexterity import dexterity_figure
-    from softnlp.plots.workspace import workspace_figure
-    from softnlp.workspace.export import export_csv
-    from softnlp.workspace.read import load_workspace, read_column
-    from softnlp.workspace.summary import summarise
+    from softnlp.figures.comparison import comparison_figure
+    from softnlp.figures.dexterity import dexterity_figure
+    from softnlp.figures.workspace import workspace_figure
+    from softnlp.sweep.export import export_csv
+    from softnlp.sweep.read import load_workspace, read_column
+    from softnlp.sweep.summary import summarise
 
     for key, value in (("--voxel-mm", voxel_mm), ("--radius-mm", radius_mm)):
         if value is not None and not (np.isfinite(value) and value > 0):
@@ -111,7 +111,7 @@ class _Places:
 
 def _places(found: Workspace, out: Path | None) -> tuple[Path, _Places]:
     """Return the file of the figure, and what names the others; a folder is made where it is missing."""
-    from softnlp.results.files import make_folder
+    from softnlp.base.files import make_folder
 
     if out is not None and out.suffix.lower() in _FIGURES and not out.is_dir():
         return out, _Places(out, True)
@@ -122,9 +122,9 @@ def _places(found: Workspace, out: Path | None) -> tuple[Path, _Places]:
 
 def _compared(found: Workspace, against: Path, within_bar: float) -> tuple[Comparison, Measured | None]:
     """Compare with whatever is there."""
-    from softnlp.workspace.comparison import compare_measured, compare_workspaces
-    from softnlp.workspace.measured import load_measured
-    from softnlp.workspace.read import load_workspace
+    from softnlp.sweep.comparison import compare_measured, compare_workspaces
+    from softnlp.sweep.measured import load_measured
+    from softnlp.sweep.read import load_workspace
 
     if not (np.isfinite(within_bar) and within_bar >= 0):
         raise InputError(f"expected a number of at least 0, got {within_bar:g}", key="--within-bar")
@@ -144,8 +144,8 @@ def _compared(found: Workspace, against: Path, within_bar: float) -> tuple[Compa
 
 def _write_comparison(compared: Comparison, measured: Measured | None, table: Path) -> Path:
     """Print and write a comparison; return the file."""
-    from softnlp.results.files import placed_whole
-    from softnlp.workspace.comparison import comparison_rows
+    from softnlp.base.files import placed_whole
+    from softnlp.sweep.comparison import comparison_rows
 
     notes = [f"warning: {note}" for note in (measured.notes if measured else ())]
     say("\n".join(["", *_comparison_lines(compared), *notes]))
@@ -211,7 +211,7 @@ def _summary_rows(found: Workspace, s: Summary) -> Iterator[tuple[str, str]]:
 
 def _body(body: Boundary) -> str:
     """Return the measures of a hull or a boundary, or what it is instead."""
-    from softnlp.workspace.boundary import Extent
+    from softnlp.sweep.boundary import Extent
 
     radius = "" if body.radius is None else f", radius {body.radius / MILLIMETRE:.2f} mm, of {body.points:,} poses"
     radius += f", {body.outside:,} outside" if body.outside else ""
@@ -226,7 +226,7 @@ def _body(body: Boundary) -> str:
 
 def _comparison_lines(compared: Comparison) -> list[str]:
     """Return the table of the distances, by group and in all, and what was left out."""
-    from softnlp.evaluation.statistics import groups, statistics
+    from softnlp.base.statistics import groups, statistics
 
     every = np.ones(len(compared.row), bool)
     table = [["pressurised", "pairs", "mean", "median", "RMSE", "max [mm]", "mean [%]"]]

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from softnlp.errors import InputError
-from softnlp.evaluation.comparison import Comparison
-from softnlp.evaluation.observed import NUMBERS, OBSERVABLES, differences
-from softnlp.evaluation.statistics import Statistics
-from softnlp.reading import shown
+from softnlp.base.errors import InputError
+from softnlp.base.reading import shown
+from softnlp.base.statistics import Statistics
+from softnlp.model.inputs import coefficients_table, contact_table, loads_table, package_version, pressure_bar, tidy
 from softnlp.results.identify_document import number
-from softnlp.results.inputs import coefficients_table, contact_table, loads_table, package_version, pressure_bar, tidy
-from softnlp.runner_compare import CompareTask
+from softnlp.scenario.compare import CompareTask
+from softnlp.studies.comparison import Comparison
+from softnlp.studies.observed import NUMBERS, OBSERVABLES, differences
 
 STATISTICS = ("count", "rmse", "mape_percent", "mean", "median", "max", "bias", "left_out_of_mape", "unit")
 _VARIANT = ("law", "coefficients", "conventions", "closure")

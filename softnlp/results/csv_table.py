@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from softnlp.results.fields import BLOCKED_FORCE, Field, closure_of, document_fields, left_by_weights, solved_pose
-from softnlp.results.files import write_whole
-from softnlp.results.inputs import pressure_bar, tidy
+from softnlp.base.files import write_whole
+from softnlp.model.inputs import pressure_bar, tidy
+from softnlp.model.robot import Robot
 from softnlp.results.targets import INVERSE, TARGET_FIELDS, TargetField, target_values
-from softnlp.robot import Robot
-from softnlp.studies.step import Run, Step
+from softnlp.statics.step import Run, Step
+from softnlp.studies.fields import BLOCKED_FORCE, Field, closure_of, document_fields, left_by_weights, solved_pose
 
 
 def write_table(run: Run, path: str | PathLike[str]) -> Path:

@@ -10,17 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.results.fields import (
-    BLOCKED_FORCE,
-    SELF_INTERSECTING,
-    STABLE,
-    Field,
-    closure_of,
-    dataset_fields,
-    left_by_weights,
-    solved_pose,
-)
-from softnlp.results.inputs import (
+from softnlp.base.netcdf import dataset_bytes, said
+from softnlp.model.inputs import (
     coefficients_table,
     contact_table,
     conventions_table,
@@ -30,10 +21,19 @@ from softnlp.results.inputs import (
     robot_table,
     versions,
 )
-from softnlp.results.netcdf import dataset_bytes, said
+from softnlp.nlp.solver import EquationResidual
 from softnlp.results.targets import INVERSE, TARGET_FIELDS, target_values
-from softnlp.solver import EquationResidual
-from softnlp.studies.step import SELF_INTERSECTING_FLAGS, STABLE_FLAGS, Run, Step, stable_flag
+from softnlp.statics.step import SELF_INTERSECTING_FLAGS, STABLE_FLAGS, Run, Step, stable_flag
+from softnlp.studies.fields import (
+    BLOCKED_FORCE,
+    SELF_INTERSECTING,
+    STABLE,
+    Field,
+    closure_of,
+    dataset_fields,
+    left_by_weights,
+    solved_pose,
+)
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,10 +9,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from softnlp.gravity import gravity_lines
-from softnlp.materials import Material
-from softnlp.results.document import compact_json
-from softnlp.results.inputs import (
+from softnlp.base.units import BAR, DEGREE, MILLIMETRE
+from softnlp.model.gravity import gravity_lines
+from softnlp.model.inputs import (
     coefficients_table,
     contact_table,
     loads_table,
@@ -21,12 +20,13 @@ from softnlp.results.inputs import (
     robot_table,
     tidy,
 )
-from softnlp.robot import DIMENSIONS, Robot
+from softnlp.model.materials import Material
+from softnlp.model.robot import DIMENSIONS, Robot
+from softnlp.results.document import compact_json
 from softnlp.studies.design import Design
 from softnlp.studies.design_candidate import Candidate
 from softnlp.studies.design_optimise import Active
 from softnlp.studies.design_task import OUTPUTS, Output, PressureSteps, Range
-from softnlp.units import BAR, DEGREE, MILLIMETRE
 
 if TYPE_CHECKING:
     from rich.console import Group

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from softnlp.results.fields import BLOCKED_FORCE, closure_of, document_fields, left_by_weights, solved_pose
-from softnlp.results.inputs import (
+from softnlp.model.inputs import (
     coefficients_table,
     contact_table,
     loads_table,
@@ -20,9 +19,10 @@ from softnlp.results.inputs import (
     robot_table,
     tidy,
 )
+from softnlp.nlp.solver import EquationResidual
 from softnlp.results.targets import target_values
-from softnlp.solver import EquationResidual
-from softnlp.studies.step import Run, Step
+from softnlp.statics.step import Run, Step
+from softnlp.studies.fields import BLOCKED_FORCE, closure_of, document_fields, left_by_weights, solved_pose
 
 
 def to_json(run: Run) -> dict[str, Any]:

@@ -9,14 +9,14 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from softnlp.errors import InputError
+from softnlp.base.errors import InputError
+from softnlp.base.files import make_folder, write_whole
+from softnlp.model.inputs import versions
 from softnlp.results.csv_table import table_text
 from softnlp.results.dataset import netcdf_bytes
 from softnlp.results.document import json_text
-from softnlp.results.files import make_folder, write_whole
-from softnlp.results.inputs import versions
 from softnlp.results.view import RunView, view_of_dataset, view_of_run
-from softnlp.studies.step import Run
+from softnlp.statics.step import Run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,7 +42,7 @@ def save(
     scenario_text
         What was asked, kept as scenario.toml.
     figure
-        Draws the run, `softnlp.plots.run_figure` for instance; kept as figure.png. Drawn last, so that an error of
+        Draws the run, `softnlp.figures.run_figure` for instance; kept as figure.png. Drawn last, so that an error of
         drawing leaves the numbers.
 
     Returns

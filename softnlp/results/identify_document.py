@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softnlp.evaluation.statistics import Statistics
-from softnlp.materials import Material
-from softnlp.results.inputs import loads_table, package_version, tidy
+from softnlp.base.statistics import Statistics
+from softnlp.base.units import BAR, DEGREE, MEGAPASCAL, MILLIMETRE
+from softnlp.model.inputs import loads_table, package_version, tidy
+from softnlp.model.materials import Material
 from softnlp.studies.free_constants import COEFFICIENTS, file_name
 from softnlp.studies.measurements import OBSERVABLES, column_slice
-from softnlp.units import BAR, DEGREE, MEGAPASCAL, MILLIMETRE
 
 if TYPE_CHECKING:
-    from softnlp.scenario import Scenario
+    from softnlp.scenario.read import Scenario
     from softnlp.studies.identified import Identified
     from softnlp.studies.identify_task import RobotTask, TensileTask
     from softnlp.studies.plausibility import Check

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.results.inputs import loads_table, package_version, pressure_bar
+from softnlp.base.units import BAR, DEGREE, MILLIMETRE, NEWTON_MILLIMETRE
+from softnlp.model.inputs import loads_table, package_version, pressure_bar
 from softnlp.studies.derivatives import entries_of
 from softnlp.studies.ellipsoids import Ellipsoid
 from softnlp.studies.report import SensitivityReport
-from softnlp.units import BAR, DEGREE, MILLIMETRE, NEWTON_MILLIMETRE
 
 Array = NDArray[np.float64]
 

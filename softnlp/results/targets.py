@@ -9,8 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from softnlp.studies.step import Aimed, Run, Step
-from softnlp.units import DEGREE, MILLIMETRE
+from softnlp.base.units import DEGREE, MILLIMETRE
+from softnlp.statics.step import Aimed, Run, Step
 
 INVERSE = "inverse"
 

@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from softnlp.gravity import gravity_lines
-from softnlp.results.fields import BLOCKED_FORCE, solved_pose
+from softnlp.base.units import BAR, DEGREE, MILLIMETRE
+from softnlp.model.gravity import gravity_lines
 from softnlp.results.targets import INVERSE
-from softnlp.studies.step import Run, Step
-from softnlp.units import BAR, DEGREE, MILLIMETRE
+from softnlp.statics.step import Run, Step
+from softnlp.studies.fields import BLOCKED_FORCE, solved_pose
 
 if TYPE_CHECKING:
     from rich.console import Group

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.results.fields import BLOCKED_FORCE, solved_pose
-from softnlp.results.inputs import loads_of_table, robot_of_table
+from softnlp.base.status import Status
+from softnlp.base.units import BAR, DEGREE, MILLIMETRE
+from softnlp.model.inputs import loads_of_table, robot_of_table
+from softnlp.model.robot import Robot
+from softnlp.model.rod import Loads
 from softnlp.results.targets import INVERSE
-from softnlp.robot import Robot
-from softnlp.rod import Loads
-from softnlp.status import Status
-from softnlp.studies.step import Contact, Run, SectionRadii, stable_flag
-from softnlp.units import BAR, DEGREE, MILLIMETRE
+from softnlp.statics.step import Contact, Run, SectionRadii, stable_flag
+from softnlp.studies.fields import BLOCKED_FORCE, solved_pose
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,11 +8,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.studies.bounded import Limits, Measured
+from softnlp.base.units import BAR
+from softnlp.nlp.bounded import Limits, Measured
+from softnlp.statics.step import Aimed, Pose
 from softnlp.studies.inverse_task import InverseTask, Target
-from softnlp.studies.step import Aimed, Pose
 from softnlp.studies.tip_map import TipMap, TipPoint
-from softnlp.units import BAR
 
 Array = NDArray[np.float64]
 

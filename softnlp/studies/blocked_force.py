@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.contact_settings import Closure, ClosureWeights, ContactSettings
-from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
-from softnlp.errors import InputError
-from softnlp.materials import Material
-from softnlp.numerics import Numerics
-from softnlp.quantities import Model
-from softnlp.robot import LOWERABLE_RULES, Robot, check
-from softnlp.rod import Loads
-from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.blocked_grid import Blocked
+from softnlp.base.errors import InputError
+from softnlp.model.contact_settings import Closure, ClosureWeights, ContactSettings
+from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.model.materials import Material
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.robot import LOWERABLE_RULES, Robot, check
+from softnlp.model.rod import Loads
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.multistart import other_equilibria
+from softnlp.statics.step import Run, Step
+from softnlp.statics.wall import Wall, checked_contact, standing_wall
 from softnlp.studies.forward import checked_loads, pressure_table
-from softnlp.studies.multistart import other_equilibria
-from softnlp.studies.step import Run, Step
-from softnlp.studies.wall import Wall, checked_contact, standing_wall
 from softnlp.studies.weight_sensitivity import given_weights, sensitivities
 
 Array = NDArray[np.float64]

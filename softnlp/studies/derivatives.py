@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.errors import InputError, nearest
-from softnlp.implicit import ImplicitDerivatives
-from softnlp.problem import CompiledProblem, compile_problem
-from softnlp.quantity import Quantity
-from softnlp.solver import Engine, Solution
-from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.blocked_grid import Blocked
+from softnlp.base.errors import InputError, nearest
+from softnlp.base.quantity import Quantity
+from softnlp.nlp.implicit import ImplicitDerivatives
+from softnlp.nlp.problem import CompiledProblem, compile_problem
+from softnlp.nlp.solver import Engine, Solution
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.pose_grid import Solved
+from softnlp.statics.solver import PoseSolver
 from softnlp.studies.force_inversion import joint_cases
-from softnlp.studies.pose_grid import Solved
-from softnlp.studies.statics import PoseSolver
 
 Array = NDArray[np.float64]
 

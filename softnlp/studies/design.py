@@ -8,19 +8,19 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from typing import Any
 
-from softnlp.contact_settings import ContactSettings
-from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
-from softnlp.materials import Material
-from softnlp.numerics import Numerics
-from softnlp.processes import begin_worker, process_context
-from softnlp.quantities import Model
-from softnlp.robot import Robot
-from softnlp.rod import Loads
+from softnlp.base.processes import begin_worker, process_context
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.model.materials import Material
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.robot import Robot
+from softnlp.model.rod import Loads
+from softnlp.statics.wall import checked_contact
 from softnlp.studies.design_candidate import Candidate, Workshop, structure
 from softnlp.studies.design_evaluate import Evaluator
 from softnlp.studies.design_task import MOST_ENUMERATED, DesignTask, Setting, check_task, with_choices
 from softnlp.studies.forward import checked_loads
-from softnlp.studies.wall import checked_contact
 
 Progress = Callable[[int, Candidate], None]
 _CHUNK = 8  # candidates that a process is given at once; most of one structure, which is compiled once

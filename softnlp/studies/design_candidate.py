@@ -9,16 +9,16 @@ from typing import Any, Literal
 
 import numpy as np
 
-from softnlp.contact_settings import require_in_front
-from softnlp.errors import InputError
-from softnlp.materials import Material
-from softnlp.quantities import Model
-from softnlp.robot import Robot
-from softnlp.status import Status
+from softnlp.base.errors import InputError
+from softnlp.base.status import Status
+from softnlp.model.contact_settings import require_in_front
+from softnlp.model.materials import Material
+from softnlp.model.quantities import Model
+from softnlp.model.robot import Robot
+from softnlp.statics.step import Step
 from softnlp.studies.design_evaluate import Evaluation, Evaluator, broken_rules, missed, unmet
 from softnlp.studies.design_optimise import Active, Optimised, Optimiser
 from softnlp.studies.design_task import SIZES, DesignTask, PressureSteps, Range, Setting, with_choices
-from softnlp.studies.step import Step
 
 _FAILED = (Status.DIVERGED, Status.INACCURATE)
 _LEVELS = 32  # pressures at which a free pressure is looked at before it is optimised

@@ -10,21 +10,21 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.branch import stretch_on_branch
-from softnlp.errors import RobotError
-from softnlp.loadcase import RodFunctions
-from softnlp.quantities import Model
-from softnlp.robot import SELF_INTERSECTION, Robot, touching_stretch, violations
-from softnlp.rules import neighbours
-from softnlp.status import Status
-from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.blocked_grid import Blocked
+from softnlp.base.errors import RobotError
+from softnlp.base.status import Status
+from softnlp.model.quantities import Model
+from softnlp.model.robot import SELF_INTERSECTION, Robot, touching_stretch, violations
+from softnlp.model.rules import neighbours
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.branch import stretch_on_branch
+from softnlp.statics.loadcase import RodFunctions
+from softnlp.statics.pose_grid import Solved
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.step import Pose, Step
+from softnlp.statics.unloaded import unloaded_case
+from softnlp.statics.wall import Wall, standing_wall
 from softnlp.studies.design_task import OUTPUTS, DesignTask, Limits, Output, Setting
-from softnlp.studies.pose_grid import Solved
-from softnlp.studies.statics import PoseSolver
-from softnlp.studies.step import Pose, Step
-from softnlp.studies.wall import Wall, standing_wall
-from softnlp.unloaded import unloaded_case
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def free_outputs(case: Mapping[str, Any], length: Any) -> dict[str, Any]:
 
 
 def chamber_gaps(robot: Robot, stretch: Any) -> list[Any]:
-    """Return the gaps between neighbouring reinforced chambers at a stretch [m], as of `softnlp.rules.neighbours`.
+    """Return the gaps between neighbouring reinforced chambers at a stretch [m], as `softnlp.model.rules.neighbours`.
 
     The circle shrinks as lambda^-1/2 (S2), r_co stays.
     """

@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.loadcase import LoadCase
-from softnlp.optimality import OPTIMAL, kkt_error, not_optimal
-from softnlp.quantities import Model
-from softnlp.rod import STATE_SIZE
-from softnlp.solver import violation
+from softnlp.model.quantities import Model
+from softnlp.model.rod import STATE_SIZE
+from softnlp.nlp.optimality import OPTIMAL, kkt_error, not_optimal
+from softnlp.nlp.solver import violation
+from softnlp.statics.loadcase import LoadCase
+from softnlp.statics.pose import between_nodes, shape_function
+from softnlp.statics.pose_grid import next_size
+from softnlp.statics.wall import Situation
 from softnlp.studies.design_evaluate import Evaluation, Evaluator, broken_rules, unmet
 from softnlp.studies.design_problem import FOLD, FOLD_SCALE, OBJECTIVE_SCALE, PRESSURE, DesignProblem, design_problem
 from softnlp.studies.design_task import OUTPUTS, Range
-from softnlp.studies.pose import between_nodes, shape_function
-from softnlp.studies.pose_grid import next_size
-from softnlp.studies.wall import Situation
 
 Array = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ class Optimum:
     """Where the program ended from one start.
 
     x : of the program. values : the continuous choices, and "pressure", SI. objective : SI. violation : largest scaled
-    one, evaluated again. kkt : as of `softnlp.solver.Solution`. engine_status : IPOPT's own word, for information.
+    one, evaluated again. kkt : as of `softnlp.nlp.solver.Solution`. engine_status : IPOPT's own word, for information.
     """
 
     x: Array

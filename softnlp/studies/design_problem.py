@@ -11,19 +11,19 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.condensed import CondensedSolver
-from softnlp.loadcase import LoadCase, load_case
-from softnlp.optimality import Bounds, slopes
-from softnlp.problem import CompiledProblem, Constraint, compile_problem
-from softnlp.quantities import with_symbols
-from softnlp.quantity import quantity
-from softnlp.robot import SELF_INTERSECTION, Robot
-from softnlp.rules import rules
+from softnlp.base.quantity import quantity
+from softnlp.base.units import MILLIMETRE
+from softnlp.model.quantities import with_symbols
+from softnlp.model.robot import SELF_INTERSECTION, Robot
+from softnlp.model.rules import rules
+from softnlp.nlp.optimality import Bounds, slopes
+from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
+from softnlp.nlp.transcription import MultipleShooting
+from softnlp.statics.condensed import CondensedSolver
+from softnlp.statics.loadcase import LoadCase, load_case
+from softnlp.statics.unloaded import unloaded_case
 from softnlp.studies.design_evaluate import Evaluator, chamber_gaps, free_outputs, robot_outputs
 from softnlp.studies.design_task import OUTPUTS, DesignTask, Range
-from softnlp.transcription import MultipleShooting
-from softnlp.units import MILLIMETRE
-from softnlp.unloaded import unloaded_case
 
 Array = NDArray[np.float64]
 

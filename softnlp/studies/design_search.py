@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import isfinite
 from typing import Any
 
-from softnlp.errors import InputError
+from softnlp.base.errors import InputError
 from softnlp.studies.design_candidate import Candidate, Workshop
 
 _SEED = 7

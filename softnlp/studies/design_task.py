@@ -9,14 +9,14 @@ from math import inf, isfinite, prod
 from numbers import Integral
 from typing import Any, Literal
 
-from softnlp.contact_settings import ContactSettings
-from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
-from softnlp.errors import InputError, nearest
-from softnlp.materials import Material
-from softnlp.numerics import Numerics
-from softnlp.robot import ALLOWABLE, DIMENSIONS, MINIMUM_WALL, Robot, is_number
-from softnlp.rod import Loads
-from softnlp.units import BAR, DEGREE, MILLIMETRE
+from softnlp.base.errors import InputError, nearest
+from softnlp.base.units import BAR, DEGREE, MILLIMETRE
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.model.materials import Material
+from softnlp.model.numerics import Numerics
+from softnlp.model.robot import ALLOWABLE, DIMENSIONS, MINIMUM_WALL, Robot, is_number
+from softnlp.model.rod import Loads
 
 MOST_ENUMERATED = 5000  # combinations above which a search takes the place of enumeration
 COUNTS = tuple(d.field for d in DIMENSIONS if d.scale is None)
@@ -180,8 +180,8 @@ class DesignTask:
     allow
         Rules of manufacture that may be broken; "self_intersection" for shapes that pass through themselves.
     minimum_wall
-        delta_s, the least wall of Eq. (1) and, see `softnlp.rules.rules`, of the outer and of the inner wall each,
-        unless `requirements` has a least one of its own [m].
+        delta_s, the least wall of Eq. (1) and, see `softnlp.model.rules.rules`, of the outer and of the inner wall
+        each, unless `requirements` has a least one of its own [m].
     starts
         First guesses of each optimisation; None is 4, and 2 where one number alone is free.
     trials

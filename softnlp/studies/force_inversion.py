@@ -8,26 +8,26 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.contact_settings import ContactSettings
-from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
-from softnlp.errors import InputError
-from softnlp.loadcase import LoadCase, load_case
-from softnlp.materials import Material
-from softnlp.numerics import Numerics
-from softnlp.problem import CompiledProblem, Constraint, compile_problem
-from softnlp.quantities import Model
-from softnlp.quantity import Quantity, quantity
-from softnlp.robot import LOWERABLE_RULES, Robot, check
-from softnlp.rod import Loads
-from softnlp.solver import Engine
-from softnlp.status import Status
-from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.blocked_grid import Blocked
+from softnlp.base.errors import InputError
+from softnlp.base.quantity import Quantity, quantity
+from softnlp.base.status import Status
+from softnlp.base.units import BAR
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.model.materials import Material
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.robot import LOWERABLE_RULES, Robot, check
+from softnlp.model.rod import Loads
+from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
+from softnlp.nlp.solver import Engine
+from softnlp.nlp.transcription import method_named
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.loadcase import LoadCase, load_case
+from softnlp.statics.step import Step
+from softnlp.statics.wall import checked_contact, standing_wall
 from softnlp.studies.forward import checked_loads
-from softnlp.studies.step import Step
-from softnlp.studies.wall import checked_contact, standing_wall
-from softnlp.transcription import method_named
-from softnlp.units import BAR
 
 Array = NDArray[np.float64]
 

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
-from softnlp.errors import InputError
-from softnlp.materials import Material
-from softnlp.numerics import Numerics
-from softnlp.quantities import Model
-from softnlp.ranges import FORCE, GRAVITY, MOMENT, PRESSURE
-from softnlp.robot import LOWERABLE_RULES, Robot, check
-from softnlp.rod import Loads
-from softnlp.studies.statics import PoseSolver
-from softnlp.studies.step import Run, Step
+from softnlp.base.errors import InputError
+from softnlp.base.ranges import FORCE, GRAVITY, MOMENT, PRESSURE
+from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.model.materials import Material
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.robot import LOWERABLE_RULES, Robot, check
+from softnlp.model.rod import Loads
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.step import Run, Step
 
 
 def forward(

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.conventions import Coefficients
-from softnlp.errors import InputError, nearest
-from softnlp.materials import Material
+from softnlp.base.errors import InputError, nearest
+from softnlp.model.conventions import Coefficients
+from softnlp.model.materials import Material
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Coefficient:
-    """A coefficient that may be freed. quantity : its name in `softnlp.quantities`. field : of `Coefficients`."""
+    """A coefficient that may be freed. quantity : its name in `softnlp.model.quantities`. field : of `Coefficients`."""
 
     quantity: str
     field: str
@@ -44,7 +44,7 @@ COEFFICIENTS: Mapping[str, Coefficient] = MappingProxyType(
 class FreeConstants:
     """Constants to identify, in order. start, lower, upper, scale : SI, one each; scale is a typical size.
 
-    names : as asked. quantities : their names in `softnlp.quantities`.
+    names : as asked. quantities : their names in `softnlp.model.quantities`.
     """
 
     names: tuple[str, ...]

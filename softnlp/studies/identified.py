@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.conventions import Coefficients
-from softnlp.evaluation.statistics import Statistics, statistics
-from softnlp.materials import Material
-from softnlp.status import Status
+from softnlp.base.statistics import Statistics, statistics
+from softnlp.base.status import Status
+from softnlp.model.conventions import Coefficients
+from softnlp.model.materials import Material
 from softnlp.studies.fit_statistics import Uncertainty, constant_note, determined
 from softnlp.studies.free_constants import FreeConstants
 from softnlp.studies.measurements import OBSERVABLES, Data, column_slice

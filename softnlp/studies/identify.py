@@ -14,16 +14,17 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.body import Fit
-from softnlp.contact_settings import ContactSettings
-from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
-from softnlp.errors import InputError, MaterialError
-from softnlp.materials import Material
-from softnlp.numerics import Numerics
-from softnlp.optimality import OPTIMAL, misfit_slope, not_optimal
-from softnlp.quantities import Model
-from softnlp.rod import Loads
-from softnlp.status import Status
+from softnlp.base.errors import InputError, MaterialError
+from softnlp.base.status import Status
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.model.materials import Material
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.rod import Loads
+from softnlp.nlp.optimality import OPTIMAL, misfit_slope, not_optimal
+from softnlp.statics.body import Fit
+from softnlp.statics.wall import checked_contact
 from softnlp.studies.fit_statistics import Uncertainty, open_constants, uncertainty
 from softnlp.studies.forward import checked_loads
 from softnlp.studies.free_constants import FreeConstants, file_name, free_constants
@@ -38,7 +39,6 @@ from softnlp.studies.measurements import (
 from softnlp.studies.predicted_force import BlockedForces
 from softnlp.studies.predicted_pose import ArcPoses, Failure, FreePoses, LoadedPoses, Prediction
 from softnlp.studies.trial import TrialBlocked, TrialPoses
-from softnlp.studies.wall import checked_contact
 
 Array = NDArray[np.float64]
 

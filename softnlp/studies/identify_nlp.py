@@ -13,28 +13,28 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.contact_settings import ContactSettings
-from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
-from softnlp.errors import InputError
-from softnlp.loadcase import LoadCase, load_case, rod_functions
-from softnlp.materials import Material
-from softnlp.numerics import Numerics
-from softnlp.problem import CompiledProblem, compile_problem
-from softnlp.quantities import Model
-from softnlp.quantity import Quantity
-from softnlp.rod import Loads
-from softnlp.solver import Engine
-from softnlp.status import Status
-from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.blocked_grid import Blocked
+from softnlp.base.errors import InputError
+from softnlp.base.quantity import Quantity
+from softnlp.base.status import Status
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.model.materials import Material
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.rod import Loads
+from softnlp.model.tip import tip_conditions
+from softnlp.nlp.problem import CompiledProblem, compile_problem
+from softnlp.nlp.solver import Engine
+from softnlp.nlp.transcription import method_named
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.loadcase import LoadCase, load_case, rod_functions
+from softnlp.statics.pose_grid import Solved
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.wall import checked_contact, standing_wall
 from softnlp.studies.forward import checked_loads
 from softnlp.studies.free_constants import FreeConstants, free_constants
 from softnlp.studies.measurements import COLUMNS, POSE_COLUMNS, RELATIVE_NOISE, Data, Measurements, checked_measurements
-from softnlp.studies.pose_grid import Solved
-from softnlp.studies.statics import PoseSolver
-from softnlp.studies.wall import checked_contact, standing_wall
-from softnlp.tip import tip_conditions
-from softnlp.transcription import method_named
 
 Array = NDArray[np.float64]
 

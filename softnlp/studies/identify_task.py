@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.laws import Law
-from softnlp.materials import Material
+from softnlp.model.laws import Law
+from softnlp.model.materials import Material
 from softnlp.studies.measurements import Measurements
 from softnlp.studies.plausibility import Check
 

@@ -8,17 +8,17 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
-from softnlp.errors import InputError
-from softnlp.materials import Material
-from softnlp.numerics import Numerics
-from softnlp.quantities import Model
-from softnlp.robot import LOWERABLE_RULES, Robot, check
-from softnlp.rod import Loads
+from softnlp.base.errors import InputError
+from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.model.materials import Material
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.robot import LOWERABLE_RULES, Robot, check
+from softnlp.model.rod import Loads
+from softnlp.statics.step import Run, Step
 from softnlp.studies.forward import checked_loads
 from softnlp.studies.inverse_solver import InverseSolver, Reached
 from softnlp.studies.inverse_task import InverseTask, Target
-from softnlp.studies.step import Run, Step
 
 Array = NDArray[np.float64]
 

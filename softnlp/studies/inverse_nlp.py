@@ -12,16 +12,16 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.loadcase import load_case
-from softnlp.problem import CompiledProblem, Constraint, compile_problem
-from softnlp.quantity import quantity
-from softnlp.rod import Loads
-from softnlp.solver import Engine, Solution
+from softnlp.base.quantity import quantity
+from softnlp.base.units import BAR
+from softnlp.model.rod import Loads
+from softnlp.nlp.bounded import Limits
+from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
+from softnlp.nlp.solver import Engine, Solution
+from softnlp.nlp.transcription import method_named
+from softnlp.statics.loadcase import load_case
+from softnlp.statics.solver import PoseSolver
 from softnlp.studies.aiming import Aim
-from softnlp.studies.bounded import Limits
-from softnlp.studies.statics import PoseSolver
-from softnlp.transcription import method_named
-from softnlp.units import BAR
 
 Array = NDArray[np.float64]
 

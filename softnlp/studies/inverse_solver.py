@@ -16,23 +16,23 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.branch import stretch_on_branch
-from softnlp.numerics import Numerics
-from softnlp.optimality import OPTIMAL, not_optimal
-from softnlp.quantities import Model
-from softnlp.robot import SELF_INTERSECTION
-from softnlp.rod import Loads
-from softnlp.status import Status
+from softnlp.base.status import Status
+from softnlp.base.units import BAR, DEGREE, MILLIMETRE
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.robot import SELF_INTERSECTION
+from softnlp.model.rod import Loads
+from softnlp.nlp.bounded import Limits, Map, Measured, could_gain, least_norm, nearest
+from softnlp.nlp.optimality import OPTIMAL, not_optimal
+from softnlp.statics.branch import stretch_on_branch
+from softnlp.statics.pose_grid import Solved
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.step import Aimed, Step
 from softnlp.studies.aiming import Aim, Table, aim_of, spread, tabulated
-from softnlp.studies.bounded import Limits, Map, Measured, could_gain, least_norm, nearest
 from softnlp.studies.derivatives import PoseDerivatives
 from softnlp.studies.inverse_nlp import InverseProblem, inverse_problem, pressure_of
 from softnlp.studies.inverse_task import InverseTask, Target
-from softnlp.studies.pose_grid import Solved
-from softnlp.studies.statics import PoseSolver
-from softnlp.studies.step import Aimed, Step
 from softnlp.studies.tip_map import ArcMap, GridMap, TipMap, TipPoint
-from softnlp.units import BAR, DEGREE, MILLIMETRE
 
 Array = NDArray[np.float64]
 

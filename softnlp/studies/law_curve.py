@@ -14,8 +14,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.errors import InputError
-from softnlp.laws import LAWS, Law
+from softnlp.base.errors import InputError
+from softnlp.model.laws import LAWS, Law
 
 Array = NDArray[np.float64]
 

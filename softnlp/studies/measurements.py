@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.errors import InputError, nearest
-from softnlp.robot import LOWERABLE_RULES, Robot, check
+from softnlp.base.errors import InputError, nearest
+from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.studies.forward import pressure_table
 
 Array = NDArray[np.float64]

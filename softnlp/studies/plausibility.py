@@ -12,7 +12,7 @@ from math import inf, isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.units import MEGAPASCAL
+from softnlp.base.units import MEGAPASCAL
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]

@@ -13,12 +13,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.rod import Loads
-from softnlp.studies.blocked_grid import Blocked, BlockedGrid
-from softnlp.studies.implicit import SolutionDerivatives, unit_directions
+from softnlp.model.rod import Loads
+from softnlp.nlp.directions import SolutionDerivatives, unit_directions
+from softnlp.statics.blocked_grid import Blocked, BlockedGrid
+from softnlp.statics.wall import Wall, standing_wall
 from softnlp.studies.predicted_pose import Failure, Prediction
 from softnlp.studies.trial import TrialBlocked
-from softnlp.studies.wall import Wall, standing_wall
 
 Array = NDArray[np.float64]
 

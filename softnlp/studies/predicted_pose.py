@@ -14,14 +14,14 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp import rod
-from softnlp.branch import stretch_on_branch
-from softnlp.loadcase import unpack_section
-from softnlp.rod import Loads
-from softnlp.status import Status
-from softnlp.studies.implicit import SolutionDerivatives, unit_directions
-from softnlp.studies.pose_grid import Grid, Solved, pose_distance
-from softnlp.studies.statics import PoseSolver
+from softnlp.base.status import Status
+from softnlp.model import rod
+from softnlp.model.rod import Loads
+from softnlp.nlp.directions import SolutionDerivatives, unit_directions
+from softnlp.statics.branch import stretch_on_branch
+from softnlp.statics.loadcase import unpack_section
+from softnlp.statics.pose_grid import Grid, Solved, pose_distance
+from softnlp.statics.solver import PoseSolver
 from softnlp.studies.trial import TrialPoses
 
 Array = NDArray[np.float64]

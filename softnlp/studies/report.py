@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
-from softnlp.errors import InputError, nearest
-from softnlp.materials import Material
-from softnlp.numerics import Numerics
-from softnlp.quantities import Model, quantities
-from softnlp.robot import DIMENSIONS, Robot
-from softnlp.rod import Loads
+from softnlp.base.errors import InputError, nearest
+from softnlp.base.units import BAR, NEWTON_MILLIMETRE
+from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.model.materials import Material
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model, quantities
+from softnlp.model.robot import DIMENSIONS, Robot
+from softnlp.model.rod import Loads
+from softnlp.statics.step import Pose
 from softnlp.studies.ellipsoids import (
     Ellipsoid,
     Manipulability,
@@ -24,9 +26,7 @@ from softnlp.studies.ellipsoids import (
     stiffness_ellipsoid,
 )
 from softnlp.studies.sensitivity import Sensitivities, sensitivities
-from softnlp.studies.step import Pose
 from softnlp.studies.tolerances import ErrorBars, Sampled, error_bars, monte_carlo
-from softnlp.units import BAR, NEWTON_MILLIMETRE
 
 Array = NDArray[np.float64]
 

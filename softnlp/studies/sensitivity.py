@@ -9,16 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.contact_settings import ContactSettings
-from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
-from softnlp.errors import InputError, nearest
-from softnlp.materials import Material
-from softnlp.numerics import Numerics
-from softnlp.quantities import Model
-from softnlp.robot import LOWERABLE_RULES, Robot, check
-from softnlp.rod import Loads
-from softnlp.status import Status
-from softnlp.studies.blocked import BlockedSolver
+from softnlp.base.errors import InputError, nearest
+from softnlp.base.status import Status
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.model.materials import Material
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.robot import LOWERABLE_RULES, Robot, check
+from softnlp.model.rod import Loads
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.step import Step
+from softnlp.statics.wall import checked_contact, standing_wall
 from softnlp.studies.derivatives import (
     UNITS,
     LinearPoint,
@@ -31,9 +34,6 @@ from softnlp.studies.derivatives import (
     quantities_of,
 )
 from softnlp.studies.forward import checked_loads, pressure_table
-from softnlp.studies.statics import PoseSolver
-from softnlp.studies.step import Step
-from softnlp.studies.wall import checked_contact, standing_wall
 
 Array = NDArray[np.float64]
 
@@ -146,7 +146,7 @@ def sensitivities(
     by
         Any of pressure, tip_force, tip_moment, gravity, robot.DIMENSION, material.CONSTANT, material.density,
         stiffening.elongation, stiffening.bending, corrections.area, corrections.inertia, corrections.bore_fraction and,
-        with `contact`, contact.wall_point, contact.tip_cap, contact.chamber_reaction; see `softnlp.quantities`.
+        with `contact`, contact.wall_point, contact.tip_cap, contact.chamber_reaction; see `softnlp.model.quantities`.
     loads
         As `softnlp.forward`.
     contact

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.errors import InputError, MaterialError, nearest
-from softnlp.evaluation.statistics import Statistics, statistics
-from softnlp.laws import LAWS, Law
-from softnlp.materials import DENSITY, Material
+from softnlp.base.errors import InputError, MaterialError, nearest
+from softnlp.base.statistics import Statistics, statistics
+from softnlp.model.laws import LAWS, Law
+from softnlp.model.materials import DENSITY, Material
 from softnlp.studies.fit_statistics import constant_note, determined, open_constants, uncertainty
 from softnlp.studies.law_curve import LawCurve, first_guesses, nearest_constants
 from softnlp.studies.plausibility import Check, curve_checks, law_checks, messages

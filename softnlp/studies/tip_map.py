@@ -9,12 +9,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.branch import stretch_on_branch
-from softnlp.rod import STATE_SIZE, Loads
-from softnlp.solver import Solution
+from softnlp.model.rod import STATE_SIZE, Loads
+from softnlp.nlp.solver import Solution
+from softnlp.statics.branch import stretch_on_branch
+from softnlp.statics.pose_grid import Solved
+from softnlp.statics.solver import PoseSolver
 from softnlp.studies.derivatives import PoseDerivatives
-from softnlp.studies.pose_grid import Solved
-from softnlp.studies.statics import PoseSolver
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.errors import InputError, nearest
+from softnlp.base.errors import InputError, nearest
 from softnlp.studies.derivatives import UNITS, entries_of
 from softnlp.studies.sensitivity import Sensitivities
 

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.contact_settings import ContactSettings
-from softnlp.numerics import Numerics
-from softnlp.quantities import Model, quantities
-from softnlp.robot import Robot
-from softnlp.rod import Loads
-from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.implicit import SolutionDerivatives
-from softnlp.studies.statics import PoseSolver
-from softnlp.studies.wall import Situation
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model, quantities
+from softnlp.model.robot import Robot
+from softnlp.model.rod import Loads
+from softnlp.nlp.directions import SolutionDerivatives
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.wall import Situation
 
 Array = NDArray[np.float64]
 

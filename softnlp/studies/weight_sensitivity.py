@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from softnlp.contact_settings import ContactSettings
-from softnlp.conventions import REPRODUCTION, Coefficients, Conventions
-from softnlp.errors import InputError
-from softnlp.materials import Material
-from softnlp.numerics import Numerics
-from softnlp.quantities import Model
-from softnlp.robot import LOWERABLE_RULES, Robot, check
-from softnlp.rod import Loads
-from softnlp.studies.blocked import BlockedSolver
-from softnlp.studies.blocked_grid import Blocked
+from softnlp.base.errors import InputError
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.model.materials import Material
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.robot import LOWERABLE_RULES, Robot, check
+from softnlp.model.rod import Loads
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.step import Step, WeightSensitivity
+from softnlp.statics.wall import checked_contact, standing_wall
 from softnlp.studies.forward import checked_loads, pressure_table
-from softnlp.studies.step import Step, WeightSensitivity
-from softnlp.studies.wall import checked_contact, standing_wall
 
 UNITS: Mapping[str, str] = {"force": "1/N", "moment": "1/(N m)", "length": "1/m", "position": "1/m"}
 FACTOR = 1.1

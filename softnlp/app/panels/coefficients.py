@@ -8,7 +8,7 @@ from nicegui import ui
 
 from softnlp.app.fields import choice_field, number_field
 from softnlp.app.session import Session
-from softnlp.conventions import COEFFICIENT_SETS, CONVENTIONS
+from softnlp.model.conventions import COEFFICIENT_SETS, CONVENTIONS
 
 _FIELDS = (
     ("stiffening", "elongation", "k_e, axial stiffening, Eq. (10)", 0.05),

@@ -6,7 +6,7 @@ from nicegui import ui
 
 from softnlp.app.fields import choice_field, vector_field
 from softnlp.app.session import Session
-from softnlp.gravity import DIRECTIONS, gravity_named, gravity_words
+from softnlp.model.gravity import DIRECTIONS, gravity_named, gravity_words
 
 _WORDS = {
     "off": "off",

@@ -27,9 +27,9 @@ from softnlp.app.redraw import Redraw
 from softnlp.app.session import Session
 from softnlp.app.stretch import PoseStretch
 from softnlp.app.theme import darkness, on_dark
-from softnlp.formula import MAX_LENGTH
-from softnlp.laws import LAWS
-from softnlp.materials import DENSITY, FITTED_STRETCH, MaterialEntry
+from softnlp.model.formula import MAX_LENGTH
+from softnlp.model.laws import LAWS
+from softnlp.model.materials import DENSITY, FITTED_STRETCH, MaterialEntry
 
 _FORMS: Mapping[Form, str] = {"library": "Library", "constants": "Own constants", "formula": "Own formula"}
 _LOOK = "dense outlined hide-bottom-space"

@@ -12,9 +12,9 @@ from nicegui import ui
 from softnlp.app.pressure_units import PRESSURE_UNITS, PressureUnit
 from softnlp.app.redraw import Redraw
 from softnlp.app.session import Session
-from softnlp.plots.style import colour
-from softnlp.ranges import PRESSURE
-from softnlp.units import BAR
+from softnlp.base.ranges import PRESSURE
+from softnlp.base.units import BAR
+from softnlp.figures.style import colour
 
 FIRST_LIMIT = 1.5 * BAR  # of the sliders
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from softnlp.app.numbers import Line, certificate_words, step_lines
 from softnlp.app.parts import Chart, csv_text, line
-from softnlp.plots.style import COLOURS
+from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE
+from softnlp.figures.style import COLOURS
 from softnlp.results import table_text, to_json
-from softnlp.studies.step import Run, Shape
-from softnlp.units import MILLIMETRE, NEWTON_MILLIMETRE
+from softnlp.statics.step import Run, Shape
 
 Array = NDArray[np.float64]
 

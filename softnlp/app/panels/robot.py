@@ -22,9 +22,9 @@ from softnlp.app.robot_state import (
 from softnlp.app.section_svg import section_svg
 from softnlp.app.session import Session
 from softnlp.app.stretch import PoseStretch
-from softnlp.errors import InputError
-from softnlp.robot import ALLOWABLE, DIMENSIONS, MINIMUM_WALL, ROBOTS, Dimension
-from softnlp.units import MILLIMETRE
+from softnlp.base.errors import InputError
+from softnlp.base.units import MILLIMETRE
+from softnlp.model.robot import ALLOWABLE, DIMENSIONS, MINIMUM_WALL, ROBOTS, Dimension
 
 _LABELS = {
     "outer_diameter_mm": ("Outer diameter", 0.5),

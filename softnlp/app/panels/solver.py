@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from softnlp.app.fields import choice_field, number_field
 from softnlp.app.session import Session
-from softnlp.numerics import Numerics
+from softnlp.model.numerics import Numerics
 
 _TRANSCRIPTIONS = {"multiple-shooting": "multiple shooting, RK4", "collocation": "collocation"}
 

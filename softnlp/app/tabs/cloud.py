@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.app.job import Progress, Stopped
-from softnlp.errors import InputError
-from softnlp.runner_workspace import run_sweep
-from softnlp.scenario import Scenario
-from softnlp.units import BAR, MILLIMETRE
-from softnlp.workspace.planning import plan_of
-from softnlp.workspace.read import Workspace, column_names, load_workspace, read_column
-from softnlp.workspace.run import WORKSPACE_FILE, SweepProgress, SweepSummary
-from softnlp.workspace.summary import Summary, summarise
-from softnlp.workspace.task import WorkspaceTask
+from softnlp.base.errors import InputError
+from softnlp.base.units import BAR, MILLIMETRE
+from softnlp.scenario.planning import plan_of
+from softnlp.scenario.read import Scenario
+from softnlp.scenario.run_workspace import run_sweep
+from softnlp.sweep.read import Workspace, column_names, load_workspace, read_column
+from softnlp.sweep.run import WORKSPACE_FILE, SweepProgress, SweepSummary
+from softnlp.sweep.summary import Summary, summarise
+from softnlp.sweep.task import WorkspaceTask
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.studies.step import Step
-from softnlp.units import BAR
+from softnlp.base.units import BAR
+from softnlp.statics.step import Step
 
 Table = dict[str, Any]
 Array = NDArray[np.float64]

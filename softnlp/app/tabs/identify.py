@@ -28,12 +28,12 @@ from softnlp.app.tabs.identify_table import (
     with_free,
 )
 from softnlp.app.tabs.tensile import tensile_part
-from softnlp.columns import read_columns
-from softnlp.errors import InputError
+from softnlp.base.csv_columns import read_columns
+from softnlp.base.errors import InputError
+from softnlp.base.status import Status
 from softnlp.results.identify_document import identified_text, robot_table_text, scenario_tables
-from softnlp.runner_identify import run_robots
-from softnlp.scenario import Scenario
-from softnlp.status import Status
+from softnlp.scenario.read import Scenario
+from softnlp.scenario.run_identify import run_robots
 from softnlp.studies.identified import Identified
 from softnlp.studies.identify_task import RobotTask
 

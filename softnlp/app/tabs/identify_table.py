@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from softnlp.conventions import Coefficients
-from softnlp.materials import Material
-from softnlp.plots.style import colour
+from softnlp.figures.style import colour
+from softnlp.model.conventions import Coefficients
+from softnlp.model.materials import Material
 from softnlp.results.identify_document import UNITS
 from softnlp.studies.free_constants import COEFFICIENTS, file_name, free_constants
 from softnlp.studies.identified import Identified

@@ -27,9 +27,9 @@ from softnlp.app.tabs.target_table import (
     without,
     words_of,
 )
-from softnlp.errors import InputError
+from softnlp.base.errors import InputError
 from softnlp.results.csv_table import table_text
-from softnlp.studies.step import Step
+from softnlp.statics.step import Step
 
 STUDY = "inverse"
 _FAR = 1e6  # [mm], farther targets are not marked

@@ -14,7 +14,7 @@ from nicegui import ui
 
 from softnlp.app.stage import Stage
 from softnlp.app.theme import darkness, on_dark
-from softnlp.errors import SoftnlpError
+from softnlp.base.errors import SoftnlpError
 
 _ENDED = {
     0: "every step solved",

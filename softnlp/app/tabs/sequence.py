@@ -24,11 +24,11 @@ from softnlp.app.tabs.sequence_table import (
     series,
     source_of,
 )
-from softnlp.errors import InputError
-from softnlp.plots.style import colour
+from softnlp.base.errors import InputError
+from softnlp.base.units import BAR
+from softnlp.figures.style import colour
 from softnlp.results.csv_table import table_text
-from softnlp.studies.step import Run, Step
-from softnlp.units import BAR
+from softnlp.statics.step import Run, Step
 
 STUDY = "forward"
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.errors import InputError
-from softnlp.reading import shown
-from softnlp.studies.step import Step
-from softnlp.units import BAR, DEGREE, MILLIMETRE
+from softnlp.base.errors import InputError
+from softnlp.base.reading import shown
+from softnlp.base.units import BAR, DEGREE, MILLIMETRE
+from softnlp.statics.step import Step
 
 Array = NDArray[np.float64]
 

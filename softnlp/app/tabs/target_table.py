@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from softnlp.base.units import BAR, DEGREE, MILLIMETRE
 from softnlp.results.targets import target_values
-from softnlp.studies.step import Run, Step
-from softnlp.units import BAR, DEGREE, MILLIMETRE
+from softnlp.statics.step import Run, Step
 
 Table = dict[str, Any]
 

@@ -9,10 +9,10 @@ from softnlp.app.fields import choice_field, number_field
 from softnlp.app.parts import Chart, NumberTable, RunRow, csv_drop, plain_words
 from softnlp.app.session import Session
 from softnlp.app.tabs.identify_table import law_rows, law_traces
-from softnlp.errors import InputError
+from softnlp.base.errors import InputError
 from softnlp.results.identify_document import material_file_text, material_table, tensile_table_text
-from softnlp.runner_identify import run_tensile
-from softnlp.scenario import Scenario
+from softnlp.scenario.read import Scenario
+from softnlp.scenario.run_identify import run_tensile
 from softnlp.studies.identify_task import TensileTask
 from softnlp.studies.tensile import LawFit, TensileFit
 

@@ -10,10 +10,10 @@ from softnlp.app.parts import NumberTable, RunRow, number_text, plain_words
 from softnlp.app.session import Session
 from softnlp.app.stage import Stage
 from softnlp.app.tabs import cloud
-from softnlp.errors import InputError
-from softnlp.plots.cloud import shown
-from softnlp.units import BAR, MILLIMETRE
-from softnlp.workspace.export import export_csv
+from softnlp.base.errors import InputError
+from softnlp.base.units import BAR, MILLIMETRE
+from softnlp.figures.cloud import shown
+from softnlp.sweep.export import export_csv
 
 STUDY = "workspace"
 _FIRST = {"levels": 8, "samples": 1000}

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softnlp.gravity import is_hanging
-from softnlp.mesh import resampled
-from softnlp.mesh.display import STATIONS
+from softnlp.base.units import BAR, MILLIMETRE, NEWTON_MILLIMETRE
+from softnlp.figures.mesh import resampled
+from softnlp.figures.mesh.display import STATIONS
+from softnlp.model.gravity import is_hanging
+from softnlp.model.robot import Robot
 from softnlp.results import Body
-from softnlp.robot import Robot
-from softnlp.studies.step import SectionRadii
-from softnlp.studies.wall import Wall
-from softnlp.units import BAR, MILLIMETRE, NEWTON_MILLIMETRE
+from softnlp.statics.step import SectionRadii
+from softnlp.statics.wall import Wall
 
 Array = NDArray[np.float64]
 
@@ -88,7 +88,7 @@ def frame_of(
     ----------
     pressure : (sets,) gauge [Pa].
     ghost : another shape, that without loads for instance.
-    tip_force, tip_moment, gravity : as in `softnlp.rod.Loads`, world frame [N], [N m], [m/s^2].
+    tip_force, tip_moment, gravity : as in `softnlp.model.rod.Loads`, world frame [N], [N m], [m/s^2].
     wall : a plane, drawn where the tip is nearest to it. wall_force : how hard it pushes the tip [N].
     tip_cap : L_t, from the tip to where it touches [m].
 

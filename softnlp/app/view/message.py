@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.app.view.frame import Frame, Tube
-from softnlp.mesh import display_mesh
-from softnlp.palette import COLOURS, colour
-from softnlp.robot import Robot
-from softnlp.units import MILLIMETRE
+from softnlp.base.palette import COLOURS, colour
+from softnlp.base.units import MILLIMETRE
+from softnlp.figures.mesh import display_mesh
+from softnlp.model.robot import Robot
 
 Layout = tuple[int, tuple[float, ...]]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from softnlp.app.view.frame import Frame
 from softnlp.app.view.message import Layout, cloud_message, frame_message, layout_of, robot_message
-from softnlp.units import BAR
+from softnlp.base.units import BAR
 
 Point = tuple[float, float, float]
 

@@ -1,0 +1,1 @@
+"""What everything stands on: errors, statuses, units, ranges, and reading and writing of text and files."""

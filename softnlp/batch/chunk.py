@@ -1,0 +1,164 @@
+"""Solving one chunk of a plan: all its poses at once, and by the problem itself those that this leaves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.base.status import Status
+from softnlp.batch.arrays import some
+from softnlp.batch.blocked_lane import CLOSURES, BlockedLane, BlockedPoses, wall_of_plan
+from softnlp.batch.plan import Plan
+from softnlp.batch.pose_lane import PoseLane, Poses, entries
+from softnlp.batch.poses import STATUSES, Block, Lane, Rows, unsolved_rows
+from softnlp.batch.reduced import POSITION, ROTATION, STATE
+from softnlp.model.quantities import Model, with_symbols
+from softnlp.model.rod import Loads
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.pose_grid import Solved
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.step import Step, stable_flag
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+class ChunkSolver:
+    """Solves chunks of one plan; a worker makes one and keeps what it compiled."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self._problem: PoseSolver | None = None
+        self._blocked_problem: BlockedSolver | None = None
+        self._free = PoseLane(plan) if plan.numerics.transcription == "multiple-shooting" else None
+        self._wall = None if plan.contact is None else wall_of_plan(plan, plan.contact)
+        self._blocked: BlockedLane | None = None
+        together = self._free is not None and plan.numerics.intervals is None
+        if self._free is not None and plan.contact is not None and self._wall is not None:
+            together = together and plan.contact.closure in CLOSURES
+            self._blocked = BlockedLane(plan, plan.contact, self._wall, self._free) if together else None
+
+    def solve(self, chunk: int) -> Block:
+        """Return the poses of a chunk; never raises for a pose that cannot be solved."""
+        numbers = self.plan.members(chunk)
+        rows = unsolved_rows(numbers, self.plan.row_type)
+        columns = self.plan.full_values(numbers)
+        if self._free is not None and (self._wall is None or self._blocked is not None):
+            self._solve_together(self._free, rows, columns, self.plan.values[numbers])
+        messages: list[tuple[int, str]] = []
+        near: Any = None
+        for k in np.flatnonzero(rows["lane"] == Lane.PROBLEM).tolist():
+            step, solved = self._solve_alone(columns[:, k], near)
+            near = solved or near
+            _fill(rows, k, step)
+            if step.status is not Status.SOLVED:
+                messages.append((int(numbers[k]), step.message))
+        dead_moment = np.any(columns[entries(self.plan, "tip_moment")] != 0, axis=0)
+        rows["stable"][dead_moment] = stable_flag(None)  # also of those that the lane found
+        return Block(chunk, rows, tuple(messages))
+
+    def _solve_together(self, lane: PoseLane, rows: Rows, columns: Array, features: Array) -> None:
+        """Fill the rows of poses that are solved, accurate and stable for certain; the others stay as they are."""
+        free = lane.solve(columns, features)
+        if self._blocked is None:
+            _fill_free(rows, free, lane.self_intersecting(free, columns))
+            return
+        gap, touch = self._blocked.gaps(free), self._blocked.touching(free)
+        beyond = gap <= -touch
+        apart = some_poses(free, ~beyond)
+        _fill_free(rows, apart, lane.self_intersecting(apart, columns))
+        rows["blocked_force"][apart.numbers] = 0.0
+        rows["gap"][apart.numbers] = gap[~beyond]
+        rows["status"][apart.numbers[(gap > touch)[~beyond]]] = STATUSES.index(Status.NO_CONTACT)
+        if np.any(beyond):
+            found = self._blocked.solve(columns, features, some_poses(free, beyond))
+            if found is not None:
+                gaps = np.full(len(rows), np.nan)
+                gaps[free.numbers] = gap
+                _fill_blocked(rows, found, gaps[found.numbers], self._blocked.self_intersecting(found, columns))
+
+    def _solve_alone(self, column: Array, near: Any) -> tuple[Step, Solved | Blocked | None]:
+        """Solve one pose by the problem itself, from a neighbour where there is one."""
+        model, pressure, loads = self._pose(column)
+        plan = self.plan
+        if plan.contact is None:
+            self._problem = self._problem or PoseSolver(plan.model, plan.numerics)
+            return self._problem.with_model(model).solve(pressure, loads, near)
+        self._blocked_problem = self._blocked_problem or BlockedSolver(plan.model, plan.numerics, plan.contact)
+        # from zero pressure: the neighbours in a chunk are not on the way to each other
+        return self._blocked_problem.with_model(model).solve(pressure, loads, self._wall)
+
+    def _pose(self, column: Array) -> tuple[Model, Array, Loads]:
+        """Return the model, the pressures and the loads of one pose from every quantity."""
+        values: dict[str, Any] = {}
+        start = 0
+        for name, nominal in self.plan.nominal.items():
+            part = column[start : start + nominal.size]
+            values[name] = float(part[0]) if nominal.size == 1 and name != "pressure" else part
+            start += nominal.size
+        named = with_symbols(self.plan.model, values)
+        return named, values["pressure"], Loads(values["tip_force"], values["tip_moment"], values["gravity"])
+
+
+def some_poses(poses: Poses, mask: NDArray[np.bool_]) -> Poses:
+    """Return some of the solved poses."""
+    return Poses(poses.numbers[mask], some(poses.sections, mask), some(poses.shot, mask), poses.residual[mask])
+
+
+def _fill_free(rows: Rows, poses: Poses, through: Mask) -> None:
+    """Put solved poses without a wall into their rows."""
+    lengths, angle, backbone = poses.shot.integrals[:-2], poses.shot.integrals[-2], poses.shot.integrals[-1]
+    _fill_together(rows, poses, poses.shot.tip, lengths, angle, backbone)
+    rows["self_intersecting"][poses.numbers] = through
+
+
+def _fill_blocked(rows: Rows, poses: BlockedPoses, gap: Array, through: Mask) -> None:
+    """Put solved blocked poses into their rows."""
+    angle, backbone = poses.shot.integrals
+    _fill_together(rows, poses, poses.shot.state, poses.shot.state[STATE:], angle, backbone)
+    rows["self_intersecting"][poses.numbers] = through
+    rows["blocked_force"][poses.numbers] = poses.force
+    rows["gap"][poses.numbers] = gap
+
+
+def _fill_together(
+    rows: Rows, poses: Poses | BlockedPoses, tip: Array, lengths: Array, angle: Array, backbone: Array
+) -> None:
+    """Put what poses with and without a wall share into their rows; both are stable for certain. tip : [p, R, ...]."""
+    where, shot, L_0 = poses.numbers, poses.shot, poses.sections.length_unit
+    rows["status"][where] = STATUSES.index(Status.SOLVED)
+    rows["lane"][where] = Lane.BATCH
+    rows["stable"][where] = 1
+    rows["intervals"][where] = shot.intervals
+    rows["iterations"][where] = shot.iterations
+    rows["stretch"][where] = poses.sections.stretch
+    rows["tip_position"][where] = (tip[POSITION] * L_0).T
+    rows["tip_rotation"][where] = tip[ROTATION].T.reshape(-1, 3, 3).transpose(0, 2, 1)
+    rows["bending_angle"][where] = angle
+    rows["backbone_length"][where] = backbone * L_0
+    rows["chamber_length"][where] = (lengths * L_0).T
+    rows["residual"][where] = poses.residual
+    rows["error"][where] = shot.error
+
+
+def _fill(rows: Rows, k: int, step: Step) -> None:
+    """Put a step into row k."""
+    rows["status"][k] = STATUSES.index(step.status)
+    rows["lane"][k] = Lane.PROBLEM
+    rows["iterations"][k] = step.iterations
+    rows["intervals"][k] = step.intervals or 0
+    rows["residual"][k] = np.nan if step.residual is None else step.residual
+    pose = step.pose
+    if pose is None or not step.status.has_solution:
+        return
+    rows["stable"][k] = stable_flag(pose.stable)
+    rows["self_intersecting"][k] = pose.fit.self_intersecting
+    rows["error"][k] = step.discretisation_error
+    for name in ("stretch", "tip_position", "tip_rotation", "bending_angle", "backbone_length", "chamber_length"):
+        rows[name][k] = getattr(pose, name)
+    if step.contact is not None:
+        rows["blocked_force"][k] = step.contact.force
+        rows["gap"][k] = step.contact.gap

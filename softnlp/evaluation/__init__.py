@@ -1,1 +1,0 @@
-"""How far simulations are from measurements: statistics of errors, and whole comparisons."""

@@ -1,0 +1,321 @@
+"""The 3-D panel of a run: bodies to scale, chambers coloured by set, base, tip frame and loads. Lengths in mm."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE
+from softnlp.figures.mesh.rings import circle, placed
+from softnlp.figures.style import GREY, INK, PALE, SMALL, TEXT, colour, step_colours
+from softnlp.model.gravity import gravity_lines, is_hanging
+from softnlp.results import Body, RunView
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+BODY_FACETS, CHAMBER_FACETS, GHOST_FACETS = 32, 10, 24
+BODY_STATIONS, GHOST_STATIONS = 25, 13
+SILICONE = (0.93, 0.91, 0.88)
+GHOST_TINT, IDLE_TINT = 0.16, 0.40  # how much of its colour a faint body and a chamber without pressure keep
+MOST_GHOSTS = 3
+ELEVATION = 16.0  # of the viewer [deg]
+_ARROW = 0.32  # length of a load's arrow, of L_0
+_CANVAS = 5.6  # side of the square that the panel may draw in [inch]
+_BOX = (4.4, 3.7)  # largest width and height of the box of the axes, labels not included [inch]
+
+
+def tube(body: Body, radius: float, offset: tuple[float, float], facets: int, stations: int) -> tuple[Array, Array]:
+    """Return (n, 4, 3) quads [mm] and (n, 3) outward normals of a tube along a body.
+
+    radius : [m]. offset : of the tube's axis from the body's, in the body frame [m].
+    """
+    M = len(body.position)
+    chosen = np.unique(np.linspace(0, M - 1, min(stations, M)).round().astype(int))
+    p, R = body.position[chosen], body.rotation[chosen]
+    local = radius * circle(facets) + np.array(offset)
+    rings = placed(p[:, None], R[:, None], np.concatenate([local, local[:1]])[None]) / MILLIMETRE
+    quads = np.stack([rings[:-1, :-1], rings[1:, :-1], rings[1:, 1:], rings[:-1, 1:]], axis=2)
+    middle = 2 * np.pi * (np.arange(facets) + 0.5) / facets
+    outward = np.column_stack([np.cos(middle), np.sin(middle), 0 * middle])
+    normals = np.einsum("sij,fj->sfi", R[:-1], outward)
+    return quads.reshape(-1, 4, 3), normals.reshape(-1, 3)
+
+
+def disc(radius: float, facets: int, z: float) -> Array:
+    """Return a flat disc (1, facets, 3) about the axis, in the unit of its arguments."""
+    angle = np.linspace(0, 2 * np.pi, facets, endpoint=False)
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.full(facets, z)])[None]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """From where axes are seen: from a little above, and with the base on top where the robot hangs.
+
+    azimuth : of the viewer about +z [deg]. hanging : whether the picture is turned upside down.
+    """
+
+    azimuth: float
+    hanging: bool
+
+    @property
+    def eye(self) -> Array:
+        """The unit vector towards the viewer (3,)."""
+        return direction(self.azimuth, -ELEVATION if self.hanging else ELEVATION)
+
+    @property
+    def right(self) -> Array:
+        """The level unit vector that points right in the picture (3,)."""
+        return direction(self.azimuth + (-90 if self.hanging else 90), 0)
+
+    @property
+    def light(self) -> Array:
+        """The unit vector towards the light (3,), from the upper left."""
+        return direction(self.azimuth + 50, -40) if self.hanging else direction(self.azimuth - 50, 40)
+
+    def aim(self, axes: Any) -> None:
+        """Turn 3-D axes."""
+        upside_down = {"elev": -ELEVATION, "roll": 180} if self.hanging else {"elev": ELEVATION}
+        axes.view_init(azim=self.azimuth, **upside_down)
+
+
+def side_camera(towards: Array, least: float, gravity: Sequence[float], turn: float = 20.0) -> Camera:
+    """Return the camera for which a level vector points right, turned by some degrees; a fixed one if it is short."""
+    (x, y), hanging = towards, is_hanging(gravity)
+    if np.hypot(x, y) < least:
+        return Camera(-60.0, hanging)
+    away = 90.0 - turn
+    return Camera(float(np.degrees(np.arctan2(y, x))) + (away if hanging else -away), hanging)
+
+
+def view_camera(view: RunView) -> Camera:
+    """Return the camera for which the last solved step bends to the right, almost side on."""
+    body = view.bodies[view.solved[-1]] if view.solved else None
+    towards = np.zeros(2) if body is None else body.position[-1, :2]
+    return side_camera(towards, 0.02 * view.robot.length, view.loads.gravity)
+
+
+def body_panel(figure: Figure, centre: tuple[float, float], view: RunView) -> Any:
+    """Draw the 3-D panel of a run about a point of the figure [inch] and return its axes."""
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+
+    camera = view_camera(view)
+    axes, reach = base_axes(figure, centre, view, camera)
+    solved = view.solved
+    shades = step_colours(len(view.bodies))
+    light = camera.light
+    for k in _ghosts(solved):
+        body = view.bodies[k]
+        assert body is not None
+        quads, normals = tube(body, body.radii.outer, (0, 0), GHOST_FACETS, GHOST_STATIONS)
+        pale = shaded(normals, GHOST_TINT * shades[k][:3] + (1 - GHOST_TINT), light, contrast=0.06)
+        axes.add_collection3d(
+            Poly3DCollection(quads, facecolors=pale, edgecolors=pale, linewidths=0.4, zorder=2, label="earlier step")
+        )
+        reach.append(quads.reshape(-1, 3))
+    if solved:
+        lines = [b.position / MILLIMETRE for b in view.bodies if b is not None]
+        axes.add_collection3d(
+            Line3DCollection(lines, colors=shades[list(solved)], linewidths=1.4, zorder=3, label="axes of the steps")
+        )
+        reach += lines
+        reach += draw_cut_open(axes, view, solved[-1], camera.eye, light)
+        reach += draw_loads(axes, view, lines[-1][-1], np.vstack(reach), camera)
+    frame(axes, np.vstack(reach))
+    return axes
+
+
+def base_axes(figure: Figure, centre: tuple[float, float], view: RunView, camera: Camera) -> tuple[Any, list[Array]]:
+    """Return 3-D axes about a point of the figure [inch] with the base plate alone, and the points it reaches [mm].
+
+    Gravity, where there is some, is said in words beneath.
+    """
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    width, height = figure.get_size_inches()
+    left, bottom = centre[0] - _CANVAS / 2, centre[1] - _CANVAS / 2
+    box = (left / width, bottom / height, _CANVAS / width, _CANVAS / height)
+    axes: Any = figure.add_axes(box, projection="3d", computed_zorder=False)
+    axes.patch.set_visible(False)
+    camera.aim(axes)
+    for line in gravity_lines(view.loads.gravity):
+        figure.text(0.018, 0.053, line, size=SMALL, color=GREY)
+    axes.set_proj_type("ortho")
+    plate = disc(0.75 * view.robot.outer_diameter / MILLIMETRE, 40, 0.0)
+    axes.add_collection3d(
+        Poly3DCollection(plate, facecolors="#EEEEEE", edgecolors=GREY, linewidths=0.6, zorder=1, label="base")
+    )
+    return axes, [plate.reshape(-1, 3), np.array([[0.0, 0.0, view.robot.length / MILLIMETRE]])]
+
+
+def _ghosts(solved: Sequence[int]) -> list[int]:
+    """Return a few steps between the first and the last to show as faint bodies, the first included."""
+    if len(solved) < 2:
+        return []
+    return sorted({solved[round(j)] for j in np.linspace(0, len(solved) - 1, MOST_GHOSTS + 1)[:-1]})
+
+
+def draw_cut_open(axes: Any, view: RunView, k: int, eye: Array, light: Array, *, tip_frame: bool = True) -> list[Array]:
+    """Draw step k's body opened towards the viewer, chambers and tip frame; return points that it reaches [mm].
+
+    The half of the skin that faces the viewer is left out, so that the chambers are seen and nothing is transparent.
+    Chambers without pressure are pale.
+    """
+    from matplotlib.colors import to_rgb
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+
+    body, robot = view.bodies[k], view.robot
+    assert body is not None
+    skin, normals = tube(body, body.radii.outer, (0, 0), BODY_FACETS, BODY_STATIONS)
+    behind = normals @ eye < 0
+    quads, colours = [skin[behind]], [shaded(-normals[behind], SILICONE, light, contrast=0.14)]
+    for theta, chamber_set in zip(robot.chamber_angles(), robot.set_of_chamber, strict=True):
+        r_cp = body.radii.chamber_circle
+        offset = (r_cp * float(np.cos(theta)), r_cp * float(np.sin(theta)))
+        chamber, outward = tube(body, body.radii.chamber, offset, CHAMBER_FACETS, BODY_STATIONS)
+        rgb = np.array(to_rgb(colour(chamber_set)))
+        if view.pressure[k, chamber_set] == 0:
+            rgb = IDLE_TINT * rgb + (1 - IDLE_TINT)
+        quads.append(chamber)
+        colours.append(shaded(outward, rgb, light))
+    edges = _outline(skin, behind)
+    quads.append(edges)
+    colours.append(np.tile(to_rgb(GREY), (len(edges), 1)))
+    # One collection, so that all is sorted by depth together; edges of the face's colour close the seams.
+    faces = np.concatenate(colours)
+    axes.add_collection3d(
+        Poly3DCollection(
+            np.concatenate(quads), facecolors=faces, edgecolors=faces, linewidths=0.6, zorder=4, label="last step"
+        )
+    )
+    rim = skin.reshape(-1, BODY_FACETS, 4, 3)[-1, :, 1]
+    axes.plot(*np.vstack([rim, rim[:1]]).T, color=GREY, linewidth=0.8, zorder=5, label="tip rim")
+
+    if not tip_frame:
+        return [skin.reshape(-1, 3)]
+    tip, R = body.position[-1] / MILLIMETRE, body.rotation[-1]
+    size = 0.2 * robot.length / MILLIMETRE
+    arms = [(tip, tip + size * R[:, j]) for j in range(3)]
+    axes.add_collection3d(Line3DCollection(arms, colors=GREY, linewidths=1.2, zorder=6, label="tip frame"))
+    for (_, end), name in zip(arms, "xyz", strict=True):
+        axes.text(*(tip + 1.35 * (end - tip)), name, size=SMALL, color=GREY, ha="center", va="center", zorder=7)
+    return [skin.reshape(-1, 3), np.array([tip + 1.4 * size * R[:, j] for j in range(3)])]
+
+
+def _outline(skin: Array, behind: NDArray[np.bool_]) -> Array:
+    """Return (n, 4, 3) faces of no width where a body's faces turn from towards the viewer to away."""
+    faces, away = skin.reshape(-1, BODY_FACETS, 4, 3), behind.reshape(-1, BODY_FACETS)
+    turns = away != np.roll(away, -1, axis=1)
+    edges: Array = faces[turns][:, [3, 2, 2, 3]]
+    return edges
+
+
+def shaded(normals: Array, rgb: Any, light: Array, contrast: float = 0.28) -> Array:
+    """Return (n, 3) colours, lighter where a face looks at the light."""
+    brightness = 1 - contrast + contrast * (normals @ light)
+    return np.clip(np.asarray(rgb) * brightness[:, None], 0, 1)
+
+
+def direction(azimuth: float, elevation: float) -> Array:
+    """Return the unit vector towards an azimuth and elevation [deg]."""
+    a, e = np.radians([azimuth, elevation])
+    return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+
+
+def draw_loads(axes: Any, view: RunView, tip: Array, reach: Array, camera: Camera) -> list[Array]:
+    """Draw tip force, tip moment and gravity as arrows of one length with their size beside; return their ends [mm].
+
+    Gravity stands to the left of everything drawn so far, `reach`.
+    """
+    right = camera.right
+    size = _ARROW * view.robot.length / MILLIMETRE
+    force, moment, gravity = (
+        np.asarray(x, dtype=float) for x in (view.loads.tip_force, view.loads.tip_moment, view.loads.gravity)
+    )
+    height = (1.0 if gravity[2] <= 0 else 1 - _ARROW) * view.robot.length / MILLIMETRE
+    aside = (float((reach @ right).min()) - 0.3 * size) * right + np.array([0.0, 0.0, height])
+    arrows = [
+        (tip, force, f"F {np.linalg.norm(force):.3g} N", "tip force"),
+        (tip, moment, f"M {np.linalg.norm(moment) / NEWTON_MILLIMETRE:.3g} N mm", "tip moment"),
+        (aside, gravity, "g", "gravity"),
+    ]
+    ends = []
+    for start, vector, text, label in arrows:
+        norm = float(np.linalg.norm(vector))
+        if norm > 0:
+            ends += draw_arrow(axes, start, size * vector / norm, text, label, camera)
+    return ends
+
+
+def draw_arrow(
+    axes: Any,
+    start: Array,
+    step: Array,
+    text: str,
+    label: str,
+    camera: Camera,
+    *,
+    ink: str = INK,
+    at_tail: bool = False,
+) -> list[Array]:
+    """Draw an arrow [mm], its head flat towards the viewer and its text beyond one end; return points it reaches."""
+    from matplotlib.patheffects import withStroke
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+    eye, right = camera.eye, camera.right
+    size = float(np.linalg.norm(step))
+    across = np.cross(step, eye)
+    across = 0.4 * across / np.linalg.norm(across) if np.linalg.norm(across) > 0.1 * size else 0.4 * right
+    tail, side = start + 0.74 * step, 0.28 * size * across
+    lines = [(start, start + step), (tail + side, start + step), (tail - side, start + step)]
+    axes.add_collection3d(Line3DCollection(lines, colors=ink, linewidths=1.6, zorder=6, label=label))
+    sideways = float(step @ right) / size * (-1 if at_tail else 1)
+    place, away = ("center", 0.22) if abs(sideways) < 0.4 else ("left" if sideways > 0 else "right", 0.05)
+    end = start - away * step if at_tail else start + (1 + away) * step
+    halo = [withStroke(linewidth=2.5, foreground="white")]
+    axes.text(*end, text, size=TEXT, color=ink, zorder=8, ha=place, va="center", path_effects=halo, parse_math=True)
+    return [start[None], end[None]]
+
+
+def frame(axes: Any, points: Array) -> None:
+    """Set limits with equal scales on the three axes and one tick distance for all."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    widest = float((high - low).max())
+    low, high = low - 0.03 * widest, high + 0.03 * widest
+    decade = 10.0 ** np.floor(np.log10(widest / 6))
+    distance = next(d for d in decade * np.array([1.0, 2.0, 5.0, 10.0]) if d >= widest / 6)
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_zlim(low[2], high[2])
+    _fit(axes, high - low)
+    for k, (axis, name) in enumerate(((axes.xaxis, "x"), (axes.yaxis, "y"), (axes.zaxis, "z"))):
+        # No tick next to a corner, where the labels of two axes would meet.
+        first, last = np.ceil((low[k] + 0.07 * widest) / distance), np.floor((high[k] - 0.07 * widest) / distance)
+        axis.set_ticks(distance * np.arange(first, last + 1))
+        axis.set_pane_color((1, 1, 1, 0))
+        axis.line.set_color(GREY)
+        axis._axinfo["grid"].update(color=PALE, linewidth=0.6)
+        axis.set_label_text(f"{name} [mm]", size=TEXT, color=INK)
+    axes.tick_params(labelsize=SMALL, colors=INK, pad=0)
+    # mplot3d scales label distances with the width of the box, so a slender one needs more.
+    slender = widest / float((high - low)[:2].max()) - 1
+    axes.tick_params(axis="z", pad=4 + 2 * slender)
+    axes.zaxis.labelpad = 4 + 7 * slender
+
+
+def _fit(axes: Any, size: Array) -> None:
+    """Give the box its proportions and the largest scale at which it fits, as seen from the chosen direction."""
+    from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+    axes.set_box_aspect(size)
+    axes.apply_aspect()
+    corners = np.array(np.meshgrid(axes.get_xlim(), axes.get_ylim(), axes.get_zlim())).reshape(3, -1)
+    across, up, _ = proj_transform(*corners, axes.get_proj())
+    seen = np.ptp(axes.transData.transform(np.column_stack([across, up])), axis=0) / axes.figure.dpi
+    axes.set_box_aspect(size, zoom=float(min(_BOX / seen)))

@@ -1,0 +1,112 @@
+"""Figures of an identification: a tensile test with its laws, or measured against modelled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softnlp.base.units import KILOPASCAL
+from softnlp.figures.style import GREY, INK, PALE, SMALL, TEXT, colour, in_own_style, new_figure, plain, user_text
+from softnlp.results.identify_document import UNITS
+from softnlp.studies.measurements import column_slice
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from softnlp.studies.identified import Identified
+    from softnlp.studies.tensile import TensileFit
+
+_LABELS = {
+    "tip_position": "tip position [mm]",
+    "bending_angle": "bending angle [deg]",
+    "elongation": "elongation [mm]",
+    "blocked_force": "blocked force [N]",
+}
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")  # one more than colours, so that pairs repeat late
+
+
+@in_own_style
+def tensile_figure(fit: TensileFit, name: str, before: Any = None) -> Figure:
+    """Draw the test with every fitted law, R^2 in the legend, and what each law leaves.
+
+    before : a material to compare with, or None.
+    """
+    figure = new_figure(11.0, 4.6, f"Tensile test of {name}", f"{fit.stretch.size} points; incompressible, uniaxial")
+    low, high = next(iter(fit.fits.values())).fitted_stretch
+    stretch = np.linspace(low, high, 241)
+    left = figure.add_axes((0.07, 0.13, 0.5, 0.69))
+    right = figure.add_axes((0.65, 0.13, 0.32, 0.69))
+    plain(left, "stretch [-]", "engineering stress [kPa]")
+    plain(right, "stretch [-]", "law - data [kPa]")
+    left.plot(
+        fit.stretch, fit.stress / KILOPASCAL, "o", color=INK, markersize=3.5, markerfacecolor="none", label="data"
+    )
+    if before is not None:
+        left.plot(
+            stretch,
+            np.asarray(before.engineering_stress(stretch)) / KILOPASCAL,
+            color=GREY,
+            linestyle=":",
+            linewidth=1.3,
+            label=user_text(f"before: {before.name}, {before.law.name}"),
+        )
+    order = np.argsort(fit.stretch, kind="stable")
+    styles = ("-", "--", "-.", (0, (4, 1, 1, 1, 1, 1)), (0, (8, 2)))
+    for k, f in enumerate(fit.fits.values()):
+        look: dict[str, Any] = {"color": colour(k), "linestyle": styles[k % len(styles)], "linewidth": 1.5}
+        words = (
+            user_text(f.law.name),
+            f"R² = {f.r_squared:.5f}",
+            *([f.status] if f.material is None else ()),
+            *_unsure(f.notes),
+        )
+        left.plot(stretch, f.stress(stretch) / KILOPASCAL, label=", ".join(words), **look)
+        right.plot(fit.stretch[order], (f.stress(fit.stretch) - fit.stress)[order] / KILOPASCAL, **look)
+    right.axhline(0.0, color=GREY, linewidth=0.8, zorder=1)
+    left.legend(fontsize=SMALL, frameon=False, labelcolor=INK)
+    return figure
+
+
+def _unsure(notes: Mapping[str, str]) -> list[str]:
+    """Return a legend's words on the constants that have a note."""
+    return [f"{name} {note}" for name, note in notes.items() if note]
+
+
+@in_own_style
+def identified_figure(found: Identified, title: str) -> Figure:
+    """Draw the model before and after against what was measured, a panel an observable and a marker a robot."""
+    shown = [key for key in UNITS if key in found.errors()]
+    width = 0.9 + 4.1 * len(shown)
+    pairs = zip(found.free.names, found.constants, strict=True)
+    constants = ", ".join(f"{n} = {v:.4g}" + (found.notes[n] and f" ({found.notes[n]})") for n, v in pairs)
+    figure = new_figure(max(width, 6.5), 5.0, title, constants)
+    step = 1.0 / len(shown)
+    robots = [sum(bool(np.any(np.isfinite(d.of(key)))) for d in found.data) for key in shown]
+    named = int(np.argmax(robots))
+    for k, key in enumerate(shown):
+        axes = figure.add_axes((step * k + 0.16 * step, 0.12, 0.78 * step, 0.71))
+        unit = UNITS[key][1]
+        plain(axes, f"measured {_LABELS[key]}", f"model {_LABELS[key]}")
+        ends = []
+        for j, data in enumerate(found.data):
+            measured = data.of(key) / unit
+            if not np.any(np.isfinite(measured)):
+                continue
+            where = column_slice(key)
+            look: dict[str, Any] = {"linestyle": "none", "marker": _MARKERS[j % len(_MARKERS)], "markersize": 5}
+            old, new = found.before[j][:, where] / unit, found.after[j][:, where] / unit
+            axes.plot(measured.ravel(), old.ravel(), color=GREY, markerfacecolor="none", **look)
+            axes.plot(measured.ravel(), new.ravel(), color=colour(j), label=user_text(data.label), **look)
+            ends += [measured, old, new]
+        every = np.concatenate([e.ravel() for e in ends])
+        low, high = float(np.nanmin(every)), float(np.nanmax(every))
+        axes.plot([low, high], [low, high], color=PALE, linewidth=1.5, zorder=0)
+        before, after = found.errors(False)[key], found.errors()[key]
+        axes.set_title(
+            f"rmse {before.rmse / unit:.3g} before (grey), {after.rmse / unit:.3g} after", size=TEXT, color=INK
+        )
+        if k == named:
+            axes.legend(fontsize=SMALL, frameon=False, labelcolor=INK)
+    return figure

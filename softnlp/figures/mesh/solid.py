@@ -1,0 +1,192 @@
+"""Watertight solids of a body for export: the section as one polygon with holes, swept along the axis.
+
+The polygon is made and triangulated once, so the sweep is closed and its normals point outwards by construction; where
+a shape passes through itself the solid does too, and `Solid.warnings` says so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.base.errors import InputError
+from softnlp.base.units import MILLIMETRE
+from softnlp.figures.mesh.rings import circle, natural_body, placed, resampled
+from softnlp.model.robot import Robot
+from softnlp.results import Body
+from softnlp.statics.body import fit_of, turns
+
+if TYPE_CHECKING:
+    from manifold3d import CrossSection
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+FACETS = 96
+FACET_LIMITS = (8, 2000)
+HOLES = ("bore", "reinforced")
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A closed surface.
+
+    name : of what it is. vertices : (n, 3) [mm]. faces : (m, 3), counter-clockwise seen from outside. warnings : what a
+    maker should know. chamber : of a core, from 0, else None.
+    """
+
+    name: str
+    vertices: Array
+    faces: Indices
+    warnings: tuple[str, ...] = ()
+    chamber: int | None = None
+
+    @property
+    def volume(self) -> float:
+        """Volume by the divergence theorem [mm^3]."""
+        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
+        return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+def require(facets: int) -> None:
+    """Check what every solid needs, before time is spent on a shape.
+
+    Raises
+    ------
+    InputError
+        Without the extra `mesh`, or for a number of facets out of range.
+    """
+    low, high = FACET_LIMITS
+    if not low <= facets <= high:
+        raise InputError(f"expected a number of facets from {low} to {high}, got {facets}", key="facets")
+    _manifold3d()
+
+
+def body_solid(robot: Robot, body: Body, facets: int = FACETS) -> Solid:
+    """Return the silicone of a shape, with lumen and bores open at both ends.
+
+    Every circle has `facets` sides, its corners on the circle, and the axis turns by at most one facet's angle from
+    one station to the next, so the volume's relative error falls as facets^-2.
+
+    Raises
+    ------
+    InputError
+        Without the extra `mesh`, for a number of facets out of range, or where no wall is left beside the bores.
+    """
+    made = _swept("body", body, _silicone(robot, body, body.radii.bore, facets), facets)
+    return replace(made, warnings=fit_of(body.position, body.rotation, body.radii.outer).warnings)
+
+
+def mould_body(robot: Robot, facets: int = FACETS, holes: str = "bore") -> Solid:
+    """Return the silicone as it is cast: straight, of length L_0, with lumen and chambers as through holes.
+
+    holes : "bore", the finished body with holes of r_ci0; or "reinforced", of r_co, the silicone that is cast around
+    chambers made and wound before.
+
+    Raises
+    ------
+    InputError
+        As `body_solid`.
+    """
+    body = natural_body(robot)
+    return _swept("body", body, _silicone(robot, body, _hole_radius(robot, holes), facets), facets)
+
+
+def cores(robot: Robot, body: Body | None = None, facets: int = FACETS, holes: str = "bore") -> tuple[Solid, ...]:
+    """Return what fills the lumen and the chambers, each a solid of its own: lumen first, then chamber by chamber.
+
+    body : a shape; by default the natural one, whose cores are the rods of a mould. holes : as of `mould_body`.
+
+    Raises
+    ------
+    InputError
+        As `body_solid`.
+    """
+    require(facets)
+    shape = natural_body(robot) if body is None else body
+    radius = _hole_radius(robot, holes) if body is None else body.radii.bore
+    discs: list[tuple[int | None, Array]] = [(None, shape.radii.lumen * circle(facets))]
+    discs += [(n, outline) for n, outline in enumerate(_holes(robot, shape, radius, facets))]
+    names = ["lumen" if n is None else f"chamber {n + 1}" for n, _ in discs]
+    return tuple(
+        _swept(name, shape, _section([outline]), facets, chamber=n)
+        for name, (n, outline) in zip(names, discs, strict=True)
+    )
+
+
+def _hole_radius(robot: Robot, holes: str) -> float:
+    if holes not in HOLES:
+        raise InputError(f"expected {' or '.join(map(repr, HOLES))}, got {holes!r}", key="holes")
+    return float(robot.bore_radius if holes == "bore" else robot.chamber_radius)
+
+
+def _holes(robot: Robot, body: Body, radius: float, facets: int) -> list[Array]:
+    """Return the outline of each chamber in the section [m]."""
+    theta = np.array(robot.chamber_angles(), dtype=float)
+    centres = body.radii.chamber_circle * np.column_stack([np.cos(theta), np.sin(theta)])
+    return [centre + radius * circle(facets) for centre in centres]
+
+
+def _silicone(robot: Robot, body: Body, hole: float, facets: int) -> CrossSection:
+    """Return the section between outer circle, lumen and holes [mm]; holes that overlap become one."""
+    require(facets)
+    r_r, r_i, r_cp = body.radii.outer, body.radii.lumen, body.radii.chamber_circle
+    if r_cp + hole >= r_r * np.cos(np.pi / facets):
+        few = r_cp + hole < r_r
+        reason = "expected more facets: a bore reaches between them" if few else "the bores reach the surface here"
+        raise InputError(f"{reason}, r_cp + r = {(r_cp + hole) / MILLIMETRE:.4g} mm of {r_r / MILLIMETRE:.4g} mm")
+    if r_cp - hole <= r_i:
+        raise InputError(
+            f"the bores reach the lumen here, r_cp - r = {(r_cp - hole) / MILLIMETRE:.4g} mm of "
+            f"{r_i / MILLIMETRE:.4g} mm"
+        )
+    unit = circle(facets)
+    return _section([r_r * unit]) - _section([r_i * unit, *_holes(robot, body, hole, facets)])
+
+
+def _section(outlines: list[Array]) -> CrossSection:
+    """Return the union of outlines [m] as a section [mm]."""
+    return _manifold3d().CrossSection([outline / MILLIMETRE for outline in outlines])
+
+
+def _swept(name: str, body: Body, section: CrossSection, facets: int, chamber: int | None = None) -> Solid:
+    """Sweep a section [mm] along a body."""
+    loops = [np.asarray(loop, dtype=float) for loop in section.to_polygons()]
+    flat = np.concatenate(loops)
+    cap = np.asarray(_manifold3d().triangulate(loops), dtype=np.int64)
+    turned = float(np.sqrt((turns(body.rotation) ** 2).sum(axis=1)).sum())
+    stations = 1 + max(1, int(np.ceil(turned * facets / (2 * np.pi))))
+    axis = resampled(body, stations)
+    local = flat * MILLIMETRE
+    points = placed(axis.position[:, None], axis.rotation[:, None], local[None]) / MILLIMETRE
+    n = len(flat)
+    starts = [0, *np.cumsum([len(loop) for loop in loops])[:-1]]
+    following = np.concatenate([np.roll(np.arange(len(c)), -1) + k for c, k in zip(loops, starts, strict=True)])
+    here = np.arange(n) + n * np.arange(stations - 1)[:, None]
+    there = following + n * np.arange(stations - 1)[:, None]
+    sides = [np.stack([here, there, there + n], axis=-1), np.stack([here, there + n, here + n], axis=-1)]
+    faces = np.concatenate([cap[:, ::-1], *(s.reshape(-1, 3) for s in sides), cap + n * (stations - 1)])
+    return Solid(name, points.reshape(-1, 3), faces, chamber=chamber)
+
+
+def _manifold3d() -> Any:
+    """Return the library that makes sections.
+
+    Raises
+    ------
+    InputError
+        Where it is not installed.
+    """
+    try:
+        import manifold3d
+    except ImportError:
+        raise missing_extra() from None
+    return manifold3d
+
+
+def missing_extra() -> InputError:
+    """Return the error of a library that the extra brings."""
+    return InputError("solids need trimesh and manifold3d, which are not installed: pip install 'softnlp[mesh]'")

@@ -1,0 +1,80 @@
+"""The flat panels of a run: numbers of its steps, one below the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.base.units import BAR
+from softnlp.figures.abscissa import STEP, Abscissa
+from softnlp.figures.style import GREY, WRONG, colour, plain, step_colours
+from softnlp.results import RunView
+from softnlp.statics.step import STABLE_FLAGS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+LEAST_SPAN = 1.0  # of a vertical axis [deg or mm]
+
+
+def new_panels(figure: Figure, rows: int) -> list[Axes]:
+    """Return panels at the right of a figure, one below the other, with one horizontal axis."""
+    panels: list[Axes] = []
+    top, bottom, gap = 0.865, 0.105, 0.055
+    height = (top - bottom - gap * (rows - 1)) / rows
+    for row in range(rows):
+        box = (0.645, top - (row + 1) * height - row * gap, 0.335, height)
+        panels.append(figure.add_axes(box, sharex=panels[0] if panels else None))
+    return panels
+
+
+def finish_panels(figure: Figure, panels: Sequence[Axes], view: RunView, x: Abscissa) -> None:
+    """Draw the pressures where they need a panel, the last one; label the lowest panel alone."""
+    from matplotlib.ticker import MaxNLocator
+
+    if x.with_pressures:
+        pressures(panels[-1], view, x)
+    for panel in panels[:-1]:
+        panel.set_xlabel("")
+        panel.tick_params(labelbottom=False)
+    if x.label == STEP:
+        panels[0].set_xlim(0.5, len(view.status) + 0.5)
+        panels[0].xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+    figure.align_ylabels(panels)
+
+
+def series(axes: Axes, view: RunView, x: Abscissa, y: Array, label: str, least_span: float = LEAST_SPAN) -> None:
+    """Draw one number of each step; steps without a solution are crosses at the foot, unstable ones hollow."""
+    plain(axes, x.label, label)
+    shades = step_colours(len(y))
+    axes.plot(x.values, y, color=GREY, linewidth=1.0, zorder=2)
+    faces = np.where((view.stable == STABLE_FLAGS["unstable"])[:, None], 1.0, shades)
+    size = float(np.clip(1000 / len(y), 5, 26))
+    axes.scatter(
+        x.values, y, s=size, c=faces, edgecolors=list(map(tuple, shades)), linewidths=1.2, zorder=3, label="steps"
+    )
+    failed = [k for k in range(len(y)) if k not in view.solved]
+    if failed:
+        foot, place = axes.get_xaxis_transform(), [0.05] * len(failed)
+        axes.plot(x.values[failed], place, "x", color=WRONG, markersize=6, transform=foot, label="no solution")
+    axes.ticklabel_format(useOffset=False)
+    known = y[np.isfinite(y)]
+    if known.size == 0:
+        axes.set_yticks([])
+    elif np.ptp(known) < least_span:
+        # Rounding errors about a constant are not worth a panel's height.
+        middle = (known.min() + known.max()) / 2
+        axes.set_ylim(middle - 0.55 * least_span, middle + 0.55 * least_span)
+
+
+def pressures(axes: Axes, view: RunView, x: Abscissa) -> None:
+    """Draw the pressure of each set."""
+    plain(axes, x.label, "pressure [bar]")
+    for k in range(view.pressure.shape[1]):
+        axes.plot(x.values, view.pressure[:, k] / BAR, color=colour(k), linewidth=1.5, marker=".", label=f"set {k + 1}")

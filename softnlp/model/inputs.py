@@ -1,0 +1,126 @@
+"""What a run was asked, as plain tables with unit suffixes, and back for figures; and what computed it."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from softnlp.base.units import BAR, MILLIMETRE, NEWTON_MILLIMETRE
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.conventions import Coefficients, Conventions
+from softnlp.model.gravity import gravity_words
+from softnlp.model.materials import Material
+from softnlp.model.robot import DIMENSIONS, Robot
+from softnlp.model.rod import Loads
+
+
+def tidy(value: float, scale: float = 1.0) -> float:
+    """Return an input in its file unit without the last-digit noise of the conversion: 0.3, not 0.30000000000000004."""
+    return float(f"{float(value) / scale:.14g}")
+
+
+def pressure_bar(pressure: Any) -> list[float]:
+    """Return pressures [Pa] in bar."""
+    return [tidy(p, BAR) for p in pressure]
+
+
+def robot_table(robot: Robot) -> dict[str, Any]:
+    """Return a robot as the `[robot]` table of a scenario with every dimension."""
+    table: dict[str, Any] = {"name": robot.name}
+    for dimension in DIMENSIONS:
+        value = getattr(robot, dimension.field)
+        table[dimension.file_key] = int(value) if dimension.scale is None else tidy(value, dimension.scale)
+    return table
+
+
+def robot_of_table(table: Mapping[str, Any]) -> Robot:
+    """Return the robot of a `robot_table`; KeyError where a dimension is missing."""
+    values: dict[str, Any] = {
+        d.field: int(table[d.file_key]) if d.scale is None else float(table[d.file_key]) * d.scale for d in DIMENSIONS
+    }
+    return Robot(name=str(table["name"]), **values)
+
+
+def material_table(material: Material) -> dict[str, Any]:
+    """Return a material as an inline `[material]` table of a scenario; stresses in MPa."""
+    constants = {c.file_key: tidy(material.constants[c.name], c.scale) for c in material.law.constants}
+    return {
+        "name": material.name,
+        "model": material.law.name,
+        "constants": constants,
+        "density_kg_m3": tidy(material.density),
+        "fitted_stretch": [tidy(limit) for limit in material.fitted_stretch],
+    }
+
+
+def coefficients_table(coefficients: Coefficients) -> dict[str, float]:
+    """Return the dimensionless coefficients by name."""
+    return {f.name: tidy(getattr(coefficients, f.name)) for f in fields(coefficients)}
+
+
+def contact_table(contact: ContactSettings) -> dict[str, Any]:
+    """Return the wall and the closure as the `[contact]` table of a scenario; what is left to the study is absent."""
+    table: dict[str, Any] = {"closure": contact.closure_name, "tip_cap_mm": tidy(contact.tip_cap, MILLIMETRE)}
+    if contact.wall_point is None or contact.wall_normal is None:
+        table["offset_mm"] = tidy(contact.offset, MILLIMETRE)
+    else:
+        table["wall_point_mm"] = [tidy(x, MILLIMETRE) for x in contact.wall_point]
+        table["wall_normal"] = [float(x) for x in contact.wall_normal]
+    weights = contact.weights
+    for key, weight, unit in (
+        ("weight_force_per_N", weights.force, 1.0),
+        ("weight_moment_per_Nmm", weights.moment, NEWTON_MILLIMETRE),
+        ("weight_length_per_mm", weights.length, MILLIMETRE),
+        ("weight_position_per_mm", weights.position, MILLIMETRE),
+    ):
+        if weight is not None:
+            table[key] = tidy(weight * unit)
+    return table
+
+
+def conventions_table(conventions: Conventions) -> dict[str, Any]:
+    """Return how ambiguous equations were read."""
+    table = asdict(conventions)
+    table["fibre_thickness_mm"] = tidy(table.pop("fibre_thickness"), MILLIMETRE)
+    return table
+
+
+def loads_table(loads: Loads) -> dict[str, Any]:
+    """Return the dead loads in the world frame, gravity in words too."""
+    return {
+        "tip_force_N": [tidy(f) for f in loads.tip_force],
+        "tip_moment_Nmm": [tidy(m, NEWTON_MILLIMETRE) for m in loads.tip_moment],
+        "gravity_m_per_s2": [tidy(g) for g in loads.gravity],
+        "gravity": gravity_words(loads.gravity),
+    }
+
+
+def loads_of_table(table: Mapping[str, Any]) -> Loads:
+    """Return the loads of a `loads_table`; KeyError where one is missing."""
+    return Loads(
+        tip_force=tuple(float(f) for f in table["tip_force_N"]),
+        tip_moment=tuple(float(m) * NEWTON_MILLIMETRE for m in table["tip_moment_Nmm"]),
+        gravity=tuple(float(g) for g in table["gravity_m_per_s2"]),
+    )
+
+
+def package_version(name: str = "softnlp") -> str:
+    """Return the installed version of a package, "unknown" for one that is not installed."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def versions() -> dict[str, str]:
+    """Return what computed the numbers: packages, Python, platform."""
+    packages = {name: package_version(name) for name in ("softnlp", "casadi", "numpy", "xarray")}
+    return {
+        "softnlp": packages.pop("softnlp"),
+        "python": platform.python_version(),
+        **packages,
+        "platform": platform.platform(),
+    }

@@ -1,0 +1,168 @@
+"""The Cosserat rod: Eqs. (2), (5), (8), (13), (17) as a field along s, and its tip balance, Eq. (9).
+
+The state is x = [p (3), R (9, column by column), n (3), m (3)]: position, rotation (columns are the body axes),
+internal force and moment, all in the world frame. Pure functions of numbers or symbols in any consistent system of
+units.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import casadi as ca
+
+from softnlp.model.gravity import gravity_named
+from softnlp.model.section import Section
+
+Vector = tuple[float, float, float]
+
+STATE_BLOCKS = {"position": slice(0, 3), "rotation": slice(3, 12), "force": slice(12, 15), "moment": slice(15, 18)}
+STATE_SIZE = 18
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """Dead loads in the world frame.
+
+    Attributes
+    ----------
+    tip_force
+        (3,) F_e [N].
+    tip_moment
+        (3,) M_e [N m].
+    gravity
+        (3,) acceleration g [m/s^2]; zeros switch it off. One of the words of a scenario, "standing" or "hanging" for
+        instance, becomes that of the earth. Raises `InputError` for another word.
+    """
+
+    tip_force: Any = (0.0, 0.0, 0.0)
+    tip_moment: Any = (0.0, 0.0, 0.0)
+    gravity: Any = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Take a word for gravity."""
+        if isinstance(self.gravity, str):
+            object.__setattr__(self, "gravity", gravity_named(self.gravity))
+
+
+class RodSection(NamedTuple):
+    """What the rod asks of its section at s, in one consistent system of units.
+
+    shear, axial, bending_x, bending_y, torsion : GA, EA, EI_x, EI_y, GJ. pressure_force : F_P.
+    pressure_moment_x, pressure_moment_y : sum d_i x P_i A_c e3. load_x, load_y, load_z : f_e, force per length, world
+    frame.
+    """
+
+    shear: Any
+    axial: Any
+    bending_x: Any
+    bending_y: Any
+    torsion: Any
+    pressure_force: Any
+    pressure_moment_x: Any
+    pressure_moment_y: Any
+    load_x: Any
+    load_y: Any
+    load_z: Any
+
+
+def rod_section(section: Section, density: Any, gravity: Any, length_unit: Any, force_unit: Any) -> RodSection:
+    """Return the section as the rod sees it, with lengths and forces divided by the given units [m, N].
+
+    The weight is f_e = rho A g per length of the stretched rod.
+    """
+    EI_x, EI_y = section.bending_stiffness
+    M_x, M_y = section.pressure_moment
+    moment_unit = force_unit * length_unit
+    f_e = [density * section.area * gravity[k] * length_unit / force_unit for k in range(3)]
+    return RodSection(
+        section.shear_stiffness / force_unit,
+        section.axial_stiffness / force_unit,
+        EI_x / (moment_unit * length_unit),
+        EI_y / (moment_unit * length_unit),
+        section.torsional_stiffness / (moment_unit * length_unit),
+        section.pressure_force / force_unit,
+        M_x / moment_unit,
+        M_y / moment_unit,
+        *f_e,
+    )
+
+
+def hat(a: Any) -> Any:
+    """Return the 3x3 matrix with hat(a) b = a x b."""
+    return ca.vertcat(
+        ca.horzcat(0, -a[2], a[1]),
+        ca.horzcat(a[2], 0, -a[0]),
+        ca.horzcat(-a[1], a[0], 0),
+    )
+
+
+def unpack(x: Any) -> tuple[Any, Any, Any, Any]:
+    """Split a state into p, R (3x3), n, m."""
+    return x[0:3], ca.reshape(x[3:12], 3, 3), x[12:15], x[15:18]
+
+
+def strains(x: Any, section: RodSection) -> tuple[Any, Any]:
+    """Return the linear strain v and the curvature u in the body frame, Eq. (5)."""
+    _, R, n, m = unpack(x)
+    n_b, m_b = R.T @ n, R.T @ m
+    v = ca.vertcat(
+        n_b[0] / section.shear, n_b[1] / section.shear, (n_b[2] - section.pressure_force) / section.axial + 1
+    )
+    u = ca.vertcat(m_b[0] / section.bending_x, m_b[1] / section.bending_y, m_b[2] / section.torsion)
+    return v, u
+
+
+def field(x: Any, section: RodSection) -> Any:
+    """Return dx/ds, Eqs. (2), (8), (13), for the stretched arc length s in 0..L.
+
+    The pressure term of the moment balance, sum P_i A_c [(v + u x d_i) x e3 + d_i x (u x e3)], is by the Jacobi
+    identity F_P v x e3 + u x (sum d_i x P_i A_c e3), so the rod needs two sums of its section and not every chamber.
+    """
+    _, R, n, _ = unpack(x)
+    v, u = strains(x, section)
+    e3 = ca.vertcat(0, 0, 1)
+    F_P = section.pressure_force
+    M_P = ca.vertcat(section.pressure_moment_x, section.pressure_moment_y, 0)
+    f_e = ca.vertcat(section.load_x, section.load_y, section.load_z)
+    dp = R @ v
+    dR = R @ hat(u)
+    dn = -f_e + F_P * (dR @ e3)
+    dm = -ca.cross(dp, n) + R @ (F_P * ca.cross(v, e3) + ca.cross(u, M_P))
+    return ca.vertcat(dp, ca.reshape(dR, 9, 1), dn, dm)
+
+
+def base_balance(x: Any) -> Any:
+    """Return the 12 clamped-base residuals: p = 0 and R = I."""
+    p, R, _, _ = unpack(x)
+    return ca.vertcat(p, ca.reshape(R - ca.DM.eye(3), 9, 1))
+
+
+def tip_balance(x: Any, section: RodSection, force: Any, moment: Any) -> Any:
+    """Return the 6 tip residuals n(L) - F_e - F_P R e3 and m(L) - M_e - R sum d_i x P_i A_c e3, Eq. (9)."""
+    _, R, n, m = unpack(x)
+    M_P = ca.vertcat(section.pressure_moment_x, section.pressure_moment_y, 0)
+    return ca.vertcat(n - force - section.pressure_force * R[:, 2], m - moment - R @ M_P)
+
+
+def arc_state(s: Any, section: RodSection) -> Any:
+    """Return the state at s of the rod without gravity or tip load: the circular arc of constant u, with v = e3.
+
+    Exact for `field` with no weight; written without division by the curvature, so that zero pressure is straight.
+    """
+    u_x = section.pressure_moment_x / section.bending_x
+    u_y = section.pressure_moment_y / section.bending_y
+    angle2 = (u_x**2 + u_y**2) * s**2
+    small = angle2 < 1e-8
+    safe2 = ca.if_else(small, 1.0, angle2)
+    angle = ca.sqrt(safe2)
+    sinc = ca.if_else(small, 1 - angle2 / 6, ca.sin(angle) / angle)
+    cosc = ca.if_else(small, 0.5 - angle2 / 24, (1 - ca.cos(angle)) / safe2)
+    sinc3 = ca.if_else(small, 1.0 / 6 - angle2 / 120, (1 - ca.sin(angle) / angle) / safe2)
+    K = hat(ca.vertcat(u_x, u_y, 0) * s)
+    R = ca.DM.eye(3) + sinc * K + cosc * (K @ K)
+    e3 = ca.vertcat(0, 0, 1)
+    p = s * (e3 + cosc * (K @ e3) + sinc3 * (K @ (K @ e3)))
+    M_P = ca.vertcat(section.pressure_moment_x, section.pressure_moment_y, 0)
+    return ca.vertcat(p, ca.reshape(R, 9, 1), section.pressure_force * R[:, 2], R @ M_P)

@@ -1,0 +1,1 @@
+"""Posing and solving: transcriptions, problems, engines and paths; it knows no robot."""

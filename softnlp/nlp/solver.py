@@ -1,0 +1,288 @@
+"""Solving a compiled problem: IPOPT, a certificate that does not take its word, and continuation."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Protocol, runtime_checkable
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.nlp.optimality import OPTIMAL, kkt_error
+from softnlp.nlp.problem import CompiledProblem
+
+Array = NDArray[np.float64]
+
+_LONGEST_SOLVE = 60.0  # seconds after which IPOPT is stopped
+_NEWTON_STEPS = 12
+_DIVERGED = 1e4  # scaled residual past which Newton steps are not worth following
+_LARGEST_FALLBACK = 8000  # unknowns up to which IPOPT is tried after Newton: MUMPS has taken minutes over more
+_SLACK = 100.0  # round-off may leave a residual this much above the tolerance asked of an engine
+
+
+@dataclass(frozen=True)
+class EquationResidual:
+    """One line of a certificate: the largest error of one equation, evaluated again after the solve.
+
+    Attributes
+    ----------
+    equation
+        Its name.
+    value
+        In `unit` [SI].
+    unit
+        Of the value.
+    scaled
+        The value over EI/L^2 (forces), EI/L (moments) or L (lengths) [1].
+    """
+
+    equation: str
+    value: float
+    unit: str
+    scaled: float
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A point x of a problem at fixed values p, and what is known of it.
+
+    residual : largest scaled violation of any equation or bound, evaluated again; inf when it is not a number.
+    kkt : error of the first-order conditions, evaluated again, see `softnlp.nlp.optimality.kkt_error`; 0 where
+    nothing is minimised. iterations : of every attempt that led here. engine_status : IPOPT's own word.
+    """
+
+    x: Array
+    p: Array
+    residual: float
+    iterations: int
+    engine_status: str
+    kkt: float = 0.0
+
+    def holds(self, tolerance: float) -> bool:
+        """Whether every equation and bound holds within the tolerance: feasible, which is not yet optimal."""
+        return self.residual <= tolerance
+
+    @property
+    def optimal(self) -> bool:
+        """Whether the point is feasible and the first-order conditions hold, both within `OPTIMAL`."""
+        return self.holds(OPTIMAL) and self.kkt <= OPTIMAL
+
+
+class LinearSolver(Protocol):
+    """Solves J(x, p) dx = -g where a problem's structure allows better than a sparse factorisation."""
+
+    def solve(self, x: Array, p: Array, g: Array) -> Array:
+        """Return dx; raises `numpy.linalg.LinAlgError` where J is singular."""
+        ...
+
+
+@runtime_checkable
+class ManySidedSolver(Protocol):
+    """A linear solver that takes many right sides for the cost of one factorisation or sweep."""
+
+    def solve_many(self, x: Array, p: Array, G: Array) -> Array:
+        """Return the columns dx for as many right sides G (n, r). Raises as `LinearSolver.solve`."""
+        ...
+
+
+class SparseSolver:
+    """Solves J dx = -g of any square problem by sparse LU factorisation."""
+
+    def __init__(self, problem: CompiledProblem) -> None:
+        self._problem = problem
+
+    def solve(self, x: Array, p: Array, g: Array) -> Array:
+        """Return dx. Raises `numpy.linalg.LinAlgError` where J is singular or not finite."""
+        return self.solve_many(x, p, g)
+
+    def solve_many(self, x: Array, p: Array, G: Array) -> Array:
+        """Return the columns dx for as many right sides G (n, r), of one factorisation. Raises as `solve`."""
+        from scipy.sparse import csc_matrix
+        from scipy.sparse.linalg import splu
+
+        J = self._problem.jacobian(x, p)
+        entries = np.asarray(J.nonzeros())
+        if not np.all(np.isfinite(entries)):
+            raise np.linalg.LinAlgError("the Jacobian is not finite")
+        try:
+            factors = splu(csc_matrix((entries, J.row(), J.colind()), shape=J.shape))
+        except RuntimeError as error:
+            raise np.linalg.LinAlgError(str(error)) from error
+        return np.asarray(factors.solve(-np.asarray(G, dtype=float)))
+
+
+class Engine:
+    """Newton's method where a structured linear solver is given, and IPOPT, on one compiled problem.
+
+    IPOPT is the reference: it solves what Newton does not, unless `newton_only` or too large for it in bounded time (no
+    limit reaches into one sparse factorisation). A square problem needs no Hessian: with a zero one IPOPT's step is
+    Newton's too. `moved` is how a step of Newton's is taken. Safe to share between threads: calls wait for each other.
+    """
+
+    def __init__(
+        self,
+        problem: CompiledProblem,
+        *,
+        linear: LinearSolver | None = None,
+        newton_only: bool = False,
+        max_iterations: int | None = None,
+        tolerance: float = 1e-11,
+        moved: Callable[[Array, Array], Array] = np.add,
+    ) -> None:
+        self.problem = problem
+        self.linear = linear
+        self._moved = moved
+        self.newton_only = newton_only
+        self.tolerance = tolerance
+        self._lock = threading.Lock()
+        # Newton at given values either converges soon or has left the basin of the first guess; with quantities free,
+        # 70 iterations are not rare.
+        self._max_iterations = max_iterations or (15 if problem.is_square and not problem.free else 300)
+
+    @cached_property
+    def _solver(self) -> ca.Function:
+        nlp = self.problem.nlp
+        options: dict[str, Any] = {
+            "print_time": False,
+            "calc_lam_p": False,
+            "calc_multipliers": False,
+            "show_eval_warnings": False,
+            "ipopt": {
+                "print_level": 0,
+                "sb": "yes",
+                "tol": self.tolerance,
+                "constr_viol_tol": self.tolerance,
+                "acceptable_iter": 0,
+                "honor_original_bounds": "yes",  # IPOPT relaxes bounds by 1e-8 of a scaled unknown while it solves
+                "nlp_scaling_method": "none",
+                "max_iter": self._max_iterations,
+                "max_wall_time": _LONGEST_SOLVE,
+            },
+        }
+        if self.problem.is_square:
+            x, p = nlp["x"], nlp["p"]
+            n, m = x.numel(), nlp["g"].numel()
+            symbols = [ca.MX.sym("x", n), ca.MX.sym("p", p.numel()), ca.MX.sym("lam_f"), ca.MX.sym("lam_g", m)]
+            options["hess_lag"] = ca.Function("zero_hessian", symbols, [ca.MX(n, n)])
+        return ca.nlpsol("solver", "ipopt", dict(nlp), options)
+
+    def solve(self, p: Array, x_start: Array) -> Solution:
+        """Solve at fixed values p from a first guess; judge the result by the residual, evaluated again."""
+        x_start = np.asarray(x_start, dtype=float)
+        spent = 0
+        if self.linear is not None:
+            quick = self._newton(self.linear, p, x_start)
+            if self.newton_only or quick.holds(self.tolerance * _SLACK):
+                return quick
+            if x_start.size > _LARGEST_FALLBACK:
+                return quick
+            spent = quick.iterations
+        with self._lock:
+            start_residual = violation(self.problem, x_start, p)
+        if self.problem.is_square and not start_residual < _DIVERGED:
+            # A sparse factorisation of such numbers may take minutes and leads nowhere.
+            return Solution(x_start, p, start_residual, spent, "the first guess is out of all proportion")
+        reference = self._ipopt(p, x_start)
+        return replace(reference, iterations=reference.iterations + spent)
+
+    def _newton(self, linear: LinearSolver, p: Array, x_start: Array) -> Solution:
+        """Take full Newton steps while they help."""
+        problem = self.problem
+        x, best, worst_allowed = x_start, np.inf, _DIVERGED
+        with self._lock:
+            g = np.asarray(problem.residual(x, p)).ravel()
+            size = _size(g)
+            if not size < _DIVERGED:
+                return Solution(x, p, size, 0, "the first guess is out of all proportion")
+            for k in range(_NEWTON_STEPS):
+                if size <= self.tolerance:
+                    return Solution(x, p, size, k, "Newton converged")
+                try:
+                    trial = self._moved(x, linear.solve(x, p, g))
+                except np.linalg.LinAlgError:
+                    return Solution(x, p, size, k, "Newton met a singular Jacobian")
+                g = np.asarray(problem.residual(trial, p)).ravel()
+                new_size = _size(g)
+                if not new_size < worst_allowed:
+                    return Solution(x, p, size, k, "Newton diverged")
+                if new_size >= best and best < self.tolerance * _SLACK:
+                    return Solution(x, p, size, k, "Newton converged to round-off")
+                x, size, best = trial, new_size, min(best, new_size)
+        return Solution(x, p, size, _NEWTON_STEPS, "Newton reached its iteration limit")
+
+    def _ipopt(self, p: Array, x_start: Array) -> Solution:
+        problem = self.problem
+        with self._lock:
+            try:
+                result = self._solver(
+                    x0=x_start,
+                    p=p,
+                    lbx=problem.lower_x,
+                    ubx=problem.upper_x,
+                    lbg=problem.lower_g,
+                    ubg=problem.upper_g,
+                )
+            except RuntimeError as error:  # the engine gave up on a number that is not finite
+                return Solution(x_start, p, float("inf"), 0, str(error).splitlines()[-1])
+            stats = self._solver.stats()
+        x, *lam = (np.asarray(result[key], dtype=float).ravel() for key in ("x", "lam_x", "lam_g"))
+        kkt = kkt_error(problem.slopes, problem.bounds, p, x_start, x, *lam) if problem.has_objective else 0.0
+        return Solution(x, p, violation(problem, x, p), int(stats["iter_count"]), str(stats["return_status"]), kkt)
+
+
+def _size(g: Array) -> float:
+    """Return the largest entry of a residual; inf where it is not a number."""
+    worst = float(np.max(np.abs(g), initial=0.0))
+    return worst if np.isfinite(worst) else float("inf")
+
+
+def violation(problem: CompiledProblem, x: Array, p: Array) -> float:
+    """Return the largest scaled violation of any equation, constraint or bound at x; inf when it is not a number."""
+    g = np.asarray(problem.residual(x, p)).ravel()
+    excess = np.concatenate([problem.lower_g - g, g - problem.upper_g, problem.lower_x - x, x - problem.upper_x])
+    worst = float(np.max(excess, initial=0.0))
+    return worst if np.all(np.isfinite(g)) and np.isfinite(worst) else float("inf")
+
+
+def certificate(problem: CompiledProblem, solution: Solution) -> tuple[EquationResidual, ...]:
+    """Return the largest residual of every named equation, in its unit and scaled."""
+    g = np.asarray(problem.residual(solution.x, solution.p)).ravel()
+    off = np.maximum(np.maximum(problem.lower_g - g, g - problem.upper_g), 0.0)
+    scales = np.asarray(problem.si_scales(solution.x, solution.p)).ravel()
+    lines = []
+    for equation, scale in zip(problem.equations, scales, strict=True):
+        worst = float(np.max(off[equation.rows]))
+        lines.append(EquationResidual(equation.name, worst * float(scale), equation.unit, worst))
+    return tuple(lines)
+
+
+def outputs(problem: CompiledProblem, solution: Solution) -> dict[str, Array]:
+    """Return the outputs of the cases at a solution, SI, world frame; columns are flat, matrices keep their shape."""
+    values = problem.outputs(x=solution.x, p=solution.p)
+    return {
+        name: np.asarray(value).ravel() if 1 in value.shape else np.asarray(value) for name, value in values.items()
+    }
+
+
+def discretisation_correction(
+    problem: CompiledProblem, solution: Solution, linear: LinearSolver | None = None
+) -> Array:
+    """Return the first-order change of x from halving every step: one Newton step on the fine equations.
+
+    The fine equations reuse the coarse Jacobian, which differs from theirs by the discretisation error itself. Where
+    the problem is not square, the free quantities are held.
+    """
+    fine = np.asarray(problem.fine_residual(solution.x, solution.p)).ravel()
+    if linear is not None:
+        return linear.solve(solution.x, solution.p, fine)
+    J = problem.jacobian(solution.x, solution.p)
+    n = J.size2()
+    skip = 0 if problem.is_square else problem.free_size
+    size = n - skip
+    J = J[:size, skip:]
+    step = np.asarray(ca.solve(J, ca.DM(-fine[:size]), "qr")).ravel()
+    return np.concatenate([np.zeros(skip), step])

@@ -1,0 +1,173 @@
+"""Check the tables of a scenario against their schema, and say what does not fit in one line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from softnlp.base.errors import InputError, nearest
+from softnlp.base.ranges import numbers_outside
+from softnlp.base.reading import choices, did_you_mean, one_line, shown
+from softnlp.scenario.schema import BlockedForceFile, ForwardFile, ScenarioFile
+from softnlp.scenario.schema_design import DesignFile
+from softnlp.scenario.schema_identify import IdentifyFile
+from softnlp.scenario.schema_inverse import InverseFile
+from softnlp.scenario.schema_workspace import WorkspaceFile
+
+SCHEMAS: Mapping[str, type[ScenarioFile]] = {
+    "forward": ForwardFile,
+    "blocked-force": BlockedForceFile,
+    "inverse": InverseFile,
+    "workspace": WorkspaceFile,
+    "identify": IdentifyFile,
+    "design": DesignFile,
+}
+"""The studies that this version runs, and the file of each."""
+
+_TABLES = {name for schema in SCHEMAS.values() for name in schema.model_fields} - {"title", "study"}
+
+
+def parse(data: Mapping[str, Any]) -> ScenarioFile:
+    """Return the tables of a scenario, checked one by one.
+
+    Raises
+    ------
+    InputError
+        For the first key that does not fit, with the number of the others.
+    """
+    schema = SCHEMAS[_study(data)]
+    details, file = [], None
+    try:
+        file = schema.model_validate(data)
+    except ValidationError as error:
+        details = error.errors(include_url=False)
+    wrong = [detail["loc"] for detail in details]
+    for place, number, text in numbers_outside(data):
+        if not any(loc[: len(place)] == place[: len(loc)] for loc in wrong):
+            details.append({"type": "own", "loc": place, "msg": text, "input": number, "ctx": {"text": text}})
+    if file is None or details:
+        raise first_of(list(_errors(schema, details)))
+    return file
+
+
+def first_of(errors: list[InputError]) -> InputError:
+    """Return the first error, saying how many more there are."""
+    first, more = errors[0], len(errors) - 1
+    if not more:
+        return first
+    return type(first)(f"{first.message} (and {more} more)", source=first.source, table=first.table, key=first.key)
+
+
+def _study(data: Mapping[str, Any]) -> str:
+    """Return the study, when it is one that this version runs."""
+    study = data.get("study")
+    if study is None:
+        raise InputError(f"missing; expected {choices(SCHEMAS)}", key="study")
+    if not isinstance(study, str) or study not in SCHEMAS:
+        hint = did_you_mean(study, SCHEMAS) if isinstance(study, str) else ""
+        raise InputError(f"expected {choices(SCHEMAS)}, got {shown(study)}{hint}", key="study")
+    return study
+
+
+def _errors(schema: type[ScenarioFile], details: list[ErrorDetails]) -> Iterator[InputError]:
+    """Yield an error of ours for each of pydantic's: unknown keys first, they explain missing ones."""
+    meant = set()
+    for detail in (d for d in details if d["type"] == "extra_forbidden"):
+        *place, key = detail["loc"]
+        if not place and key in _TABLES:
+            yield _placed(detail, f"this table is not used by study {_study_of(schema)!r}; remove it")
+            continue
+        known = _keys(schema, tuple(place))
+        suggestion = nearest(str(key), known)
+        meant |= {(*place, name) for name in known if suggestion == f"; did you mean {name!r}?"}
+        is_table = not place and isinstance(detail["input"], dict)
+        yield _placed(detail, f"unknown {'table' if is_table else 'key'}{suggestion}")
+    for detail in (d for d in details if d["type"] != "extra_forbidden"):
+        if detail["type"] != "missing" or detail["loc"] not in meant:
+            yield _placed(detail, _message(schema, detail))
+
+
+def _study_of(schema: type[ScenarioFile]) -> str:
+    """Return the study of a schema."""
+    return next(study for study, known in SCHEMAS.items() if known is schema)
+
+
+def _message(schema: type[ScenarioFile], detail: ErrorDetails) -> str:
+    """Say what was expected and what was found."""
+    kind, value, limits = detail["type"], detail["input"], detail.get("ctx", {})
+    if kind == "own":
+        return str(limits["text"])
+    if kind == "missing":
+        expected = _field(schema, detail["loc"]).description
+        return f"missing; expected {expected}" if expected else "missing"
+    if kind == "literal_error":
+        known = get_args(_field(schema, detail["loc"]).annotation)
+        hint = did_you_mean(value, known) if isinstance(value, str) else ""
+        return f"expected {choices(known)}, got {shown(value)}{hint}"
+    if kind == "too_short":
+        return f"expected a list of at least {limits['min_length']}, got {shown(value)}"
+    if kind == "too_long":
+        return f"expected a list of at most {limits['max_length']}, got {shown(value)}"
+    if kind == "string_too_long":
+        return f"expected at most {limits['max_length']} characters, got {len(value)}"
+    if kind in _LIMITS:
+        return f"expected a number {_LIMITS[kind]} {next(iter(limits.values())):.10g}, got {shown(value)}"
+    return f"expected {_KINDS.get(kind, one_line(detail['msg']))}, got {shown(value)}"
+
+
+_LIMITS = {
+    "greater_than": "above",
+    "greater_than_equal": "of at least",
+    "less_than": "below",
+    "less_than_equal": "of at most",
+}
+_KINDS = {
+    "float_type": "a number",
+    "finite_number": "a finite number",
+    "int_type": "a whole number",
+    "bool_type": "true or false",
+    "string_type": "text in quotes",
+    "list_type": "a list",
+    "dict_type": "a table",
+    "model_type": "a table",
+}
+
+
+def _placed(detail: ErrorDetails, message: str) -> InputError:
+    """Name the table and the key: ("pressure", "sequence_bar", 2, 0) is row 3, column 1."""
+    *path, last = [part for part in detail["loc"] if isinstance(part, str)]
+    numbers = [part + 1 for part in detail["loc"] if isinstance(part, int)]
+    where = [f"{word} {n}" for word, n in zip(("row", "column"), numbers, strict=False)]
+    if len(numbers) == 1 and last != "sequence_bar":
+        where = [f"item {numbers[0]}"]
+    message = f"{' '.join(where)}: {message}" if where else message
+    whole_table = not path and (last in _TABLES or isinstance(detail["input"], dict))
+    if whole_table:
+        return InputError(message, table=last)
+    table, *keys = [*path, last] if path else ["", last]
+    return InputError(message, table=table or None, key=".".join(keys))
+
+
+def _field(schema: type[BaseModel], loc: tuple[int | str, ...]) -> Any:
+    """Return pydantic's field at a place of the file."""
+    *path, key = [part for part in loc if isinstance(part, str)]
+    return _model(schema, tuple(path)).model_fields[key]
+
+
+def _keys(schema: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
+    """Return the keys that a table may hold."""
+    return list(_model(schema, loc).model_fields)
+
+
+def _model(schema: type[BaseModel], loc: tuple[int | str, ...]) -> type[BaseModel]:
+    """Return the table at a place of the file."""
+    for part in loc:
+        if part not in schema.model_fields:
+            continue  # a name that a person gave, as in [robots.NAME]
+        annotation = schema.model_fields[str(part)].annotation
+        candidates = (annotation, *get_args(annotation))
+        schema = next(a for a in candidates if isinstance(a, type) and issubclass(a, BaseModel))
+    return schema

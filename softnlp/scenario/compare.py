@@ -1,0 +1,285 @@
+"""From a scenario and a CSV file of measurements to a comparison: what is simulated, and with which variants."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.base.csv_columns import TIME_COLUMN, Columns, read_columns
+from softnlp.base.errors import InputError, listed, nearest
+from softnlp.base.ranges import noise_note
+from softnlp.base.reading import choices, read_text, shown
+from softnlp.base.units import DEGREE, MILLIMETRE
+from softnlp.model.contact_settings import CLOSURES, ContactSettings, ContactTask
+from softnlp.model.conventions import CONVENTIONS, Coefficients, Conventions
+from softnlp.model.materials import Material, load_materials
+from softnlp.model.robot import Robot
+from softnlp.scenario.measured_rows import SCALARS, TIP_COLUMNS, RobotRows, rows_by_robot
+from softnlp.scenario.read import Scenario
+from softnlp.studies.compare import SHAPES, compare
+from softnlp.studies.comparison import Comparison
+from softnlp.studies.measurements import Measurements
+from softnlp.studies.variants import NAMED, OWN, Variant, every_variant, named_coefficients
+from softnlp.sweep.task import WorkspaceTask
+
+Array = NDArray[np.float64]
+
+STUDIES = ("forward", "blocked-force", "workspace")
+TILT_COLUMN, BACKBONE_COLUMN = "tilt_deg", "backbone_length_mm"
+_FORCE_COLUMN = SCALARS["blocked_force"][0]
+MEASURED_COLUMNS = (*TIP_COLUMNS, *(name for name, _ in SCALARS.values()), TILT_COLUMN, BACKBONE_COLUMN)
+ALIASES: Mapping[str, str] = {
+    **{f"tip_{name}": name for name in TIP_COLUMNS},
+    **{f"tip_position_{name}": name for name in TIP_COLUMNS},
+    "bending_deg": "bending_angle_deg",
+    "tip_tilt_deg": TILT_COLUMN,
+    "force_N": _FORCE_COLUMN,
+}
+"""Other names of columns, as results and people spell them."""
+ALL = "all"
+_NEAR = 0.85
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the caller names; nothing is what the scenario says. shape : of poses, free or blocked."""
+
+    laws: tuple[str, ...] = ()
+    coefficients: tuple[str, ...] = ()
+    conventions: tuple[str, ...] = ()
+    closures: tuple[str, ...] = ()
+    shape: str = "free"
+
+
+@dataclass(frozen=True, eq=False)
+class CompareTask:
+    """A comparison that can be run.
+
+    path, text : of the file. columns : of it, under the names that this package has for them; header : under its own.
+    rows : of each robot, as `measurements`. time : (rows of the file,) [s], nan where there is none. notes : what is
+    not compared, and why. warnings : of readings that count as 0.
+    """
+
+    scenario: Scenario
+    path: Path
+    text: str
+    columns: Columns
+    header: tuple[str, ...]
+    rows: tuple[RobotRows, ...]
+    measurements: tuple[Measurements, ...]
+    variants: tuple[Variant, ...]
+    shape: str
+    time: Array
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def compare_task(scenario: Scenario, path: str | PathLike[str], asked: Asked = Asked()) -> CompareTask:
+    """Return what is to be compared.
+
+    Raises
+    ------
+    InputError
+        For a study without steps at pressures, a file that does not fit, an unknown name.
+    """
+    try:
+        return _task(scenario, path, asked)
+    except InputError as error:
+        # what reads columns speaks of a scenario's key; here the file is an argument
+        raise (InputError(error.message) if error.key == "file" else error) from None
+
+
+def _task(scenario: Scenario, path: str | PathLike[str], asked: Asked) -> CompareTask:
+    _require_study(scenario)
+    if asked.shape not in SHAPES:
+        raise InputError(f"expected {choices(SHAPES)}, got {shown(asked.shape)}", key="--shape")
+    file = read_columns(Path(), str(path))
+    text = read_text(Path(path))
+    columns = named_columns(file)
+    notes = list(_notes(columns, scenario))
+    compared = [name for name in MEASURED_COLUMNS if name in columns]
+    if scenario.contact is None and _FORCE_COLUMN in compared:
+        compared.remove(_FORCE_COLUMN)
+    if not compared:
+        known = ", ".join(MEASURED_COLUMNS)
+        why = f" ({notes[0]})" if notes else ""
+        raise InputError(
+            f"expected a column that study {scenario.study!r} can be compared with, of {known}; it has "
+            f"{listed(columns.header)}{why}",
+            source=columns.file,
+        )
+    rows, measurements = _measured(scenario, columns)
+    against_wall = scenario.contact is not None and (
+        asked.shape == "blocked" or any(np.isfinite(m.blocked_force).any() for m in measurements)
+    )
+    if asked.shape == "blocked" and scenario.contact is None:
+        raise InputError(f"expected a wall; study {scenario.study!r} of {scenario.path} has none", key="--shape")
+    if asked.closures and not against_wall:
+        raise InputError("expected only where blocked forces are compared", key="--closure")
+    if (
+        against_wall
+        and asked.shape == "free"
+        and any(name in compared for name in MEASURED_COLUMNS if name != _FORCE_COLUMN)
+    ):
+        notes.append("poses are compared with those of the free robot; --shape blocked takes the blocked ones")
+    return CompareTask(
+        scenario=scenario,
+        path=Path(path),
+        text=text,
+        columns=columns,
+        header=file.header,
+        rows=rows,
+        measurements=measurements,
+        variants=_variants(scenario, asked, against_wall),
+        shape=asked.shape,
+        time=columns.numbers(TIME_COLUMN, blank=True),
+        notes=tuple(notes),
+        warnings=noise_note(np.concatenate([of_robot.readings().ravel() for of_robot in rows])),
+    )
+
+
+def run_compare(task: CompareTask, progress: Callable[[int, int], None] | None = None) -> Comparison:
+    """Simulate what was measured; `progress` is called with how many solves are done and how many there are."""
+    asked = task.scenario
+    return compare(
+        task.measurements,
+        task.variants,
+        contact=asked.contact or ContactSettings(),
+        loads=asked.loads,
+        numerics=asked.numerics,
+        shape="blocked" if task.shape == "blocked" else "free",
+        together=asked.study == "workspace",
+        progress=progress,
+    )
+
+
+def named_columns(columns: Columns) -> Columns:
+    """Return a file whose columns have the names of this package in place of `ALIASES`."""
+    header = [ALIASES.get(name, name) for name in columns.header]
+    for name in header:
+        if header.count(name) > 1 and name in MEASURED_COLUMNS:
+            both = [old for old, new in zip(columns.header, header, strict=True) if new == name]
+            raise InputError(f"expected {name!r} once, got {' and '.join(both)}", source=columns.file)
+    return replace(columns, header=tuple(header))
+
+
+def _require_study(scenario: Scenario) -> None:
+    """Refuse a scenario that does not say how a pose at a pressure is solved."""
+    source = str(scenario.path)
+    if scenario.study not in STUDIES:
+        raise InputError(f"expected {choices(STUDIES)}, got {scenario.study!r}", source=source, key="study")
+    task = scenario.task
+    if isinstance(task, WorkspaceTask) and task.vary:
+        raise InputError(
+            "expected none: a measured row is of one robot under one load", source=source, table="workspace", key="vary"
+        )
+    if isinstance(task, ContactTask):
+        several = {"offsets_mm": task.offsets, "target_force_N": task.target_force}
+        key = next((key for key, value in several.items() if value is not None), None)
+        if task.constrained or key:
+            raise InputError(
+                "expected the force at each pressure to compare with", source=source, table="contact", key=key or "mode"
+            )
+
+
+def _notes(columns: Columns, scenario: Scenario) -> list[str]:
+    """Say what the file has that is not compared."""
+    found = []
+    if scenario.contact is None and _FORCE_COLUMN in columns:
+        found.append(f"{_FORCE_COLUMN} is not compared: study {scenario.study!r} of {scenario.path} has no wall")
+    for name in columns.header:
+        if name not in (*MEASURED_COLUMNS, *ALIASES):
+            wanted = [known for known in MEASURED_COLUMNS if known not in columns]
+            if near := get_close_matches(name, wanted, n=1, cutoff=_NEAR):
+                found.append(f"column {shown(name)} is not compared; did you mean {near[0]!r}?")
+    return found
+
+
+def _measured(scenario: Scenario, columns: Columns) -> tuple[tuple[RobotRows, ...], tuple[Measurements, ...]]:
+    """Return the rows of each robot and what was measured of it."""
+    own: dict[str, Robot] = {scenario.robot.name: scenario.robot}
+    rows = tuple(rows_by_robot([columns], own, lambda _, row: scenario.robot))
+    measurements = []
+    for of_robot in rows:
+        seen = of_robot.scalars()
+        if SCALARS["elongation"][0] not in columns:
+            backbone = of_robot.column(BACKBONE_COLUMN) * MILLIMETRE
+            seen["elongation"] = backbone - float(of_robot.robot.length)
+        if scenario.contact is None:
+            seen["blocked_force"] = np.full(len(of_robot.places), np.nan)
+        tip, tilt = of_robot.tip_position(), of_robot.column(TILT_COLUMN) * DEGREE
+        measurements.append(
+            Measurements(
+                of_robot.robot,
+                of_robot.pressure(),
+                tip_position=tip,
+                bending_angle=seen["bending_angle"],
+                elongation=seen["elongation"],
+                blocked_force=seen["blocked_force"],
+                tilt=tilt,
+                label=of_robot.label,
+            )
+        )
+    kept = [k for k, m in enumerate(measurements) if _has_numbers(m)]
+    if not kept:
+        raise InputError("expected at least one row with something measured, got blank cells", source=columns.file)
+    return tuple(rows[k] for k in kept), tuple(measurements[k] for k in kept)
+
+
+def _has_numbers(m: Measurements) -> bool:
+    parts = (m.tip_position, m.bending_angle, m.elongation, m.tilt, m.blocked_force)
+    return any(np.isfinite(part).any() for part in parts)
+
+
+def _variants(scenario: Scenario, asked: Asked, against_wall: bool) -> tuple[Variant, ...]:
+    contact = scenario.contact or ContactSettings()
+    closures: Sequence[str | None] = [_known(name, CLOSURES, "--closure") for name in dict.fromkeys(asked.closures)]
+    conventions = [_conventions(name) for name in dict.fromkeys(asked.conventions)] or [scenario.conventions]
+    return every_variant(
+        _materials(scenario, asked.laws),
+        _coefficients(scenario.coefficients, asked.coefficients),
+        conventions,
+        (closures or [contact.closure_name]) if against_wall else [None],
+    )
+
+
+def _conventions(name: str) -> Conventions:
+    return CONVENTIONS[_known(name.replace("-", "_"), CONVENTIONS, "--conventions")]
+
+
+def _coefficients(given: Coefficients, names: Sequence[str]) -> dict[str, Coefficients]:
+    """Return the coefficients that are named, or those of the scenario under the name that they have."""
+    if names:
+        known = [_known(name, (*NAMED, OWN), "--coefficients") for name in dict.fromkeys(names)]
+        return {name: given if name == OWN else named_coefficients(name, given) for name in known}
+    named = (name for name in NAMED if vars(named_coefficients(name, given)) == vars(given))
+    return {next(named, OWN): given}
+
+
+def _materials(scenario: Scenario, names: Sequence[str]) -> tuple[Material, ...]:
+    """Return the scenario's silicone with each law that is named; "all" are those that its constants are known of."""
+    own = scenario.material
+    if not names:
+        return (own,)
+    table = tomllib.loads(scenario.text)["material"]
+    known: dict[str, Material] = {own.law.name: own}
+    if "constants" not in table and "formula" not in table:
+        file = scenario.path.parent / table["file"] if "file" in table else None
+        models = load_materials(file)[own.name].models
+        known = {law: replace(found, density=own.density) for law, found in models.items()} | known
+        known = {law: known[law] for law in models}
+    wanted = [law for name in names for law in (known if name == ALL else (name,))]
+    return tuple(known[_known(law, known, "--law")] for law in dict.fromkeys(wanted))
+
+
+def _known(name: str, names: Mapping[str, object] | Sequence[str], key: str) -> str:
+    if name not in names:
+        raise InputError(f"expected {choices(names)}, got {shown(name)}{nearest(name, names)}", key=key)
+    return name

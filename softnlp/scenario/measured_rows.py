@@ -1,0 +1,112 @@
+"""Rows of CSV files with what was measured of robots: which robot each row is of, its pressures, its numbers in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.base.csv_columns import Columns
+from softnlp.base.errors import nearest
+from softnlp.base.ranges import PRESSURE, without_noise
+from softnlp.base.reading import one_line, shown
+from softnlp.base.units import BAR, DEGREE, MILLIMETRE
+from softnlp.model.robot import ROBOTS, Robot
+
+Array = NDArray[np.float64]
+
+TIP_COLUMNS = ("x_mm", "y_mm", "z_mm")
+SCALARS: Mapping[str, tuple[str, float]] = {
+    "bending_angle": ("bending_angle_deg", DEGREE),
+    "elongation": ("elongation_mm", MILLIMETRE),
+    "blocked_force": ("blocked_force_N", 1.0),
+}
+"""The column of each number that is measured beside the tip, and its unit there."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotRows:
+    """The rows of one robot, which may stand in several files.
+
+    label : the cell of the column robot, else the robot's name. places : the file of each row and its place there.
+    """
+
+    robot: Robot
+    label: str
+    places: tuple[tuple[Columns, int], ...]
+
+    def column(self, name: str) -> Array:
+        """Return a column as numbers (rows,), nan where a cell is blank or a file has no such column.
+
+        Raises `InputError` for a cell that is not a finite number.
+        """
+        kept: dict[int, Array] = {}
+        for columns, _ in self.places:
+            if id(columns) not in kept:
+                kept[id(columns)] = columns.numbers(name, blank=True)
+        return np.array([kept[id(columns)][k] for columns, k in self.places])
+
+    def pressure(self) -> Array:
+        """Return the pressures (rows, sets) [Pa], noise below 0 taken as 0; raises `InputError` as `readings`."""
+        return without_noise(self.readings()) * BAR
+
+    def readings(self) -> Array:
+        """Return the pressures (rows, sets) [bar] as they stand in the files.
+
+        Raises `InputError` for one that is missing or out of range, and for one in a set that the robot does not have.
+        """
+        found = []
+        for k in range(self.robot.chamber_sets):
+            name = f"p{k + 1}_bar"
+            values = self.column(name)
+            for row in np.flatnonzero(np.isnan(values))[:1]:
+                columns, place = self.places[row]
+                expected = f"expected a pressure from {PRESSURE.low:g} to {PRESSURE.high:g} bar"
+                raise columns.wrong(place, name, f"{expected}, got nothing{PRESSURE.hint}")
+            found.append(values)
+        self._refuse_more_sets()
+        return np.column_stack(found)
+
+    def _refuse_more_sets(self) -> None:
+        sets = self.robot.chamber_sets
+        for name in dict.fromkeys(name for columns, _ in self.places for name in columns.header):
+            number = name.removeprefix("p").removesuffix("_bar")
+            if name == f"p{number}_bar" and number.isdecimal() and int(number) > sets:
+                values = self.column(name)
+                for row in np.flatnonzero(np.isfinite(values) & (values != 0))[:1]:
+                    columns, place = self.places[row]
+                    raise columns.wrong(place, name, f"expected 0 or nothing: {self.label} has {sets} sets")
+
+    def tip_position(self) -> Array:
+        """Return the tips (rows, 3) [m]."""
+        return np.column_stack([self.column(name) for name in TIP_COLUMNS]) * MILLIMETRE
+
+    def scalars(self) -> dict[str, Array]:
+        """Return each of `SCALARS` (rows,), SI."""
+        return {key: self.column(name) * unit for key, (name, unit) in SCALARS.items()}
+
+
+def rows_by_robot(
+    tables: Sequence[Columns], own: Mapping[str, Robot], unnamed: Callable[[Columns, int], Robot]
+) -> list[RobotRows]:
+    """Return the rows of each robot, in the order in which the robots come first.
+
+    own : robots by the name that the column robot has for them, before those of the library. unnamed : gives the robot
+    of a row without a name, or raises.
+    """
+    found: dict[tuple[str, int], tuple[Robot, list[tuple[Columns, int]]]] = {}
+    for columns in tables:
+        for k, name in enumerate(columns.text("robot")):
+            robot = _named(name, own, columns, k) if name else unnamed(columns, k)
+            found.setdefault((name or robot.name, id(robot)), (robot, []))[1].append((columns, k))
+    return [RobotRows(robot, one_line(label), tuple(places)) for (label, _), (robot, places) in found.items()]
+
+
+def _named(name: str, own: Mapping[str, Robot], columns: Columns, row: int) -> Robot:
+    known = {**ROBOTS, **own}
+    if name in known:
+        return known[name]
+    message = f"expected a robot of the scenario or of the library, got {shown(name)}{nearest(name, known)}"
+    raise columns.wrong(row, "robot", message)

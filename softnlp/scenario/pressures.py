@@ -1,0 +1,173 @@
+"""Pressures of a scenario, step by step: a list, a ramp or a CSV file."""
+
+from __future__ import annotations
+
+from array import array
+from math import isfinite
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.base.csv_columns import TIME_COLUMN, csv_rows
+from softnlp.base.errors import InputError
+from softnlp.base.ranges import READING, TIME, noise_note, without_noise
+from softnlp.base.reading import LONGEST_NAME, did_you_mean, one_line, read_text, shown
+from softnlp.base.units import BAR
+from softnlp.scenario.schema import PressureTable, RampTable
+
+Array = NDArray[np.float64]
+
+
+class PressurePath(NamedTuple):
+    """pressures : (steps, sets) [Pa]. times : (steps,) [s], or None when the source has none. notes : on readings."""
+
+    pressures: Array
+    times: Array | None
+    notes: tuple[str, ...] = ()
+
+
+def pressure_path(table: PressureTable, sets: int, folder: Path) -> PressurePath:
+    """Return the pressures of every step.
+
+    Parameters
+    ----------
+    table : [pressure] of the scenario.
+    sets : chamber sets of the robot, one column each.
+    folder : where a relative `file` is looked for.
+
+    Raises
+    ------
+    InputError
+        With the key (no table, no source), when not exactly one source is given or it does not fit the robot.
+    """
+    given = [key for key in PressureTable.model_fields if getattr(table, key) is not None]
+    if len(given) != 1:
+        raise InputError(
+            f"expected exactly one of {', '.join(PressureTable.model_fields)}, got {' and '.join(given) or 'none'}",
+            key=given[1] if given else None,
+        )
+    if table.sequence_bar is not None:
+        return _path(_sequence(table.sequence_bar, sets))
+    if table.ramp is not None:
+        return PressurePath(_ramp(table.ramp, sets), None)
+    assert table.file is not None
+    try:
+        return _csv(read_text(folder / table.file), sets)
+    except InputError as error:
+        raise InputError(f"{one_line(table.file, LONGEST_NAME)}: {error.message}", key="file") from None
+
+
+def _path(readings: Array, times: Array | None = None) -> PressurePath:
+    """Return the path of readings [bar], noise below 0 taken as 0."""
+    return PressurePath(without_noise(readings) * BAR, times, noise_note(readings))
+
+
+def _sequence(rows: list[list[float]], sets: int) -> Array:
+    """One row a step, one column a set."""
+    for number, row in enumerate(rows, start=1):
+        if len(row) != sets:
+            raise InputError(
+                f"row {number}: expected {sets} pressures, one for each chamber set, got {len(row)}",
+                key="sequence_bar",
+            )
+    return np.array(rows, dtype=float)
+
+
+def _ramp(ramp: RampTable, sets: int) -> Array:
+    """Equal steps from one pressure to another in the named sets, zero in the others."""
+    for number, chosen in enumerate(ramp.sets, start=1):
+        if not 1 <= chosen <= sets:
+            raise InputError(
+                f"item {number}: expected a chamber set from 1 to {sets}, got {shown(chosen)}", key="ramp.sets"
+            )
+        if chosen in ramp.sets[: number - 1]:
+            raise InputError(f"item {number}: expected each chamber set once, got {chosen} twice", key="ramp.sets")
+    pressures = np.zeros((ramp.steps, sets))
+    pressures[:, [chosen - 1 for chosen in ramp.sets]] = np.linspace(ramp.from_bar, ramp.to_bar, ramp.steps)[:, None]
+    return pressures * BAR
+
+
+def _csv(text: str, sets: int) -> PressurePath:
+    """Read a header of t_s (optional) and one column a set, in any order, and one row a step."""
+    rows = csv_rows(text)
+    line, header = next(rows, (1, []))
+    if not header:
+        raise InputError(f"expected a header {_names(sets)} and rows of numbers, got an empty file")
+    columns = _columns(header, sets, line)
+    values, lines = array("d"), array("l")
+    for line, row in rows:
+        if len(row) != len(header):
+            raise InputError(f"line {line}: expected {len(header)} values as in the header, got {len(row)}")
+        try:
+            values.extend(map(float, row))
+        except ValueError:
+            raise _not_a_number(line, header, row) from None
+        lines.append(line)
+    if not lines:
+        raise InputError("expected at least one row of numbers below the header, got none")
+    table = np.frombuffer(values).reshape(-1, len(header))
+    if text.count("_") > sum(name.count("_") for name in header):  # Python reads 1_5 as 15
+        for line, row in list(csv_rows(text))[1:]:
+            if any("_" in cell for cell in row):
+                raise _not_a_number(line, header, row)
+    _require_possible(table, lines, columns)
+    pressures = table[:, [columns[name] for name in columns if name != TIME_COLUMN]]
+    return _path(pressures, table[:, columns[TIME_COLUMN]].copy() if TIME_COLUMN in columns else None)
+
+
+def _columns(header: list[str], sets: int, line: int) -> dict[str, int]:
+    """Return the position of each column, pressures in the order of the sets."""
+    names = [name.strip() for name in header]
+    expected = [TIME_COLUMN, *(f"p{k}_bar" for k in range(1, sets + 1))]
+    for name in names:
+        if name not in expected:
+            if len(names) == 1 and (";" in name or "\t" in name):
+                raise InputError(f"line {line}: expected columns separated by commas, got {shown(name)}")
+            hint = did_you_mean(name, expected)
+            raise InputError(f"line {line}: expected a header {_names(sets)}, got a column {shown(name)}{hint}")
+        if names.count(name) > 1:
+            raise InputError(f"line {line}: expected each column once, got {name!r} {names.count(name)} times")
+    for name in expected[1:]:
+        if name not in names:
+            raise InputError(f"line {line}: missing column {name!r}; expected a header {_names(sets)}")
+    return {name: names.index(name) for name in expected if name in names}
+
+
+def _require_possible(table: Array, lines: array[int], columns: dict[str, int]) -> None:
+    """Raise InputError for the first value that is not finite, outside its range, or back in time."""
+    limits = {p: TIME if name == TIME_COLUMN else READING for name, p in columns.items()}
+    wrong = np.column_stack([~limits[p].holds(table[:, p]) for p in range(table.shape[1])])
+    for row, position in np.argwhere(wrong)[:1]:
+        value = float(table[row, position])
+        name = next(n for n, p in columns.items() if p == position)
+        problem = limits[position].refusal(value) if isfinite(value) else f"expected a finite number, got {value}"
+        raise InputError(f"line {lines[row]}: {name}: {problem}")
+    if TIME_COLUMN in columns:
+        times = table[:, columns[TIME_COLUMN]]
+        for row in np.flatnonzero(np.diff(times) < 0)[:1] + 1:
+            raise InputError(
+                f"line {lines[row]}: {TIME_COLUMN}: expected a time of at least {times[row - 1]:g}, as in the row "
+                f"before, got {times[row]:g}"
+            )
+
+
+def _not_a_number(line: int, header: list[str], row: list[str]) -> InputError:
+    """Name the first cell of a row that is not a number."""
+    for name, cell in zip(header, row, strict=True):
+        try:
+            float(cell)
+            readable = "_" not in cell
+        except ValueError:
+            readable = False
+        if not readable:
+            return InputError(f"line {line}: {name.strip()}: expected a number, got {shown(cell)}")
+    raise AssertionError("called for a row of numbers")
+
+
+def _names(sets: int) -> str:
+    """Return the header that a file for a robot has."""
+    names = [f"p{k}_bar" for k in range(1, sets + 1)]
+    shortened = names if sets <= 6 else [names[0], names[1], "...", names[-1]]
+    return ", ".join([TIME_COLUMN, *shortened])

@@ -1,0 +1,108 @@
+"""From a scenario to a finished run: which study is called with what."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from softnlp.base.errors import InputError
+from softnlp.scenario.partial import run_of
+from softnlp.scenario.read import Scenario, scenario_of
+from softnlp.scenario.run_blocked import run_blocked
+from softnlp.scenario.run_inverse import run_inverse
+from softnlp.statics.step import Run, Step
+from softnlp.studies.forward import forward
+
+if TYPE_CHECKING:  # imported where needed: a run takes none of them
+    from softnlp.studies.design import Design
+    from softnlp.studies.identified import Identified
+    from softnlp.studies.tensile import TensileFit
+    from softnlp.sweep.read import Workspace
+
+Progress = Callable[[int, Step], None]
+
+
+def run_scenario(
+    scenario: Scenario,
+    progress: Callable[[int, Any], None] | None = None,
+    branches: int = 0,
+    *,
+    workers: int = 1,
+    folder: str | PathLike[str] | None = None,
+) -> Run | Identified | TensileFit | Design | Workspace:
+    """Run the study of a scenario.
+
+    Parameters
+    ----------
+    scenario
+        Of `softnlp.load_scenario`.
+    progress
+        Called with a count and what is done: each step, candidate, evaluation of a fit, or `SweepProgress`.
+    branches
+        As `softnlp.blocked_force`.
+    workers
+        As `softnlp.run_sweep` and `softnlp.design`; the other studies take one process.
+    folder
+        Of study "workspace" alone, as `softnlp.run_sweep`; without it a temporary one, kept as long as the result.
+
+    Returns
+    -------
+    Run, Identified, TensileFit, Design or Workspace
+        A run for forward, blocked-force and inverse, whose steps carry a solution or a named status.
+
+    Raises
+    ------
+    InputError
+        For anything but a scenario, and for what the study refuses.
+    """
+    study = scenario_of(scenario, None, "softnlp.run_scenario").study
+    if folder is not None and study != "workspace":
+        raise InputError(f"only study 'workspace' takes one, not {study!r}; softnlp.save writes a run", key="folder")
+    if study == "identify":
+        from softnlp.scenario.run_identify import run_identify
+
+        return run_identify(scenario, progress)
+    if study == "design":
+        from softnlp.scenario.run_design import run_design
+
+        return run_design(scenario, progress, workers)
+    if study == "workspace":
+        from softnlp.scenario.run_workspace import run_workspace
+
+        return run_workspace(scenario, progress, workers, folder)
+    return solve_steps(scenario, progress, branches)
+
+
+def solve_steps(scenario: Scenario, progress: Progress | None = None, branches: int = 0) -> Run:
+    """Run a scenario whose study is a run, every step in order; as `run_scenario`."""
+    return replace(STUDIES[scenario.study](scenario, progress, branches), warnings=scenario.warnings)
+
+
+def partial_run(scenario: Scenario, steps: Sequence[Step]) -> Run:
+    """Return the run of a scenario that was stopped after some steps; a warning says so."""
+    note = f"stopped by the user after {len(steps)} of {scenario.step_count} steps"
+    return run_of(scenario, steps, note)
+
+
+def _forward(scenario: Scenario, progress: Progress | None, branches: int) -> Run:
+    return forward(
+        scenario.robot,
+        scenario.material,
+        scenario.pressures,
+        loads=scenario.loads,
+        coefficients=scenario.coefficients,
+        conventions=scenario.conventions,
+        numerics=scenario.numerics,
+        times=None if scenario.times is None else scenario.times.tolist(),
+        title=scenario.title,
+        progress=progress,
+    )
+
+
+STUDIES: Mapping[str, Callable[[Scenario, Progress | None, int], Run]] = {
+    "forward": _forward,
+    "blocked-force": run_blocked,
+    "inverse": run_inverse,
+}

@@ -1,0 +1,243 @@
+"""The tables of a scenario file, in the units of the file.
+
+Every key that a scenario may hold is a field here, so the file format can be read off this module. `ranges` has the
+range of each number; `scenario_check` words what does not fit; what needs more than one key, or another file, is
+checked in `scenario` and `pressures`.
+"""
+
+from __future__ import annotations
+
+from math import hypot
+from typing import Annotated, Any, Literal
+from unicodedata import category
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator
+from pydantic_core import PydanticCustomError
+
+from softnlp.base.reading import BACKSLASH_HINT, as_typed, choices, shown
+from softnlp.base.units import MILLIMETRE
+from softnlp.model.gravity import DIRECTIONS, unknown_direction
+from softnlp.model.numerics import Numerics
+from softnlp.model.robot import MINIMUM_WALL
+
+MOST_INTERVALS = 2000
+LARGEST_COMPONENT = 1e300
+MOST_STEPS = 1_000_000
+LONGEST_LABEL = 200
+LONGEST_FILE_NAME = 500
+
+
+def wrong(message: str) -> PydanticCustomError:
+    """Wrap a message of our own, which is passed on as it is."""
+    return PydanticCustomError("own", "{text}", {"text": message})
+
+
+def _direction(value: Any) -> tuple[float, float, float]:
+    """Gravity's direction: one of the names, or a vector to be normalised."""
+    if isinstance(value, str):
+        if value not in DIRECTIONS:
+            raise wrong(unknown_direction(value))
+        return DIRECTIONS[value]
+    if not isinstance(value, list):
+        raise wrong(f"expected one of {choices(DIRECTIONS)}, or a vector of 3 numbers, got {shown(value)}")
+    return _normal(value)
+
+
+def _normal(value: Any) -> tuple[float, float, float]:
+    """Normalise a list of three numbers."""
+    if not isinstance(value, list) or len(value) != 3:
+        raise wrong(f"expected a list of 3 numbers, got {shown(value)}")
+    for component in value:
+        if isinstance(component, bool) or not isinstance(component, (int, float)):
+            raise wrong(f"expected a list of 3 numbers, got {shown(component)} in it")
+        if not abs(component) <= LARGEST_COMPONENT:
+            raise wrong(f"expected 3 finite numbers, got {shown(component)} among them")
+    largest = max(abs(component) for component in value)
+    if largest == 0:
+        raise wrong("expected a direction, got a vector of length 0")
+    x, y, z = (component / largest for component in value)  # first, so that no square vanishes or overflows
+    length = hypot(x, y, z)
+    return x / length, y / length, z / length
+
+
+def _intervals(value: Any) -> int | None:
+    """Return the number of intervals, None for "auto"."""
+    if value == "auto":
+        return None
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MOST_INTERVALS:
+        raise wrong(f"expected 'auto' or a whole number from 1 to {MOST_INTERVALS}, got {shown(value)}")
+    return value
+
+
+def _file_name(value: str) -> str:
+    r"""Refuse control characters, which are escapes that nobody meant: in TOML "data\table.csv" holds a tab."""
+    if controls := [c for c in value if category(c) == "Cc"]:
+        escape = as_typed(controls[0])
+        raise wrong(f"expected a path, got '{as_typed(value)}', where {escape} is one character: {BACKSLASH_HINT}")
+    return value
+
+
+def _label(value: str) -> str:
+    """Put a name or a title on one line; control characters would reach a terminal or a figure."""
+    label = " ".join(value.split())
+    if not label or not label.isprintable():
+        raise wrong(f"expected text without control characters, got {shown(value)}")
+    return label
+
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Count = Annotated[int, Field(ge=1)]
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Direction = Annotated[tuple[float, float, float], PlainValidator(_direction)]
+Normal = Annotated[tuple[float, float, float], PlainValidator(_normal)]
+Label = Annotated[str, Field(max_length=LONGEST_LABEL), AfterValidator(_label)]
+FileName = Annotated[str, Field(max_length=LONGEST_FILE_NAME), AfterValidator(_file_name)]
+
+
+class Table(BaseModel):
+    """A table of the file: no unknown key, no conversion of types (but a whole number is a number), no nan or inf."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+
+class RobotTable(Table):
+    """[robot]: a name of the library with single dimensions changed, or every dimension in full."""
+
+    name: Label | None = None
+    outer_diameter_mm: Positive | None = None
+    lumen_diameter_mm: Positive | None = None
+    chamber_circle_diameter_mm: Positive | None = None
+    chamber_diameter_mm: Positive | None = None
+    chamber_wall_mm: Positive | None = None
+    length_mm: Positive | None = None
+    chamber_sets: Count | None = None
+    chambers_per_set: Count | None = None
+    chamber_angle_deg: NotNegative | None = None
+    allow: list[str] = []
+    minimum_wall_mm: Positive = MINIMUM_WALL / MILLIMETRE
+
+
+class MaterialTable(Table):
+    """[material]: a silicone of the library or of a file, or constants (and a formula) given here.
+
+    Only the types are checked here: the table is read as it is written by `softnlp.model.materials`.
+    """
+
+    name: Label = Field(description="a silicone of the library, or a name for your own")
+    model: str = Field(description="linear, neo-hookean, mooney-rivlin, yeoh, ogden or a law of your own")
+    density_kg_m3: Positive | None = None
+    file: FileName | None = None
+    constants: dict[str, float] | None = None
+    formula: str | None = None
+    fitted_stretch: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+
+
+class StiffeningTable(Table):
+    """[stiffening]: a set of coefficients, and k_e and k_b where they differ from the set's."""
+
+    set: Literal["reproduction", "calibrated"] = "reproduction"
+    elongation: NotNegative | None = None
+    bending: NotNegative | None = None
+
+
+class CorrectionsTable(Table):
+    """[corrections]: k_a, k_i and phi where they differ from the set's, and the conventions."""
+
+    area: Positive | None = None
+    inertia: Positive | None = None
+    bore_fraction: NotNegative | None = None
+    conventions: Literal["reproduction", "as_printed"] = "reproduction"
+
+
+class GravityTable(Table):
+    """[gravity]: a unit vector, or zeros when it is off."""
+
+    direction: Direction = DIRECTIONS["off"]
+
+
+class TipLoadTable(Table):
+    """[tip_load]: dead loads in the world frame."""
+
+    force_N: Vector = [0.0, 0.0, 0.0]
+    moment_Nmm: Vector = [0.0, 0.0, 0.0]
+
+
+class RampTable(Table):
+    """A ramp of [pressure]: equal steps, the same in each of its sets (counted from 1), zero in the others."""
+
+    sets: Annotated[list[int], Field(min_length=1)] = Field(description="a list of chamber sets, counted from 1")
+    to_bar: NotNegative = Field(description="a pressure in bar")
+    steps: Annotated[int, Field(ge=2, le=MOST_STEPS)] = Field(description="the number of poses")
+    from_bar: NotNegative = 0.0
+
+
+class PressureTable(Table):
+    """[pressure]: exactly one of its keys."""
+
+    sequence_bar: Annotated[list[list[float]], Field(min_length=1)] | None = None
+    ramp: RampTable | None = None
+    file: FileName | None = None
+
+
+class OffsetRampTable(Table):
+    """[contact] offset_ramp."""
+
+    from_mm: float = Field(description="an offset in mm")
+    to_mm: float = Field(description="an offset in mm")
+    steps: Annotated[int, Field(ge=2, le=MOST_STEPS)] = Field(description="the number of poses")
+
+
+class ContactTable(Table):
+    """[contact] of a blocked force."""
+
+    mode: Literal["blocked", "constrained"] = "blocked"
+    offset_mm: float | None = None
+    offsets_mm: Annotated[list[float], Field(min_length=1)] | None = None
+    offset_ramp: OffsetRampTable | None = None
+    target_force_N: Positive | None = None
+    tip_cap_mm: NotNegative = 0.0
+    closure: Literal["free", "compliant", "weighted", "rigid"] = "compliant"
+    chamber_reaction: NotNegative | None = None
+    wall_point_mm: Vector | None = None
+    wall_normal: Normal | None = None
+    weight_force_per_N: Positive | None = None
+    weight_moment_per_Nmm: Positive | None = None
+    weight_length_per_mm: Positive | None = None
+    weight_position_per_mm: Positive | None = None
+    weight_sensitivity: bool = False
+
+
+class SolverTable(Table):
+    """[solver]."""
+
+    intervals: Annotated[int | None, PlainValidator(_intervals)] = Numerics.intervals
+    accuracy: Positive = Numerics.accuracy
+    transcription: Literal["multiple-shooting", "collocation"] = Numerics.transcription
+    tolerance: Positive = Numerics.tolerance
+
+
+class ScenarioFile(Table):
+    """What every scenario may hold; each study adds its own tables."""
+
+    title: Label | None = None
+    study: str
+    robot: RobotTable = Field(description="a table with name or every dimension")
+    material: MaterialTable = Field(description="a table with name and model")
+    stiffening: StiffeningTable = StiffeningTable()
+    corrections: CorrectionsTable = CorrectionsTable()
+    gravity: GravityTable = GravityTable()
+    tip_load: TipLoadTable = TipLoadTable()
+    solver: SolverTable = SolverTable()
+
+
+class ForwardFile(ScenarioFile):
+    """A whole scenario of `forward`."""
+
+    pressure: PressureTable = Field(description="a table with one of sequence_bar, ramp, file")
+
+
+class BlockedForceFile(ForwardFile):
+    """A whole scenario of `blocked-force`."""
+
+    contact: ContactTable = ContactTable()

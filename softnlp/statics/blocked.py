@@ -1,0 +1,393 @@
+"""Solving one blocked pose after another: the free shape, where contact begins, and the branch from there."""
+
+from __future__ import annotations
+
+import time
+from copy import copy
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.rod import STATE_SIZE, Loads
+from softnlp.model.tip import tip_conditions
+from softnlp.nlp.continuation import follow
+from softnlp.nlp.problem import CompiledProblem, compile_problem
+from softnlp.nlp.solver import Engine, Solution
+from softnlp.nlp.transcription import MultipleShooting, method_named
+from softnlp.statics.blocked_grid import Blocked, BlockedGrid
+from softnlp.statics.blocked_step import failed_step, solved_step, touching_step
+from softnlp.statics.condensed import CondensedSolver
+from softnlp.statics.free_shape import Free, FreeShapes, free_shape, from_zero
+from softnlp.statics.loadcase import LoadCase, load_case, rod_functions
+from softnlp.statics.pose import between_nodes, shape_function
+from softnlp.statics.solver import MOST_INTERVALS, PoseSolver
+from softnlp.statics.step import Step
+from softnlp.statics.wall import Situation, Wall
+from softnlp.statics.weighted import Weighted
+
+Array = NDArray[np.float64]
+
+TOUCHING = 1e-9  # of the length: a free contact point nearer to the wall than this touches it
+_NEAR_FOLD = 0.2  # of the largest in-plane determinant on the way: below it a branch that ends has turned
+_LARGEST_JUMP = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class _Ended:
+    """Where a branch was lost: the situation reached, whether it had turned, iterations spent."""
+
+    situation: Situation
+    folded: bool
+    iterations: int
+
+
+def _slips(begin: Situation, end: Situation, sideways: list[tuple[float, float]]) -> float | None:
+    """Return the largest set pressure at which the out-of-plane determinant changed its sign, if it has."""
+    for (u, a), (w, b) in pairwise(sideways):
+        if a * b < 0:
+            return float(np.max(begin.towards(end, u + (w - u) * a / (a - b)).pressure))
+    return None
+
+
+class BlockedSolver:
+    """Solves blocked poses of one model under one closure; compiled grids are kept between poses.
+
+    contact : closure, tip cap and weights; the wall is given with each pose, and without one (`wall` false) the closure
+    holds the chambers under the dead loads alone.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        numerics: Numerics,
+        contact: ContactSettings,
+        *,
+        wall: bool = True,
+        poses: PoseSolver | None = None,
+    ) -> None:
+        self.model = model
+        self.numerics = numerics
+        self.contact = contact
+        self.has_wall = wall
+        # Without loads the free lengths and tip are taken from the closed form, so the grid need not show it.
+        self.poses = poses or PoseSolver(model, numerics, unloaded_accuracy=numerics.accuracy)
+        self.functions = rod_functions(model, tip_conditions(contact.closure, wall=wall))
+        self._declared = self.functions.declared()
+        self._transfer = shape_function(self.functions.field)
+        self._grids: dict[tuple[int, bytes], BlockedGrid] = {}
+        self._compiled: dict[int, tuple[LoadCase, CompiledProblem, CondensedSolver]] = {}
+
+    def with_contact(self, contact: ContactSettings) -> BlockedSolver:
+        """Return a solver with other settings that shares what both need compiled."""
+        if contact.closure != self.contact.closure:
+            return BlockedSolver(self.model, self.numerics, contact, wall=self.has_wall, poses=self.poses)
+        other = copy(self)
+        other.contact = contact
+        if contact.weights != self.contact.weights:
+            other._grids = {}  # what they minimise has the weights in it
+        return other
+
+    def with_model(self, model: Model) -> BlockedSolver:
+        """Return a solver for other numbers that shares what is compiled; `ValueError` for another `Model.kind`."""
+        other = copy(self)
+        other.model, other.poses = model, self.poses.with_model(model)
+        return other
+
+    def grid(self, intervals: int, plane: Array | None) -> BlockedGrid:
+        """Return the compiled problem on a grid and in a plane (None: in space), building it at first use."""
+        key = (intervals, b"" if plane is None else np.round(plane, 12).tobytes())
+        if key in self._grids:
+            return self._grids[key]
+        shooting = MultipleShooting(intervals)
+        if intervals not in self._compiled:
+            method = method_named(self.numerics.transcription, intervals)
+            case = load_case("blocked", self.functions, self._declared, method)
+            problem = compile_problem(list(self._declared.values()), [case])
+            self._compiled[intervals] = (case, problem, CondensedSolver(self.functions, shooting))
+        case, problem, judge = self._compiled[intervals]
+        condensed = CondensedSolver(self.functions, shooting, plane)
+        linear = condensed if self.numerics.transcription == "multiple-shooting" else None
+        exact = Engine(problem, linear=linear)
+        loose = Engine(problem, linear=linear, newton_only=linear is not None, max_iterations=8, tolerance=1e-7)
+        engine: Engine | Weighted = exact
+        stepper: Engine | Weighted = loose
+        if self.contact.closure == "weighted":
+            engine, stepper = (
+                Weighted(e, self.functions, case, condensed, plane, self.contact.weights) for e in (exact, loose)
+            )
+        self._grids[key] = BlockedGrid(case, engine, stepper, condensed, judge, intervals, self.functions.state_size)
+        return self._grids[key]
+
+    def solve(
+        self, pressure: Array, loads: Loads, wall: Wall | None, near: Blocked | None = None
+    ) -> tuple[Step, Blocked | None]:
+        """Solve one blocked pose, followed from a neighbouring solution or from zero pressure with the wall in place.
+
+        pressure : (sets,) [Pa], not negative. Never raises for a pose that cannot be solved.
+        """
+        began = time.perf_counter()
+        situation = Situation(np.asarray(pressure, float), loads, wall)
+        free_loads = loads if self.has_wall else Loads()  # without a wall the chambers keep their unloaded lengths
+        free = free_shape(self.poses, situation.pressure, free_loads, self.contact.tip_cap, near.free if near else None)
+        if isinstance(free, Step):
+            return replace(free, solve_time=time.perf_counter() - began), None
+        touch = TOUCHING + 3 * free.error if situation.is_loaded else TOUCHING
+        if wall is not None:
+            ahead = wall.gap(free.contact_point)
+            if ahead > -touch * float(self.model.robot.length):
+                free_step = free.step or self.poses.solve(situation.pressure, loads)[0]
+                if free_step.pose is None:
+                    return free_step, None
+                step = touching_step(free_step, self.contact, wall, ahead, touch * float(self.model.robot.length))
+                return replace(step, solve_time=time.perf_counter() - began), None
+        found, spent = self._settle(situation, free, near)
+        spent += free.iterations
+        if isinstance(found, _Ended):
+            return failed_step(situation.pressure, found.situation.pressure, found.folded, spent, began), None
+        pose = free.pose(self.poses)
+        return solved_step(self.poses, self.functions, self.contact, found, pose, spent, began), found
+
+    def _settle(self, situation: Situation, free: Free, near: Blocked | None) -> tuple[Blocked | _Ended, int]:
+        """Follow the branch to a situation and refine the grid until its accuracy is met."""
+        plane = self.plane(situation)
+        pressed = np.array([float(situation.pressure[k] > 0) for k in self.model.robot.set_of_chamber])
+        first = self.numerics.intervals or self.poses.first_intervals(free.column, free.stretch)
+        intervals = near.grid.intervals if near else first
+        spent = 0
+        found: Blocked | _Ended | None = None
+        usable = near is not None and self._leads_to(near, situation, pressed, plane)
+        if near is not None and usable:
+            found = self._continued(self.grid(intervals, plane), situation, pressed, free, plane, near)
+            if found is None:
+                found = self._followed(self.grid(intervals, plane), situation, pressed, free, plane, near)
+            spent += found.solution.iterations if isinstance(found, Blocked) else found.iterations
+        if not isinstance(found, Blocked):
+            for _ in range(2):
+                found = self._followed(self.grid(intervals, plane), situation, pressed, free, plane, None)
+                spent += found.solution.iterations if isinstance(found, Blocked) else found.iterations
+                if isinstance(found, Blocked) or found.folded or self.numerics.intervals is not None:
+                    break
+                intervals *= 2
+        target = self.poses.numerics.accuracy / 3
+        while isinstance(found, Blocked):
+            intervals = found.grid.intervals
+            wanted = self.poses.next_intervals(found.refinement_error, intervals, target)
+            if wanted is None or intervals >= MOST_INTERVALS:
+                break
+            finer = self._refined(found, self.grid(min(wanted, MOST_INTERVALS), plane))
+            if finer is None:
+                break
+            spent += finer.solution.iterations
+            found = finer
+        assert found is not None
+        return found, spent
+
+    def plane(self, situation: Situation) -> Array | None:
+        """Return the normal of the plane in which wall, pressures and loads keep the rod, or None in space."""
+        plane = situation.wall.plane if situation.wall is not None else None
+        if plane is None:
+            return None
+        column = self.poses.column(self.poses.values(situation.pressure, situation.loads))
+        c = np.asarray(self.functions.section(column, 1.2)[0]).ravel()
+        section_plane = abs(c[2] - c[3]) <= 1e-9 * abs(c[2]) or min(abs(plane[0]), abs(plane[1])) <= 1e-12
+        moment = np.array([c[6], c[7], 0.0])
+        along = np.cross(plane, [0.0, 0.0, 1.0])
+        up = np.array([0.0, 0.0, 1.0])
+        pairs = [(moment, along), (np.asarray(situation.loads.tip_moment, float), along)]
+        pairs += [(np.asarray(situation.loads.tip_moment, float), up)]
+        pairs += [(np.asarray(v, float), plane) for v in (situation.loads.tip_force, situation.loads.gravity)]
+        flat = all(abs(v @ d) <= 1e-9 * max(float(np.linalg.norm(v)), 1e-300) for v, d in pairs)
+        return plane if section_plane and flat else None
+
+    def _leads_to(self, near: Blocked, situation: Situation, pressed: Array, plane: Array | None) -> bool:
+        """Whether the sequence only rises from a solution to a situation, so that its branch is the followed one."""
+        here = near.situation
+        walls = here.wall is not None and situation.wall is not None
+        same_wall = not walls or (here.wall is not None and situation.wall is not None
+                                  and bool(np.all(here.wall.normal == situation.wall.normal)))  # fmt: skip
+        rises = bool(np.all(situation.pressure >= here.pressure))
+        same_plane = (self.plane(here) is None) == (plane is None)
+        return rises and same_wall and same_plane and bool(np.all(near.pressed == pressed))
+
+    def values(self, situation: Situation, pressed: Array, free_lengths: Array) -> dict[str, Any]:
+        """Return the quantities that a blocked pose sets."""
+        values = self.poses.values(situation.pressure, situation.loads)
+        if situation.wall is not None:
+            values["contact.wall_point"] = situation.wall.point
+            values["contact.wall_normal"] = situation.wall.normal
+        values["contact.tip_cap"] = self.contact.tip_cap
+        values["contact.chamber_reaction"] = self.model.coefficients.chamber_reaction
+        values["contact.free_lengths"] = free_lengths
+        values["contact.pressed"] = pressed
+        return values
+
+    def _continued(
+        self, grid: BlockedGrid, end: Situation, pressed: Array, free: Free, plane: Array | None, near: Blocked
+    ) -> Blocked | None:
+        """Solve at once from a neighbouring solution on the same grid; None where that leads off its branch."""
+        if grid is not near.grid:
+            return None
+        p = grid.problem.pack(self.values(end, pressed, free.lengths))
+        x = near.solution.x
+        guess = grid.predicted(x, p) if grid.has_tangent else x
+        rough = grid.stepper.solve(p, guess)
+        if not rough.holds(10 * grid.stepper.tolerance) or not grid.distance(rough.x - x) <= _LARGEST_JUMP:
+            return None
+        if grid.has_tangent and not grid.same_way(guess - x, rough.x - x):
+            return None
+        determinants = grid.determinants(rough, plane)
+        if not grid.is_minimum and determinants[0] * near.determinants[0] <= 0:
+            return None
+        return self._arrived(
+            grid, rough, near.situation, end, pressed, free, [(0.0, near.determinants), (1.0, determinants)], near
+        )
+
+    def _arrived(
+        self,
+        grid: BlockedGrid,
+        rough: Solution,
+        begin: Situation,
+        end: Situation,
+        pressed: Array,
+        free: Free,
+        trace: list[tuple[float, tuple[float, float]]],
+        near: Blocked | None,
+    ) -> Blocked | None:
+        """Solve to the end what a path led to; None where that leads elsewhere.
+
+        trace : (fraction of the way from `begin`, determinants in and out of the plane).
+        """
+        final = grid.engine.solve(rough.p, rough.x)
+        if not final.holds(self.numerics.tolerance) or grid.distance(final.x - rough.x) >= 0.01:
+            return None
+        final = replace(final, iterations=final.iterations + rough.iterations)
+        slips = near.slips if near is not None else None
+        if slips is None:
+            slips = _slips(begin, end, [(u, aside) for u, (_, aside) in trace])
+        return self._examined(grid, final, end, pressed, (slips, trace[-1][1]), free)
+
+    def _followed(
+        self,
+        grid: BlockedGrid,
+        end: Situation,
+        pressed: Array,
+        free: Free,
+        plane: Array | None,
+        near: Blocked | None,
+    ) -> Blocked | _Ended:
+        """Follow the branch to `end` from `near`, or from where contact begins on the way from zero pressure."""
+        intervals = free.solved.intervals if free.solved else grid.intervals
+        shapes = FreeShapes(self.poses, self.functions, intervals, self.contact.tip_cap)
+        unloaded = not self.has_wall
+        if near is not None:
+            begin, t_0 = near.situation, 0.0
+            solved = near.free.solved
+            on_grid = solved is not None and solved.intervals == intervals
+            shapes.begin(near.free.stretch, solved.solution.x if solved is not None and on_grid else None)
+        else:
+            begin, t_0 = from_zero(end, shapes, TOUCHING * float(self.model.robot.length))
+
+        def free_situation(situation: Situation) -> Situation:
+            return Situation(situation.pressure, Loads(), None) if unloaded else situation
+
+        def path(u: float) -> Array:
+            situation = begin.towards(end, t_0 + u * (1 - t_0))
+            lengths = free.lengths if u >= 1.0 else shapes.tip(free_situation(situation))[0]
+            return grid.problem.pack(self.values(situation, pressed, lengths))
+
+        if near is not None:
+            x = self._transferred(near, grid)
+        else:
+            first = begin.towards(end, t_0)
+            x = self._free_guess(grid, first, shapes)
+        trace: list[tuple[float, tuple[float, float]]] = []
+
+        def same_branch(u: float, solution: Solution) -> bool:
+            determinants = grid.determinants(solution, plane)
+            if trace and not grid.is_minimum and determinants[0] * trace[0][1][0] <= 0:
+                return False
+            trace.append((u, determinants))
+            return True
+
+        begun = grid.stepper.solve(path(0.0), x)
+        if begun.holds(10 * grid.stepper.tolerance):
+            same_branch(0.0, begun)
+        followed = follow(
+            grid.stepper,  # type: ignore[arg-type]
+            path,
+            begun.x,
+            distance=grid.distance,
+            first_step=0.5 if near is not None else 0.25,
+            smallest_step=1 / 2048,
+            largest_jump=_LARGEST_JUMP,
+            same_branch=same_branch,
+            predict=grid.predicted if grid.has_tangent else None,
+            same_way=grid.same_way,
+        )
+        spent = begun.iterations + followed.iterations
+        if followed.arrived:
+            rough = replace(followed.solution, iterations=spent)
+            first = begin.towards(end, t_0)
+            found = self._arrived(grid, rough, first, end, pressed, free, trace, near)
+            if found is not None:
+                return found
+        reached = begin.towards(end, t_0 + followed.fraction * (1 - t_0))
+        sizes = [abs(size) for _, (size, _) in trace]
+        folded = len(sizes) > 1 and (grid.is_minimum or sizes[-1] < _NEAR_FOLD * max(sizes))
+        return _Ended(reached, folded, spent)
+
+    def _free_guess(self, grid: BlockedGrid, situation: Situation, shapes: FreeShapes) -> Array:
+        """Return x of the free shape without force: exact without loads, else its solution moved to this grid."""
+        column = self.poses.column(self.poses.values(situation.pressure, situation.loads))
+        stretch = shapes.stretch(column)
+        s = grid.case.transcribed.points
+        states = np.asarray(self.functions.arc(column, stretch, s[None, :]))
+        if situation.is_loaded and self.has_wall:
+            _, solved = self.poses.solve(situation.pressure, situation.loads)
+            if solved is not None:
+                nodes = np.vstack([solved.nodes, np.zeros((states.shape[0] - STATE_SIZE, solved.nodes.shape[1]))])
+                moved = between_nodes(self._transfer, nodes, solved.constants, s)[: states.shape[0]]
+                states = np.vstack([moved[:STATE_SIZE], states[STATE_SIZE:]])
+        return np.concatenate([[stretch], states.T.ravel(), np.zeros(self.functions.tip_unknowns)])
+
+    def _transferred(self, found: Blocked, grid: BlockedGrid) -> Array:
+        """Return a solution on another grid."""
+        if found.grid.intervals == grid.intervals:
+            return found.solution.x
+        s = grid.case.transcribed.points
+        states = between_nodes(self._transfer, found.grid.nodes(found.solution.x), found.constants, s)[
+            : grid.state_size
+        ]
+        return np.concatenate([found.solution.x[:1], states.T.ravel(), found.grid.tip_forces(found.solution.x)])
+
+    def _refined(self, found: Blocked, grid: BlockedGrid) -> Blocked | None:
+        """Return a solution solved again on a finer grid, or None where that leads elsewhere."""
+        p = grid.problem.pack(self.values(found.situation, found.pressed, found.free.lengths))
+        guess = self._transferred(found, grid)
+        solution = grid.engine.solve(p, guess)
+        if not solution.holds(self.numerics.tolerance) or grid.distance(solution.x - guess) > 0.05:
+            return None
+        return self._examined(
+            grid, solution, found.situation, found.pressed, (found.slips, found.determinants), found.free
+        )
+
+    def _examined(
+        self,
+        grid: BlockedGrid,
+        solution: Solution,
+        situation: Situation,
+        pressed: Array,
+        aside: tuple[float | None, tuple[float, float]],
+        free: Free,
+    ) -> Blocked:
+        """Return a solution with its discretisation error."""
+        position, rotation, force = grid.refinement(solution, method_named(self.numerics.transcription, 1).order)
+        constants = np.asarray(grid.problem.case_constants(solution.x, solution.p)).ravel()
+        worst = max(position, rotation / 5, force / 5)
+        return Blocked(situation, pressed, grid, solution, constants, position, worst, *aside, free)

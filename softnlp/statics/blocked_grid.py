@@ -1,0 +1,136 @@
+"""What is compiled for blocked poses on one grid, and a solution on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.nlp.problem import CompiledProblem
+from softnlp.nlp.solver import Engine, Solution, discretisation_correction
+from softnlp.statics.condensed import CondensedSolver, plane_directions
+from softnlp.statics.free_shape import Free
+from softnlp.statics.loadcase import LoadCase
+from softnlp.statics.wall import Situation
+from softnlp.statics.weighted import Weighted
+
+Array = NDArray[np.float64]
+
+
+_FORCE_SHARE = 0.1  # of a scaled force beside a scaled position in what a step changes
+_LARGEST_MISS = 0.5  # of a step's change: a prediction that is off by more does not tell which branch was met
+_SMALL = 1e-3  # a change that tells nothing of its prediction
+
+
+@dataclass(frozen=True, eq=False)
+class BlockedGrid:
+    """Everything compiled for one number of intervals, in a plane of symmetry or in space.
+
+    condensed : the tip equations at the nodes, in the plane. judge : in space.
+    """
+
+    case: LoadCase
+    engine: Engine | Weighted
+    stepper: Engine | Weighted
+    condensed: CondensedSolver
+    judge: CondensedSolver
+    intervals: int
+    state_size: int
+
+    @property
+    def problem(self) -> CompiledProblem:
+        """The compiled problem, with every quantity fixed."""
+        return self.engine.problem
+
+    def states(self, x: Array) -> Array:
+        """Return every state in x, (nx, count)."""
+        count = len(self.case.transcribed.points)
+        return x[1 : 1 + self.state_size * count].reshape(count, self.state_size).T
+
+    def nodes(self, x: Array) -> Array:
+        """Return the node states (nx, K + 1) in x."""
+        return np.ascontiguousarray(self.states(x)[:, self.case.transcribed.node_index])
+
+    def tip_forces(self, x: Array) -> Array:
+        """Return the scaled forces that the tip conditions add."""
+        return x[1 + self.state_size * len(self.case.transcribed.points) :]
+
+    @property
+    def is_minimum(self) -> bool:
+        """Whether the solution is a minimum of weighted squares, which may go on where the equations are singular."""
+        return isinstance(self.engine, Weighted)
+
+    @property
+    def has_tangent(self) -> bool:
+        """Whether `predicted` can be used: not for a minimum, and where the nodes are the only states."""
+        return not self.is_minimum and self.engine.linear is not None
+
+    def predicted(self, x: Array, p: Array) -> Array:
+        """Return x moved along the tangent from a solution towards the one at p; x where the tangent is singular."""
+        try:
+            return x + self.condensed.solve(x, p, np.asarray(self.problem.residual(x, p)).ravel())
+        except np.linalg.LinAlgError:
+            return x
+
+    def same_way(self, predicted: Array, change: Array) -> bool:
+        """Whether a step went where it was predicted to; small steps do.
+
+        Past a fold another part of the curve may be so near that its distance alone does not tell it, also with the
+        same sign of the determinant; its forces are others.
+        """
+
+        def size(move: Array) -> float:
+            forces = float(np.max(np.abs(self.tip_forces(move)), initial=0.0))
+            return max(self.distance(move), _FORCE_SHARE * forces)
+
+        return size(change - predicted) <= max(_LARGEST_MISS * size(change), _SMALL)
+
+    def distance(self, change: Array) -> float:
+        """Return the largest change of a scaled position or of a direction cosine."""
+        return float(np.max(np.abs(self.states(change)[:12])))
+
+    def determinants(self, solution: Solution, plane: Array | None) -> tuple[float, float]:
+        """Return the determinants of the tip equations in the plane and out of it; in space, of all of them and 1."""
+        matrix = self.judge.tip_system(self._at_nodes(solution.x), solution.p).matrix
+        if plane is None:
+            return float(np.linalg.det(matrix)), 1.0
+        inside, outside = (float(np.linalg.det(V.T @ matrix @ V)) for V in plane_directions(plane, len(matrix)))
+        return inside, outside
+
+    def refinement(self, solution: Solution, order: int) -> tuple[float, float, float]:
+        """Return how far the tip's position [L_0], its rotation [rad] and the forces are from those of finer grids.
+
+        Of forces relative to those above one; of a transcription that converges with this order.
+        """
+        correction = discretisation_correction(self.problem, solution, self.engine.linear)
+        change = correction * 2**order / (2**order - 1)
+        tip = self.nodes(change)[:, -1]
+        forces = self.tip_forces(change) / np.maximum(1.0, np.abs(self.tip_forces(solution.x)))
+        rotation = np.linalg.norm(tip[3:12]) / np.sqrt(2)
+        return float(np.linalg.norm(tip[:3])), float(rotation), float(np.max(np.abs(forces), initial=0.0))
+
+    def _at_nodes(self, x: Array) -> Array:
+        """Return x with the states of the nodes alone."""
+        return np.concatenate([x[:1], self.nodes(x).T.ravel(), self.tip_forces(x)])
+
+
+@dataclass(frozen=True, eq=False)
+class Blocked:
+    """A solution with the wall in place and what was found of it.
+
+    constants : what the field takes beside the states. error : estimated tip position error over L_0. refinement_error
+    : the same for position, rotation and forces. slips : pressure [Pa] of the most pressurised set above which a planar
+    shape may slip sideways, or None. determinants : in and out of the plane. free : the free shape there.
+    """
+
+    situation: Situation
+    pressed: Array
+    grid: BlockedGrid
+    solution: Solution
+    constants: Array
+    error: float
+    refinement_error: float
+    slips: float | None
+    determinants: tuple[float, float]
+    free: Free

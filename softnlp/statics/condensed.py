@@ -1,0 +1,209 @@
+"""The linear algebra of one multiple-shooting load case, with its interior nodes eliminated interval by interval.
+
+For J(x) dx = -g, with x = [stretch | x_0 | ... | x_K | y] and g = [balance | base | gaps | tip] (see
+`softnlp.statics.loadcase`):
+
+    stretch   the balance depends on nothing else, so d(lambda) = -g_0 / b'(lambda)
+    base      d(p, R, L_i)_0 = -g_base; d(n, m)_0 stays unknown: six directions and one known part
+    interval  dx_k+1 = F_x dx_k + F_c c' d(lambda) + g_k, one Runge-Kutta step with seven forward directions
+    tip       6 + n_y equations for d(n, m)_0 and the forces y that the tip conditions add
+
+The same numbers as a sparse factorisation gives, for the cost of one sweep.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.nlp.transcription import MultipleShooting, Tableau, rk_step
+from softnlp.statics.loadcase import RodFunctions
+
+Array = NDArray[np.float64]
+
+_FORCE = slice(12, 18)
+_LARGEST = 1e150  # whose square is finite
+
+
+@dataclass(frozen=True, eq=False)
+class TipSystem:
+    """The last equations: matrix (6 + n_y, d + n_y) times d(n(0), m(0) along d directions, y) = -right.
+
+    directions : (nx, K + 1, d + 1), how the states follow those and, last, the known part. d_stretch : solved.
+    """
+
+    matrix: Array
+    right: Array
+    directions: Array
+    d_stretch: float
+
+
+class CondensedSolver:
+    """Solves J dx = -g for a load case with every quantity fixed, transcribed by multiple shooting.
+
+    The fixed values p are those of `functions.declared()`, in order. plane : unit normal of a plane of symmetry through
+    +z, in which the shape is held: n(0), m(0) have three directions in it. None: in space, where they have six.
+    """
+
+    def __init__(self, functions: RodFunctions, method: MultipleShooting, plane: Array | None = None) -> None:
+        self._shape = (functions.state_size, method.intervals + 1)
+        rows = 6 + functions.tip_unknowns
+        inside = np.eye(rows) if plane is None else plane_directions(plane, rows)[0]
+        self._into = inside.T
+        self._base = inside[:6, : inside.shape[1] - functions.tip_unknowns]
+        self._sweeps: dict[int, ca.Function] = {}
+        self._functions, self._method = functions, method
+
+    def tip_system(self, x: Array, p: Array, g: Array | None = None) -> TipSystem:
+        """Return the last equations for the residual g, or for none.
+
+        Raises `numpy.linalg.LinAlgError` where they are not finite.
+        """
+        rows, known = len(self._into[0]), self._base.shape[1]
+        given = np.zeros(x.size) if g is None else g
+        directions, tip, turned = (np.asarray(part) for part in self._sweep(1)(x, p, given))
+        if not np.max(np.abs(tip)) < _LARGEST:  # nan is not either
+            raise np.linalg.LinAlgError("the linearised tip equations are not finite")
+        matrix = np.delete(tip, known, axis=1)
+        every = directions.reshape(*self._shape, known + 1)
+        return TipSystem(matrix, tip[:, known] + given[-rows:], every, float(turned[0, 0]))
+
+    def solve(self, x: Array, p: Array, g: Array) -> Array:
+        """Return dx. Raises `numpy.linalg.LinAlgError` where the tip equations are singular or not finite."""
+        system = self.tip_system(x, p, g)
+        found = np.linalg.solve(self._into @ system.matrix, -(self._into @ system.right))
+        known = self._base.shape[1]
+        states = system.directions @ np.append(found[:known], 1.0)
+        return np.concatenate([[system.d_stretch], states.T.ravel(), found[known:]])
+
+    def solve_many(self, x: Array, p: Array, G: Array) -> Array:
+        """Return the columns dx for as many right sides G (n, r) in one sweep. Raises as `solve`."""
+        r, rows, known = G.shape[1], len(self._into[0]), self._base.shape[1]
+        directions, tip, turned = (np.asarray(part) for part in self._sweep(r)(x, p, G))
+        if not np.max(np.abs(tip)) < _LARGEST:  # nan is not either
+            raise np.linalg.LinAlgError("the linearised tip equations are not finite")
+        matrix = np.delete(tip, np.s_[known : known + r], axis=1)
+        right = tip[:, known : known + r] + G[-rows:]
+        found = np.linalg.solve(self._into @ matrix, -(self._into @ right))
+        nx, nodes = self._shape
+        every = directions.reshape(nx, nodes, known + r)
+        states = every[:, :, :known] @ found[:known] + every[:, :, known:]
+        return np.concatenate([turned, states.transpose(1, 0, 2).reshape(nx * nodes, r), found[known:]])
+
+    def _sweep(self, right_sides: int) -> ca.Function:
+        """Return the sweep for so many right sides, built at first use."""
+        if right_sides not in self._sweeps:
+            self._sweeps[right_sides] = _sweep_function(self._functions, self._method, self._base, right_sides)
+        return self._sweeps[right_sides]
+
+    def determinant_expression(self, x: Any, p: Any) -> Any:
+        """Return the determinant of the tip equations as an expression of symbols or of expressions x, p."""
+        _, tip, _ = self._sweep(1).call([x, p, ca.DM.zeros(x.numel())])
+        known, columns = self._base.shape[1], tip.shape[1]
+        matrix = ca.DM(self._into) @ ca.horzcat(tip[:, :known], tip[:, known + 1 : columns])
+        entries = ca.SX.sym("entries", *matrix.shape)
+        return ca.Function("determinant", [entries], [ca.det(entries)], {"cse": True})(matrix)
+
+    def tip_moves(self, x: Array, p: Array) -> Array:
+        """Return how the tip's state moves when the tip equations are off by given errors, (nx, 6 + n_y)."""
+        system = self.tip_system(x, p)
+        moves = np.linalg.solve(self._into @ system.matrix, self._into)
+        known = self._base.shape[1]
+        tip: Array = system.directions[:, -1, :known] @ moves[:known]
+        return tip
+
+
+def plane_directions(normal: Array, size: int) -> tuple[Array, Array]:
+    """Return the directions of (force, moment, more forces) in a plane through +z and those out of it, as columns.
+
+    In the plane: force along it and +z, moment along its normal, and what follows; out of it: the other three. They
+    are directions of the tip equations too.
+    """
+    up = np.array([0.0, 0.0, 1.0])
+    along = np.cross(normal, up)
+    inside, outside = np.zeros((size, size - 3)), np.zeros((size, 3))
+    inside[:3, 0], inside[:3, 1], inside[3:6, 2] = along, up, normal
+    inside[6:, 3:] = np.eye(size - 6)
+    outside[:3, 0], outside[3:6, 1], outside[3:6, 2] = normal, along, up
+    return inside, outside
+
+
+@lru_cache(maxsize=16)
+def _pieces(
+    functions: RodFunctions, tableau: Tableau, columns: int, right_sides: int
+) -> tuple[ca.Function, ca.Function, ca.Function]:
+    """Return one linearised step, the linearised tip and section; shared by every grid.
+
+    columns : directions, of which the last `right_sides` carry gaps and a change of the constants.
+    """
+    nx, ny = functions.state_size, functions.tip_unknowns
+    nc, na = functions.field.size1_in(1), functions.tip.size1_in(5)
+    step = rk_step(functions.field, tableau)
+
+    def sym(name: str, *shape: int) -> ca.SX:
+        return ca.SX.sym(name, *shape)
+
+    r = right_sides
+    V, state, gap, c, dc, h = (
+        sym("V", nx, columns),
+        sym("x", nx),
+        sym("gap", nx, r),
+        sym("c", nc),
+        sym("dc", nc, r),
+        sym("h"),
+    )
+    moves = ca.vertcat(V, ca.horzcat(ca.SX(nc, columns - r), dc))
+    arrived = ca.jtimes(step(state, c, h), ca.vertcat(state, c), moves)
+    arrived[:, columns - r :] += gap
+    advance = ca.Function("advance", [V, state, gap, c, dc, h], [arrived], {"cse": True})
+
+    y, a, units = sym("y", ny), sym("a", na), sym("units", 2)
+    tip_residual = functions.tip(state, c, ca.SX.zeros(3), ca.SX.zeros(3), y, a, units)
+    linear = ca.horzcat(ca.jtimes(tip_residual, ca.vertcat(state, c), moves), ca.jacobian(tip_residual, y))
+    tip = ca.Function("tip", [V, state, c, dc, y, a, units], [ca.densify(linear)], {"cse": True})
+
+    column, stretch = sym("p", functions.section.size1_in(0)), sym("stretch")
+    constants, balance, scales = functions.section(column, stretch)
+    section = ca.Function(
+        "section",
+        [column, stretch],
+        [constants, ca.jacobian(constants, stretch), ca.jacobian(balance, stretch), scales],
+        {"cse": True},
+    )
+    return advance, tip, section
+
+
+def _sweep_function(
+    functions: RodFunctions, method: MultipleShooting, base_directions: Array, right_sides: int
+) -> ca.Function:
+    """Return (x, p, g) -> directions (nx, (d + r) (K + 1)), linearised tip (rows, d + r + n_y), d(stretch) (1, r).
+
+    r : right sides, the columns of g.
+    """
+    K, nx, ny, r = method.intervals, functions.state_size, functions.tip_unknowns, right_sides
+    columns = base_directions.shape[1] + r
+    advance, tip, section = _pieces(functions, method.tableau, columns, r)
+    n_p, na = section.size1_in(0), functions.tip.size1_in(5)
+    x, p = ca.MX.sym("x", 1 + nx * (K + 1) + ny), ca.MX.sym("p", n_p + na)
+    g = ca.MX.sym("g", x.numel(), r)
+    c_now, c_slope, balance_slope, scales_now = section(p[:n_p], x[0])
+    d_stretch = -g[0, :] / balance_slope
+    d_constants = c_slope @ d_stretch
+    nodes = ca.reshape(x[1 : 1 + nx * (K + 1)], nx, K + 1)
+    base = g[1 : 1 + nx - 6, :]
+    last_gap = x.numel() - 6 - ny
+    by_side = [ca.reshape(g[1 + nx - 6 : last_gap, side], nx, K) for side in range(r)]
+    gaps = ca.horzcat(*by_side)[:, np.arange(r * K).reshape(r, K).T.ravel().tolist()]  # sides of one interval together
+    free = ca.DM.zeros(nx, columns - r)
+    free[_FORCE, :] = ca.DM(base_directions)
+    held = ca.vertcat(-base[:12, :], ca.DM.zeros(6, r), -base[12:, :])
+    start = ca.horzcat(ca.MX(free), held)
+    steps = advance.mapaccum(K)
+    every = steps(start, nodes[:, :K], gaps, ca.repmat(c_now, 1, K), ca.repmat(d_constants, 1, K), ca.DM.ones(1, K) / K)
+    last = tip(every[:, -columns:], nodes[:, K], c_now, d_constants, x[x.numel() - ny :], p[n_p:], scales_now)
+    return ca.Function("condensed", [x, p, g], [ca.horzcat(start, every), last, d_stretch])

@@ -1,0 +1,173 @@
+"""The free shape of a blocked pose and on the path towards it: chamber lengths and the contact point without a wall."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.base.status import Status
+from softnlp.model.rod import STATE_SIZE, Loads
+from softnlp.statics.arc import Arc, arc_pose, unloaded_arc
+from softnlp.statics.loadcase import RodFunctions
+from softnlp.statics.pose_grid import Solved
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.step import Pose, Step
+from softnlp.statics.wall import Situation, Wall
+
+Array = NDArray[np.float64]
+
+_NEWTON_STEPS = 30
+_SCAN = 17
+
+
+@dataclass(frozen=True, eq=False)
+class Free:
+    """A free shape: in closed form without loads (`arc`), else as it was solved.
+
+    column : every quantity in its order, SI. lengths : (N,) of the chambers [m]. contact_point : (3,) [m].
+    """
+
+    column: Array
+    stretch: float
+    lengths: Array
+    contact_point: Array
+    arc: Arc | None = None
+    solved: Solved | None = None
+    step: Step | None = None
+
+    @property
+    def error(self) -> float:
+        """The estimated tip position error over L_0."""
+        return 0.0 if self.solved is None else self.solved.error
+
+    @property
+    def iterations(self) -> int:
+        """The iterations spent on it."""
+        return 0 if self.step is None else self.step.iterations
+
+    def pose(self, poses: PoseSolver) -> Pose:
+        """Return the pose."""
+        if self.arc is not None:
+            return arc_pose(poses, self.arc)
+        assert self.step is not None
+        assert self.step.pose is not None
+        return self.step.pose
+
+
+def free_shape(poses: PoseSolver, pressure: Array, loads: Loads, tip_cap: float, near: Free | None) -> Step | Free:
+    """Return the free shape at a pressure (sets,) [Pa], or the step that says why there is none.
+
+    near : of a neighbouring pose, where there is one.
+    """
+    if not np.any([loads.tip_force, loads.tip_moment, loads.gravity]):
+        branch, arc = unloaded_arc(poses, pressure)
+        if branch.status is not Status.SOLVED:
+            return Step(pressure, branch.status, branch.message)
+        return Free(arc.column, arc.stretch, arc.lengths, arc.position + tip_cap * arc.axis, arc=arc)
+    step, solved = poses.solve(pressure, loads, near.solved if near else None)
+    if solved is None or step.pose is None:
+        return step
+    pose, x = step.pose, solved.solution.x
+    point = pose.tip_position + tip_cap * pose.tip_rotation[:, 2]
+    return Free(solved.solution.p, float(x[0]), pose.chamber_length, point, solved=solved, step=step)
+
+
+@lru_cache(maxsize=8)
+def _balance(functions: RodFunctions) -> ca.Function:
+    """Return (quantities, stretch) -> the stretch imbalance and its slope."""
+    column, stretch = ca.SX.sym("p", functions.section.size1_in(0)), ca.SX.sym("stretch")
+    _, balance, _ = functions.section(column, stretch)
+    return ca.Function("balance", [column, stretch], [balance, ca.jacobian(balance, stretch)])
+
+
+class FreeShapes:
+    """Free shapes of one model, each found from the last: an arc in closed form, or Newton where loads act."""
+
+    def __init__(self, poses: PoseSolver, functions: RodFunctions, intervals: int, tip_cap: float) -> None:
+        self._poses = poses
+        self._functions = functions
+        self._intervals = intervals
+        self._tip_cap = tip_cap
+        self._last_x: Array | None = None
+        self._last_stretch = 1.0
+        self._balance = _balance(functions)
+
+    def begin(self, stretch: float, x: Array | None) -> None:
+        """Start again from a known stretch, and from the pose problem's solution x there if it is known."""
+        self._last_stretch, self._last_x = stretch, x
+
+    def stretch(self, column: Array) -> float:
+        """Return the root of the stretch balance next to the last one."""
+        found = self._last_stretch
+        for _ in range(_NEWTON_STEPS):
+            balance, slope = self._balance(column, found)
+            change = -float(balance) / float(slope)
+            found += change
+            if not abs(change) > 1e-13:
+                break
+        self._last_stretch = found
+        return found
+
+    def tip(self, situation: Situation) -> tuple[Array, Array]:
+        """Return the free chamber lengths (N,) and the contact point (3,) [m]; nan where it is not found."""
+        values = self._poses.values(situation.pressure, situation.loads)
+        column = self._poses.column(values)
+        stretch = self.stretch(column)
+        L_0 = float(self._poses.model.robot.length)
+        if not situation.is_loaded:
+            state = np.asarray(self._functions.arc(column, stretch, 1.0)).ravel()
+            return state[STATE_SIZE:] * L_0, (state[:3] + self._tip_cap / L_0 * state[9:12]) * L_0
+        grid = self._poses.grid(self._intervals)
+        p = grid.problem.pack(values)
+        guess = self._last_x if self._last_x is not None else self._poses.arc_guess(grid, p, stretch)
+        solution = grid.stepper.solve(p, guess)
+        if not solution.holds(10 * grid.stepper.tolerance):
+            N = self._poses.model.robot.chambers
+            return np.full(N, np.nan), np.full(3, np.nan)
+        self._last_x = solution.x
+        found = grid.problem.outputs(x=solution.x, p=p)
+        axis = np.asarray(found["tip_rotation"])[:, 2]
+        point = np.asarray(found["tip_position"]).ravel() + self._tip_cap * axis
+        return np.asarray(found["chamber_lengths"]).ravel(), point
+
+
+def from_zero(end: Situation, shapes: FreeShapes, touch: float) -> tuple[Situation, float]:
+    """Return where a path from zero pressure begins, and the fraction of it at which contact is made for good.
+
+    touch : distance [m] within which the contact point touches the wall. Where loads or the offset press the robot into
+    the wall already at rest, they grow with the pressure.
+    """
+    nothing = np.zeros_like(end.pressure)
+    shapes.begin(1.0, None)
+    if end.wall is None:
+        return Situation(nothing, Loads(), None), 0.0
+    rest = Situation(nothing, end.loads, end.wall)
+    ahead = end.wall.gap(shapes.tip(rest)[1])
+    if not ahead >= -touch:
+        shapes.begin(1.0, None)
+        tip = shapes.tip(Situation(nothing, Loads(), None))[1]
+        shift = end.wall.gap(tip)
+        shapes.begin(1.0, None)
+        wall = Wall(end.wall.point + min(shift, 0.0) * end.wall.normal, end.wall.normal)
+        rest = Situation(nothing, Loads(), wall)
+
+    def gap_at(t: float) -> float:
+        situation = rest.towards(end, t)
+        assert situation.wall is not None
+        return situation.wall.gap(shapes.tip(situation)[1])
+
+    grid = np.linspace(0, 1, _SCAN)
+    gaps = np.array([gap_at(t) for t in grid[:-1]])
+    apart = np.flatnonzero(gaps > touch)
+    if apart.size == 0:
+        shapes.begin(1.0, None)
+        return rest, 0.0
+    low, high = float(grid[apart[-1]]), float(grid[apart[-1] + 1])
+    for _ in range(40):
+        middle = (low + high) / 2
+        low, high = (middle, high) if gap_at(middle) > 0 else (low, middle)
+    return rest, high

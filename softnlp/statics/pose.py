@@ -1,0 +1,164 @@
+"""From a solution of a load case to a pose in SI units: shape, strains, internal force and moment, warnings."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.model import rod
+from softnlp.model.quantities import Model
+from softnlp.model.robot import touching_stretch
+from softnlp.model.rod import Loads, RodSection
+from softnlp.model.section import deform
+from softnlp.nlp.transcription import RK4, rk_step
+from softnlp.statics.loadcase import unpack_section
+from softnlp.statics.step import Pose, SectionRadii, Shape
+
+Array = NDArray[np.float64]
+
+SHAPE_POINTS = 61
+_SUBSTEPS = 4
+_LENGTH = len(RodSection._fields)  # where the constants of a load case hold the length of the stretched rod
+_SAMPLES, _ZOOMS, _GRADES, _GAUSS = 6, 12, 16, 4  # of the bending angle's quadrature
+_MOST_PARTS = 225
+
+
+def shape_function(field: ca.Function) -> ca.Function:
+    """Return (state, c, h) -> [state a step h further, strains (v, u)], scaled, for the field of a load case."""
+    x, c, h = ca.SX.sym("x", field.size1_in(0)), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("h")
+    step = rk_step(field, RK4)
+    end = x
+    for _ in range(_SUBSTEPS):
+        end = step(end, c, h / _SUBSTEPS)
+    v, u = rod.strains(end, unpack_section(c))
+    return ca.Function("shape", [x, c, h], [ca.vertcat(end, v, u)], {"cse": True})
+
+
+def between_nodes(function: ca.Function, nodes: Array, constants: Array, s: Array) -> Array:
+    """Evaluate `shape_function` at any s in 0..1 from the node to its left; (24, len(s))."""
+    K = nodes.shape[1] - 1
+    left = np.minimum(np.floor(s * K + 1e-9).astype(int), K)
+    return np.asarray(function.map(s.size)(nodes[:, left], constants, (s - left / K)[None, :]))
+
+
+def bending_angle(function: ca.Function, nodes: Array, constants: Array) -> float:
+    """Return the integral of sqrt(u_x^2 + u_y^2) over s [rad], to 1e-7 also where the curvature vanishes on the way.
+
+    function : of `shape_function`. The curvature is smooth, its norm has a kink where it crosses zero, or nearly so. In
+    every interval, or part of the rod where those are many, the curvature is the polynomial through `_SAMPLES` points,
+    and the quadrature of its norm is graded towards the point where that is smallest.
+    """
+    K = min(nodes.shape[1] - 1, _MOST_PARTS)
+    length = float(constants[_LENGTH])  # in L_0
+    ends = (1 - np.cos(np.pi * np.arange(_SAMPLES) / (_SAMPLES - 1))) / 2  # Chebyshev points, 0 and 1 among them
+    s = ((np.arange(K)[:, None] + ends[:-1]) / K).ravel()
+    u = between_nodes(function, nodes, constants, np.append(s, 1.0))[21:23]
+    last = u[:, _SAMPLES - 1 :: _SAMPLES - 1]  # the right end of each interval is the left one of the next
+    values = np.concatenate([u[:, :-1].reshape(2, K, -1), last[:, :, None]], axis=2)
+    coefficients = np.einsum("ij,akj->aki", np.linalg.inv(np.vander(ends, increasing=True)), values)
+
+    def norm(at: Array) -> Array:
+        """Return the curvature's norm at local coordinates (K, n) in 0..1."""
+        found = np.zeros((2, *at.shape))
+        for c in np.moveaxis(coefficients, 2, 0)[::-1]:
+            found = found * at + c[:, :, None]
+        size: Array = np.hypot(found[0], found[1])
+        return size
+
+    left, width = np.zeros(K), 1.0
+    for _ in range(_ZOOMS):  # on the least of each interval
+        at = left[:, None] + width * np.linspace(0, 1, 9)
+        best = np.argmin(norm(at), axis=1)
+        left, width = at[np.arange(K), np.clip(best - 1, 0, 6)], width / 4
+    least = left + width / 2
+    graded = np.append(0.0, 0.5 ** np.arange(_GRADES, -1, -1))  # from the least outwards
+    points, weights = np.polynomial.legendre.leggauss(_GAUSS)
+    total = np.zeros(K)
+    for reach in (least, least - 1.0):  # to the left end and to the right one
+        middle = least[:, None] - reach[:, None] * (graded[1:] + graded[:-1]) / 2
+        half = np.abs(reach)[:, None] * (graded[1:] - graded[:-1]) / 2
+        at = middle[:, :, None] + half[:, :, None] * points
+        total += np.sum(norm(at.reshape(K, -1)).reshape(at.shape) * half[:, :, None] * weights, axis=(1, 2))
+    angle: float = np.sum(total).item() * length / K
+    return angle
+
+
+def shape_of(values: Array, s: Array, length_unit: float, force_unit: float) -> Shape:
+    """Return the shape in SI units from scaled states and strains (24, M)."""
+    return Shape(
+        arc=s,
+        position=values[0:3].T * length_unit,
+        rotation=values[3:12].T.reshape(-1, 3, 3).transpose(0, 2, 1),
+        force=values[12:15].T * force_unit,
+        moment=values[15:18].T * force_unit * length_unit,
+        shear_extension=values[18:21].T,
+        curvature=values[21:24].T / length_unit,
+    )
+
+
+def section_radii(model: Model, stretch: float) -> SectionRadii:
+    """Return the deformed radii at a stretch, for drawing."""
+    section = deform(
+        model.robot, model.material, [0.0] * model.robot.chamber_sets, stretch, model.coefficients, model.conventions
+    )
+    return SectionRadii(
+        outer=float(section.outer_radius),
+        lumen=float(section.lumen_radius),
+        chamber_circle=float(section.chamber_circle_radius),
+        chamber=float(section.chamber_radius),
+        bore=float(section.bore_radius),
+    )
+
+
+def stability(loads: Loads, is_minimum: bool | None) -> bool | None:
+    """Return whether a pose is stable, undefined (None) under a dead tip moment: in space that has no potential."""
+    return None if np.any(loads.tip_moment) else is_minimum
+
+
+def pose_of(
+    model: Model, outputs: dict[str, Array], shape: Shape, bending: float, unloaded_tip: Array, stable: bool | None
+) -> Pose:
+    """Assemble a pose. outputs : of the load case, SI. unloaded_tip : tip at this pressure without loads [m].
+
+    bending : of `bending_angle`, in place of the output, whose quadrature is of second order at a kink.
+    """
+    stretch = float(outputs["stretch"][0])
+    R = np.asarray(outputs["tip_rotation"])
+    tip = np.asarray(outputs["tip_position"])
+    axis = R[:, 2]
+    return Pose(
+        stretch=stretch,
+        stable=stable,
+        tip_position=tip,
+        tip_displacement=tip - unloaded_tip,
+        tip_rotation=R,
+        bending_angle=bending,
+        tilt=float(np.arctan2(np.hypot(axis[0], axis[1]), axis[2])),
+        backbone_length=float(outputs["backbone_length"][0]),
+        chamber_length=np.atleast_1d(outputs["chamber_lengths"]),
+        radii=section_radii(model, stretch),
+        shape=shape,
+    )
+
+
+def pose_warnings(model: Model, pose: Pose) -> tuple[str, ...]:
+    """Return what a designer should know of a solved pose: fitted range, touching chambers, stability, its body."""
+    found = []
+    low, high = model.material.fitted_stretch
+    if not low <= pose.stretch <= high:
+        found.append(
+            f"stretch {pose.stretch:.3f} is outside {low:g} to {high:g}, where {model.material.name} was fitted"
+        )
+    limit = touching_stretch(model.robot)
+    if pose.stretch > limit:
+        found.append(f"stretch {pose.stretch:.3f} is above {limit:.3f}, where neighbouring reinforced chambers touch")
+    if np.min(pose.shape.shear_extension[:, 2]) <= 0:
+        found.append("the load compresses the rod to nothing somewhere (v_z <= 0); the model does not hold there")
+    if pose.stable is None:
+        found.append(
+            "stability is undefined: a dead tip moment in space has no potential, so there is no energy to be least"
+        )
+    elif not pose.stable:
+        found.append("this equilibrium is not stable: the real robot buckles away from it")
+    return (*found, *pose.fit.warnings)

@@ -1,0 +1,110 @@
+"""What is compiled for poses on one grid, and a solution on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.model.rod import STATE_SIZE
+from softnlp.nlp.problem import CompiledProblem
+from softnlp.nlp.solver import Engine, Solution
+from softnlp.statics.loadcase import LoadCase
+
+Array = NDArray[np.float64]
+
+_ROUGH = 1e-2  # error of a grid whose word on stability does not count
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Everything compiled for one number of intervals.
+
+    engine : Newton's method to full tolerance. stepper : the same, loosely, for points of a path. reference : IPOPT.
+    order : of the transcription's error at the nodes.
+    iteration_cost : time of one Newton iteration, in units of one interval of Runge-Kutta (some 0.07 ms).
+    """
+
+    case: LoadCase
+    engine: Engine
+    stepper: Engine
+    reference: Engine
+    transition: ca.Function
+    order: int
+    iteration_cost: float
+
+    @property
+    def problem(self) -> CompiledProblem:
+        """The compiled problem, with every quantity fixed."""
+        return self.engine.problem
+
+    @property
+    def intervals(self) -> int:
+        """The number of intervals."""
+        return self.case.transcribed.node_index.size - 1
+
+    def nodes(self, x: Array) -> Array:
+        """Return the scaled node states (18, K + 1) in x."""
+        states = x[1:].reshape(-1, STATE_SIZE).T
+        return np.ascontiguousarray(states[:, self.case.transcribed.node_index])
+
+    def constants(self, solution: Solution) -> Array:
+        """Return what the field takes beside the state."""
+        return np.asarray(self.problem.case_constants(solution.x, solution.p)).ravel()
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A solution on a grid and what was found of it.
+
+    nodes : (18, K + 1) scaled states. limit : what they tend to on finer grids, where those begin. constants : what the
+    field takes beside them. error : estimated tip position error over L_0. rotation_error : the same for the tip's
+    orientation [rad]. stable : no conjugate point.
+    """
+
+    grid: Grid
+    solution: Solution
+    nodes: Array
+    limit: Array
+    constants: Array
+    error: float
+    rotation_error: float
+    stable: bool
+
+    @property
+    def intervals(self) -> int:
+        """The number of intervals."""
+        return self.grid.intervals
+
+    @property
+    def is_rough(self) -> bool:
+        """Whether the pose is not stable on its grid, which is so coarse that it may be on another."""
+        return not self.stable and self.refinement_error > _ROUGH
+
+    @property
+    def refinement_error(self) -> float:
+        """What refinement holds against the accuracy: a rotation is allowed five times as much as a position."""
+        return max(self.error, self.rotation_error / 5)
+
+
+def next_size(wanted: float) -> int:
+    """Return the first grid size of at least `wanted`; sizes grow by the square root of 2, so that few are compiled."""
+    k = 0
+    while (size := 5 * round(2 ** (k / 2))) < wanted:
+        k += 1
+    return size
+
+
+def pose_weight(x: Array) -> Array:
+    """Return the weight of each entry of x in an arc length that is the mean over the nodes of the change of pose."""
+    states = np.zeros((x.size // STATE_SIZE, STATE_SIZE))
+    states[:, :12] = 1.0 / len(states)
+    return np.concatenate([[0.0], states.ravel()])
+
+
+def pose_distance(change: Array) -> float:
+    """Return the largest change of a scaled position or of a direction cosine between two x."""
+    states = change[1:].reshape(-1, STATE_SIZE)
+    return float(np.max(np.abs(states[:, :12])))

@@ -1,0 +1,84 @@
+"""Whether an equilibrium is a minimum of the potential energy: the index of its second variation.
+
+The loads are dead and the pressures fixed, so the rod has an energy. Its second variation is summed from tip to base:
+the part of the rod beyond a node answers a small pose of the node with a stiffness, the interval before the node with
+its own, and their sum, symmetric at an equilibrium, has as many negative eigenvalues as the node adds directions in
+which the energy falls. The total is the number of conjugate points (Morse); it is exact for points that coincide, as
+the two of a round column that buckles in both planes at once, where a determinant keeps its sign.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.model import rod
+from softnlp.nlp.transcription import RK4, rk_step
+from softnlp.statics.loadcase import unpack_section
+
+Array = NDArray[np.float64]
+
+_SUBSTEPS = 2
+MOST_INTERVALS = 225
+"""Intervals of a finer grid are taken together: the index is a whole number, which needs no finer ones."""
+
+
+def _perturbed(x: Any, delta: Any) -> Any:
+    """Move a state along 12 independent directions: p, a rotation about the world axes, n, m."""
+    p, R, n, m = rod.unpack(x)
+    R_moved = (ca.SX.eye(3) + rod.hat(delta[3:6])) @ R
+    return ca.vertcat(p + delta[0:3], ca.reshape(R_moved, 9, 1), n + delta[6:9], m + delta[9:12])
+
+
+def transition_functions(field: ca.Function) -> tuple[ca.Function, ca.Function]:
+    """Return the linearised step over one interval and the linearised tip balance.
+
+    field : of a load case. The first maps (x, c, h) to the 12x12 matrix from variations at x to those a step h
+    further; the second maps the tip's (x, c) to the 6x6 matrix A with d(n, m) = -A d(pose) at the tip, for a dead load.
+    """
+    x, c, h = ca.SX.sym("x", rod.STATE_SIZE), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("h")
+    delta = ca.SX.sym("delta", 12)
+    step = rk_step(field, RK4)
+    end = _perturbed(x, delta)
+    for _ in range(_SUBSTEPS):
+        end = step(end, c, h / _SUBSTEPS)
+    reached = ca.substitute(end, delta, ca.SX.zeros(12))
+    R = rod.unpack(reached)[1]
+    moved = ca.jacobian(end, delta)
+    rows = []
+    for j in range(12):
+        W = ca.reshape(moved[3:12, j], 3, 3) @ R.T
+        turn = ca.vertcat(W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]) / 2
+        rows.append(ca.vertcat(moved[0:3, j], turn, moved[12:18, j]))
+    transition = ca.substitute(ca.horzcat(*rows), delta, ca.SX.zeros(12))
+
+    balance = rod.tip_balance(_perturbed(x, delta), unpack_section(c), ca.SX.zeros(3), ca.SX.zeros(3))
+    tip = ca.substitute(ca.jacobian(balance, delta[:6]), delta, ca.SX.zeros(12))
+    return (
+        ca.Function("transition", [x, c, h], [transition], {"cse": True}),
+        ca.Function("tip_variation", [x, c], [tip], {"cse": True}),
+    )
+
+
+def conjugate_points(transition: ca.Function, tip_variation: ca.Function, nodes: Array, constants: Array) -> int:
+    """Count the directions in which the energy falls, from tip to base; 0 means stable.
+
+    transition : of `transition_functions`, mapped over the intervals, at most `MOST_INTERVALS`. nodes : (18, K + 1)
+    states of a solution.
+    """
+    K = min(nodes.shape[1] - 1, MOST_INTERVALS)
+    chosen = np.linspace(0, nodes.shape[1] - 1, K + 1).round().astype(int)
+    nodes, h = nodes[:, chosen], np.diff(chosen) / chosen[-1]
+    Phi = np.asarray(transition(nodes[:, :K], constants, h[None, :])).reshape(12, K, 12).transpose(1, 0, 2)
+    A, B, C, D = Phi[:, :6, :6], Phi[:, :6, 6:], Phi[:, 6:, :6], Phi[:, 6:, 6:]
+    before = D @ np.linalg.inv(B)  # force at a node by its pose, with the node before it held
+    beyond = -np.asarray(tip_variation(nodes[:, K], constants))  # and by the part of the rod beyond it
+    every = np.empty((K, 6, 6))
+    for k in range(K - 1, -1, -1):
+        every[k] = before[k] - beyond
+        # Carry the stiffness of the rod beyond over the interval: f_left as a function of the pose at its left.
+        beyond = np.linalg.solve(D[k] - beyond @ B[k], beyond @ A[k] - C[k])
+    return int(np.sum(np.linalg.eigvalsh((every + every.transpose(0, 2, 1)) / 2) < 0))

@@ -1,0 +1,306 @@
+"""What a study returns for each step: plain frozen numbers in SI units and the world frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.base.status import Status
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.conventions import Coefficients, Conventions
+from softnlp.model.materials import Material
+from softnlp.model.robot import Robot
+from softnlp.model.rod import Loads
+from softnlp.nlp.solver import EquationResidual
+from softnlp.statics.body import Fit, fit_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """The rod at M points from base to tip.
+
+    Attributes
+    ----------
+    arc
+        (M,) s/L, from 0 to 1 [1].
+    position
+        (M, 3) p, world frame [m].
+    rotation
+        (M, 3, 3) R, columns are the body axes in the world frame [1].
+    force, moment
+        (M, 3) n [N] and m [N m], world frame.
+    shear_extension, curvature
+        (M, 3) v [1] and u [1/m], body frame.
+    """
+
+    arc: Array
+    position: Array
+    rotation: Array
+    force: Array
+    moment: Array
+    shear_extension: Array
+    curvature: Array
+
+
+@dataclass(frozen=True)
+class SectionRadii:
+    """Deformed section, Eqs. (22), (S2).
+
+    Attributes
+    ----------
+    outer, lumen, chamber_circle
+        r_r, r_i, r_cp [m].
+    chamber, bore
+        r_co, which the thread keeps, and r_ci [m].
+    """
+
+    outer: float
+    lumen: float
+    chamber_circle: float
+    chamber: float
+    bore: float
+
+
+STABLE_FLAGS = {"undefined": -1, "unstable": 0, "stable": 1}
+"""What files of numbers hold for `Pose.stable`."""
+SELF_INTERSECTING_FLAGS = {"not_solved": -1, "no": 0, "self_intersecting": 1}
+"""What files of numbers hold for `Fit.self_intersecting`."""
+STABLE_MEANING = "no conjugate point on the rod; undefined under a dead tip moment and without a solution"
+
+
+def stable_flag(stable: bool | None) -> int:
+    """Return the flag of `Pose.stable`."""
+    return STABLE_FLAGS["undefined"] if stable is None else int(stable)
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """A solved static pose, world frame.
+
+    Attributes
+    ----------
+    stretch
+        lambda, of the pressure alone [1].
+    stable
+        No conjugate point on the rod, so that the energy is least; None under a dead tip moment, which has no energy.
+    tip_position
+        (3,) [m].
+    tip_displacement
+        (3,) against the shape at the same pressure without gravity or tip load [m].
+    tip_rotation
+        (3, 3) R, columns are the body axes [1].
+    bending_angle
+        Integral of sqrt(u_x^2 + u_y^2) over s [rad].
+    tilt
+        Angle between tip axis and +z [rad].
+    backbone_length
+        Integral of the norm of v [m].
+    chamber_length
+        (N,) [m].
+    radii
+        Of the deformed section.
+    shape
+        The whole rod.
+    """
+
+    stretch: float
+    stable: bool | None
+    tip_position: Array
+    tip_displacement: Array
+    tip_rotation: Array
+    bending_angle: float
+    tilt: float
+    backbone_length: float
+    chamber_length: Array
+    radii: SectionRadii
+    shape: Shape
+
+    @cached_property
+    def fit(self) -> Fit:
+        """Whether a body can take the shape, found when it is first asked for."""
+        shape = self.shape
+        shortened = np.maximum(shape.shear_extension[:, 2], np.finfo(float).tiny)  # curvature is per reference length
+        curvature = np.hypot(shape.curvature[:, 0], shape.curvature[:, 1]) / shortened
+        return fit_of(shape.position, shape.rotation, self.radii.outer, curvature)
+
+
+@dataclass(frozen=True)
+class WeightSensitivity:
+    """How the force of `weighted` answers to one weight.
+
+    Attributes
+    ----------
+    weight
+        "force", "moment", "length" or "position".
+    value
+        The weight used, in `unit` [SI].
+    unit
+        Of the weight.
+    elasticity
+        d ln F / d ln W at that value [1].
+    """
+
+    weight: str
+    value: float
+    unit: str
+    elasticity: float
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """The wall and what it does to the tip in one step of a blocked force, world frame.
+
+    Attributes
+    ----------
+    force
+        What the wall pushes with, not negative [N].
+    normal
+        (3,) unit, the direction in which it pushes the robot [1].
+    wall_point
+        (3,) a point of the wall [m].
+    tip_cap
+        L_t [m].
+    closure
+        Which equations closed the problem.
+    chamber_reaction
+        (N,) T_i, without P A_c [N].
+    free
+        The free shape at the same pressure and loads.
+    gap
+        Distance of the free shape's contact point in front of the wall, negative beyond it [m].
+    length_error
+        e_L, Eq. (14) [m].
+    weighted
+        What `weighted` left of e_n, e_m, e_L, e_h.
+    sensitivity
+        Of its force to its weights, where that was asked for.
+    """
+
+    force: float
+    normal: Array
+    wall_point: Array
+    tip_cap: float
+    closure: str
+    chamber_reaction: Array
+    free: Pose
+    gap: float
+    length_error: float
+    weighted: tuple[EquationResidual, ...] = ()
+    sensitivity: tuple[WeightSensitivity, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Aimed:
+    """A target of inverse kinematics and how near the tip comes to it at the step's pressure, world frame.
+
+    Attributes
+    ----------
+    position, direction
+        (3,) of the target, [m] and [1], or None where it has none.
+    distance, angle
+        What is left of them, [m] and [rad], or None.
+    tip_position, tip_direction
+        (3,) where the tip is then, [m] and [1], also where that is the nearest reachable point only; None without any
+        pose.
+    optimal
+        Whether the pressures satisfy the first-order conditions of what was chosen: the least pressures where the
+        target is met with sets to spare, else the nearest tip. None where nothing was left to choose.
+    """
+
+    position: Array | None
+    direction: Array | None
+    distance: float | None = None
+    angle: float | None = None
+    tip_position: Array | None = None
+    tip_direction: Array | None = None
+    optimal: bool | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One step of a run: its input, how it ended, and the pose when it was solved.
+
+    Attributes
+    ----------
+    pressure
+        (sets,) gauge [Pa].
+    status, message
+        How it ended, and what that means.
+    time
+        As given with the pressures [s].
+    pose
+        None where it was not solved; of a blocked force it is the blocked shape.
+    residual
+        Largest scaled equation error [1], or None when nothing was evaluated.
+    certificate
+        Every equation's own.
+    discretisation_error
+        Estimated tip position error over L_0 [1].
+    intervals, iterations
+        Of the grid and of every attempt that led here.
+    solve_time
+        Of the step [s].
+    warnings
+        What to know of the pose.
+    contact
+        Of a blocked force, else None.
+    aimed
+        Of inverse kinematics, else None.
+    """
+
+    pressure: Array
+    status: Status
+    message: str
+    time: float | None = None
+    pose: Pose | None = None
+    residual: float | None = None
+    certificate: tuple[EquationResidual, ...] = ()
+    discretisation_error: float | None = None
+    intervals: int | None = None
+    iterations: int = 0
+    solve_time: float = 0.0
+    warnings: tuple[str, ...] = ()
+    contact: Contact | None = None
+    aimed: Aimed | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A finished study: what was asked and its steps.
+
+    Attributes
+    ----------
+    study
+        As a scenario names it.
+    robot, material, coefficients, conventions, loads
+        As given.
+    steps
+        In order.
+    title
+        As given.
+    warnings
+        Of the robot.
+    contact
+        Of a blocked force, else None.
+    """
+
+    study: str
+    robot: Robot
+    material: Material
+    coefficients: Coefficients
+    conventions: Conventions
+    loads: Loads
+    steps: tuple[Step, ...]
+    title: str = ""
+    warnings: tuple[str, ...] = field(default=())
+    contact: ContactSettings | None = None
+
+    @property
+    def failed(self) -> tuple[Step, ...]:
+        """The steps that carry no solution."""
+        return tuple(s for s in self.steps if not s.status.has_solution)

@@ -1,0 +1,242 @@
+"""The result of a sweep as a self-describing netCDF file, made from its journal in little memory."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
+from itertools import islice
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.base.files import placed_whole
+from softnlp.base.netcdf import as_characters, encoded, put, put_attributes, put_characters, said
+from softnlp.batch.plan import Plan
+from softnlp.batch.poses import Rows
+from softnlp.model.inputs import (
+    coefficients_table,
+    contact_table,
+    conventions_table,
+    loads_table,
+    material_table,
+    robot_table,
+    versions,
+)
+from softnlp.sweep.columns import LONGEST_STATUS, TEXT, Column, columns
+from softnlp.sweep.journal import Journal
+from softnlp.sweep.sink import Sink
+
+MEMORY = 128 * 2**20
+"""Bytes of rows that are put in the order of the plan at once."""
+
+_TEXTS_AT_ONCE = 65_536
+_AXES = ("x", "y", "z")
+
+
+def write_workspace(path: str | PathLike[str], plan: Plan, journal: Journal, about: Mapping[str, str]) -> Path:
+    """Write every pose of a finished journal as netCDF, whole or not at all; return its path.
+
+    Dimensions: `pose`, `set` and `chamber` count from 1; `axis`, `row` (world) and `col` (body) are x, y, z; `unsolved`
+    are the poses that ended otherwise than solved, with what was said of each. Poses stand in the order of the plan.
+
+    Parameters
+    ----------
+    about : further attributes of the file.
+
+    Raises
+    ------
+    InputError
+        When the journal is damaged or the file cannot be written.
+    """
+    import h5netcdf
+
+    listed = columns(plan)
+    with placed_whole(path) as part, part.open("w+b", buffering=0) as raw:
+        # HDF5 that writes to a full disk by itself ends the interpreter.
+        sink = Sink(raw)
+        try:
+            with h5netcdf.File(sink, "w") as file:
+                put_attributes(file, _attributes(plan) | dict(about))
+                _declare(file, plan, listed)
+                sink.check()
+                for start, rows in _slabs(plan, journal, MEMORY):
+                    numbers = np.arange(start, start + rows.size, dtype=np.int64)
+                    for column in listed:
+                        values = column.of(rows, numbers)
+                        if column.kind == TEXT:
+                            values = as_characters(values.astype(f"S{LONGEST_STATUS}"))
+                        file.variables[column.name][start : start + rows.size] = values
+                        sink.check()
+                _write_messages(file, journal, sink)
+        finally:
+            sink.check()  # what the disk said comes before what HDF5 made of it
+    return Path(path)
+
+
+def write_csv(path: str | PathLike[str], plan: Plan, journal: Journal) -> Path:
+    """Write every pose of a finished journal as a row of CSV, whole or not at all; return its path.
+
+    Columns are those of the netCDF file, `p1_bar`, `tip_position_x_mm`, `chamber_length_1_mm` and so on where it has
+    several numbers a pose; what a pose without a solution does not have is empty.
+
+    Raises
+    ------
+    InputError
+        As `write_workspace`.
+    """
+    listed = columns(plan)
+    sizes = _sizes(plan)
+    with placed_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["pose", *(name for column in listed for name in _flat_names(column, sizes))])
+        for start, rows in _slabs(plan, journal, MEMORY // 16):
+            numbers = np.arange(start, start + rows.size, dtype=np.int64)
+            cells: list[list[Any]] = [(numbers + 1).tolist()]
+            for column in listed:
+                values = column.of(rows, numbers).reshape(rows.size, -1)
+                cells += [_cells(entry) for entry in values.T]
+            table.writerows(zip(*cells, strict=True))
+    return Path(path)
+
+
+def data_hash(path: str | PathLike[str]) -> str:
+    """Return a digest of every variable of a netCDF file: names, dimensions, types and values, without attributes."""
+    import h5netcdf
+
+    digest = hashlib.sha256()
+    with h5netcdf.File(path, "r", decode_vlen_strings=True) as file:
+        for name in sorted(file.variables):
+            variable = file.variables[name]
+            digest.update(f"{name} {variable.dimensions} {variable.shape} {variable.dtype}\n".encode())
+            for start in range(0, variable.shape[0], _TEXTS_AT_ONCE):
+                values = np.asarray(variable[start : start + _TEXTS_AT_ONCE])
+                if values.dtype.kind == "O":  # of a file of version 0.1
+                    digest.update("\0".join(map(str, values.tolist())).encode())
+                else:
+                    digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()
+
+
+def fingerprint_of(path: str | PathLike[str]) -> str | None:
+    """Return the fingerprint of the plan that a result file belongs to, None where there is no such file."""
+    import h5netcdf
+
+    try:
+        with h5netcdf.File(path, "r") as file:
+            return str(file.attrs["fingerprint"])
+    except (OSError, KeyError):
+        return None
+
+
+def _sizes(plan: Plan) -> dict[str, int]:
+    robot = plan.model.robot
+    return {"set": robot.chamber_sets, "axis": 3, "row": 3, "col": 3, "chamber": robot.chambers}
+
+
+def _declare(file: Any, plan: Plan, listed: tuple[Column, ...]) -> None:
+    """Make the dimensions, their coordinates and every variable."""
+    sizes = {"pose": plan.poses, **_sizes(plan)}
+    file.dimensions = sizes
+    for name, meaning in (("pose", "pose of the sweep"), ("set", "chamber set"), ("chamber", "chamber, set by set")):
+        numbers = np.arange(1, sizes[name] + 1, dtype=np.int64)
+        put(file, name, (name,), numbers, said("1", f"{meaning}, from 1"))
+    for name, meaning in (("axis", "axis"), ("row", "world axis"), ("col", "body axis")):
+        put(file, name, (name,), np.array(_AXES), said("1", meaning))
+    for column in listed:
+        dims, attributes = ("pose", *column.dims), said(column.unit, column.meaning, **column.more)
+        if column.kind == TEXT:
+            put_characters(file, column.name, dims, LONGEST_STATUS, attributes)
+        else:
+            put_attributes(file.create_variable(column.name, dims, column.kind), attributes)
+
+
+def _slabs(plan: Plan, journal: Journal, memory: int) -> Iterator[tuple[int, Rows]]:
+    """Yield the first number and the rows of consecutive poses, in the order of the plan."""
+    kind = plan.row_type
+    size = max(plan.chunk, memory // kind.itemsize)
+    place = np.empty(plan.poses, np.int64)
+    place[plan.order] = np.arange(plan.poses)
+    whole = f"V{kind.itemsize}"  # rows are moved as bytes, not field by field
+    for start in range(0, plan.poses, size):
+        stop = min(start + size, plan.poses)
+        rows = np.empty(stop - start, kind)
+        everything = stop - start == plan.poses
+        for block in journal.blocks(None if everything else np.unique(place[start:stop] // plan.chunk).tolist()):
+            numbers, given = block.rows["pose"], block.rows.view(whole)
+            if not everything:
+                inside = (numbers >= start) & (numbers < stop)
+                numbers, given = numbers[inside], given[inside]
+            rows.view(whole)[numbers - start] = given
+        yield start, rows
+
+
+def _write_messages(file: Any, journal: Journal, sink: Sink) -> None:
+    """Write what was said of poses that ended otherwise than solved, in the order in which they were walked."""
+    lengths = [len(text.encode()) for _, text in journal.messages()]
+    if not lengths:
+        return
+    file.dimensions["unsolved"] = len(lengths)
+    poses = file.create_variable("unsolved_pose", ("unsolved",), "i8")
+    put_attributes(poses, said("1", "pose that ended otherwise than solved, from 1"))
+    about = said("1", "how it ended, in words")
+    width = max(1, *lengths)
+    texts = put_characters(file, "unsolved_message", ("unsolved",), width, about)
+    told = journal.messages()
+    for start in range(0, len(lengths), _TEXTS_AT_ONCE):
+        part = list(islice(told, _TEXTS_AT_ONCE))
+        poses[start : start + len(part)] = np.array([pose + 1 for pose, _ in part], np.int64)
+        texts[start : start + len(part)] = as_characters(encoded((text for _, text in part), width))
+        sink.check()
+
+
+def _attributes(plan: Plan) -> dict[str, str]:
+    model = plan.model
+    tables = {
+        "robot": robot_table(model.robot),
+        "material": material_table(model.material),
+        "coefficients": coefficients_table(model.coefficients),
+        "loads": loads_table(plan.loads),
+        "versions": versions(),
+        "conventions_in_full": conventions_table(model.conventions),
+        "varied": list(plan.varied),
+        **({} if plan.contact is None else {"contact": contact_table(plan.contact)}),
+    }
+    return {
+        "study": "workspace",
+        "conventions": model.conventions.name,
+        "softnlp": versions()["softnlp"],
+        **{name: json.dumps(table, ensure_ascii=False, allow_nan=False) for name, table in tables.items()},
+        "fingerprint": plan.fingerprint(),
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def _flat_names(column: Column, sizes: Mapping[str, int]) -> list[str]:
+    """Return the CSV columns of a variable: an index goes before the unit."""
+    if not column.dims:
+        return [column.name]
+    if column.name == "pressure_bar":
+        return [f"p{k}_bar" for k in range(1, sizes["set"] + 1)]
+    labels = [
+        list(_AXES) if sizes[d] == 3 and d != "chamber" else list(map(str, range(1, sizes[d] + 1))) for d in column.dims
+    ]
+    stem, unit = column.name, ""
+    if column.unit != "1":
+        stem, _, unit = column.name.rpartition("_")
+        unit = f"_{unit}"
+    names = [stem]
+    for several in labels:
+        names = [f"{name}_{label}" for name in names for label in several]
+    return [name + unit for name in names]
+
+
+def _cells(values: NDArray[Any]) -> list[Any]:
+    """Return a column as Python values, None where there is no number."""
+    cells: list[Any] = values.tolist()
+    return cells if values.dtype.kind != "f" else [None if value != value else value for value in cells]
