@@ -10,9 +10,9 @@ import pytest
 
 from softnlp import BAR, Loads, Numerics, forward, material, robot
 from softnlp.model.quantities import Model
+from softnlp.statics import attempts as ladder
 from softnlp.statics.attempts import LOADS, Attempt, Goal, Work, attempts
 from softnlp.statics.solver import PoseSolver
-from softnlp.studies import attempts as ladder
 
 BODY, SILICONE = robot("D10L60"), material("Ecoflex 00-50", "mooney-rivlin")
 INTERVALS = 8

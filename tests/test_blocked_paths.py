@@ -17,6 +17,7 @@ from softnlp.base.status import Status
 from softnlp.model.contact_settings import ClosureWeights, ContactSettings
 from softnlp.model.quantities import Model
 from softnlp.nlp.solver import Solution
+from softnlp.statics import weighted
 from softnlp.statics.blocked import BlockedSolver, _Ended
 from softnlp.statics.blocked_grid import Blocked, BlockedGrid
 from softnlp.statics.blocked_step import solved_step
@@ -26,7 +27,7 @@ from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
 from softnlp.statics.wall import Situation, Wall, standing_wall
 from softnlp.statics.weighted import Weighted
-from softnlp.studies import force_inversion, weighted
+from softnlp.studies import force_inversion
 
 D25, ECOFLEX = robot("D25L60"), material("Ecoflex 00-50")
 OGDEN = material("Ecoflex 00-50", "ogden")
@@ -49,9 +50,9 @@ def of(numerics: Numerics = COARSE, **contact: Any) -> BlockedSolver:
 
 def copied() -> BlockedSolver:
     """Return the shared solver with grids of its own, so that what is changed of them stays here."""
-    assert found_at(0.5).grid in shared()._grids.values()
+    assert found_at(0.5).grid in shared().equations.grids.values()
     other = copy(shared())
-    other._grids = dict(shared()._grids)
+    other.equations = replace(other.equations, grids=dict(other.equations.grids))
     return other
 
 
@@ -91,9 +92,11 @@ def fails(p: Any, x: Any) -> Solution:
 
 def with_engines(solver: BlockedSolver, **engines: Callable[[Any, Any], Solution]) -> None:
     """Put other engines into the compiled grids of a solver."""
-    for key, grid in solver._grids.items():
-        new = {name: Instead(getattr(grid, name), solve) for name, solve in engines.items()}
-        solver._grids[key] = replace(grid, **new)
+    grids = solver.equations.grids
+    for key, grid in grids.items():
+        if isinstance(grid, BlockedGrid):
+            new = {name: Instead(getattr(grid, name), solve) for name, solve in engines.items()}
+            grids[key] = replace(grid, **new)
 
 
 # --- the path --------------------------------------------------------------------------------------------------------
@@ -105,7 +108,7 @@ def test_another_closure_shares_the_free_shape_and_is_that_closure() -> None:
     alone = of(closure="free")
     assert force(solve(other, 0.5)[0]) == pytest.approx(force(solve(alone, 0.5)[0]), rel=1e-9)
     assert force(solve(other, 0.5)[0]) < 0.9 * force(solve(shared(), 0.5)[0])
-    assert shared().with_contact(ContactSettings(tip_cap=1e-3))._grids is shared()._grids
+    assert shared().with_contact(ContactSettings(tip_cap=1e-3)).equations is shared().equations
 
 
 def test_a_shape_away_from_the_wall_that_its_grid_cannot_hold_has_no_force() -> None:

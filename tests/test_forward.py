@@ -31,8 +31,8 @@ from softnlp.model.materials import Material
 from softnlp.model.numerics import Numerics
 from softnlp.model.robot import ROBOTS, Robot
 from softnlp.model.rod import Loads
+from softnlp.statics import solver as statics
 from softnlp.statics.step import Pose, Step
-from softnlp.studies import statics
 from softnlp.studies.forward import forward
 
 ECOFLEX_50 = silicone("Ecoflex 00-50")

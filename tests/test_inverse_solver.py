@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from softnlp import BAR, Coefficients, Loads, Numerics, Status, inverse, material, robot
 from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
+from softnlp.nlp import bounded
 from softnlp.nlp.bounded import Limits, Measured, least_norm, nearest
 from softnlp.nlp.solver import Solution
 from softnlp.statics.branch import stretch_on_branch
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
-from softnlp.studies import bounded, inverse_solver
+from softnlp.studies import inverse_solver
 from softnlp.studies.aiming import Aim, aim_of
 from softnlp.studies.derivatives import PoseDerivatives
 from softnlp.studies.inverse_nlp import InverseProblem, inverse_problem, pressure_of

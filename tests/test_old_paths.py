@@ -46,6 +46,7 @@ def test_names_that_left_their_module_are_found_where_they_were() -> None:
     assert load_scenario is softnlp.load_scenario
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_a_name_that_was_never_there_is_none() -> None:
     with pytest.warns(DeprecationWarning, match="softnlp.scenario.load_scenario is now softnlp.scenario.read"):
         importlib.import_module("softnlp.scenario").load_scenario  # noqa: B018

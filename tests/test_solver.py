@@ -28,13 +28,14 @@ from softnlp.nlp import solver
 from softnlp.nlp.continuation import follow, straight_path
 from softnlp.nlp.solver import Engine, Solution, SparseSolver, certificate, discretisation_correction, violation
 from softnlp.nlp.transcription import Collocation, MultipleShooting, Transcription
+from softnlp.statics import compiled
+from softnlp.statics import solver as statics
 from softnlp.statics.attempts import Attempt
 from softnlp.statics.branch import stretch_on_branch
 from softnlp.statics.condensed import CondensedSolver
 from softnlp.statics.loadcase import rod_functions
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
-from softnlp.studies import statics
 from softnlp.studies.forward import forward
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # benchmarks/ is not installed
@@ -400,7 +401,7 @@ def test_what_cannot_be_judged_is_not_a_solution(monkeypatch: pytest.MonkeyPatch
         raise np.linalg.LinAlgError("Singular matrix")
 
     with monkeypatch.context() as patched:
-        patched.setattr(statics, "conjugate_points", singular)
+        patched.setattr(compiled, "conjugate_points", singular)
         step = solve()
         assert step.status is Status.DIVERGED
         assert "cannot be judged: Singular matrix" in step.message

@@ -10,7 +10,7 @@ import pytest
 
 from softnlp import BAR, Loads, Numerics, material, robot
 from softnlp.base.status import Status
-from softnlp.batch import newton, shooting, stretches
+from softnlp.batch import newton, pose_lane, shooting, stretches
 from softnlp.batch.chunk import ChunkSolver
 from softnlp.batch.compiled import compiler
 from softnlp.batch.contact_newton import PATH, BlockedShot, ContactBatch, Stage
@@ -29,7 +29,6 @@ from softnlp.statics.loadcase import rod_functions
 from softnlp.statics.solver import PoseSolver
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.forward import forward
-from softnlp.sweep import pose_lane
 
 REPRODUCTION_SET = Coefficients()
 LOADED = Loads(tip_force=(0.02, 0.01, -0.015), tip_moment=(1e-4, -2e-4, 1e-4), gravity=(0.0, 0.0, -9.80665))

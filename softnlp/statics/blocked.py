@@ -17,15 +17,16 @@ from softnlp.model.quantities import Model
 from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.model.tip import tip_conditions
 from softnlp.nlp.continuation import follow
-from softnlp.nlp.problem import CompiledProblem, compile_problem
+from softnlp.nlp.problem import compile_problem
 from softnlp.nlp.solver import Engine, Solution
 from softnlp.nlp.transcription import MultipleShooting, method_named
 from softnlp.statics.blocked_grid import Blocked, BlockedGrid
 from softnlp.statics.blocked_step import failed_step, solved_step, touching_step
+from softnlp.statics.compiled import RodEquations, rod_equations
 from softnlp.statics.condensed import CondensedSolver
 from softnlp.statics.free_shape import Free, FreeShapes, free_shape, from_zero
-from softnlp.statics.loadcase import LoadCase, load_case, rod_functions
-from softnlp.statics.pose import between_nodes, shape_function
+from softnlp.statics.loadcase import RodFunctions, load_case
+from softnlp.statics.pose import between_nodes
 from softnlp.statics.solver import MOST_INTERVALS, PoseSolver
 from softnlp.statics.step import Step
 from softnlp.statics.wall import Situation, Wall
@@ -70,6 +71,7 @@ class BlockedSolver:
         *,
         wall: bool = True,
         poses: PoseSolver | None = None,
+        equations: RodEquations | None = None,
     ) -> None:
         self.model = model
         self.numerics = numerics
@@ -77,11 +79,7 @@ class BlockedSolver:
         self.has_wall = wall
         # Without loads the free lengths and tip are taken from the closed form, so the grid need not show it.
         self.poses = poses or PoseSolver(model, numerics, unloaded_accuracy=numerics.accuracy)
-        self.functions = rod_functions(model, tip_conditions(contact.closure, wall=wall))
-        self._declared = self.functions.declared()
-        self._transfer = shape_function(self.functions.field)
-        self._grids: dict[tuple[int, bytes], BlockedGrid] = {}
-        self._compiled: dict[int, tuple[LoadCase, CompiledProblem, CondensedSolver]] = {}
+        self.equations = equations or rod_equations(model, tip_conditions(contact.closure, wall=wall))
 
     def with_contact(self, contact: ContactSettings) -> BlockedSolver:
         """Return a solver with other settings that shares what both need compiled."""
@@ -89,9 +87,12 @@ class BlockedSolver:
             return BlockedSolver(self.model, self.numerics, contact, wall=self.has_wall, poses=self.poses)
         other = copy(self)
         other.contact = contact
-        if contact.weights != self.contact.weights:
-            other._grids = {}  # what they minimise has the weights in it
         return other
+
+    @property
+    def functions(self) -> RodFunctions:
+        """The rod under the closure, see `RodFunctions`."""
+        return self.equations.functions
 
     def with_model(self, model: Model) -> BlockedSolver:
         """Return a solver for other numbers that shares what is compiled; `ValueError` for another `Model.kind`."""
@@ -101,28 +102,30 @@ class BlockedSolver:
 
     def grid(self, intervals: int, plane: Array | None) -> BlockedGrid:
         """Return the compiled problem on a grid and in a plane (None: in space), building it at first use."""
-        key = (intervals, b"" if plane is None else np.round(plane, 12).tobytes())
-        if key in self._grids:
-            return self._grids[key]
+        grids, name = self.equations.grids, self.numerics.transcription
+        weights = self.contact.weights if self.contact.closure == "weighted" else None
+        key = (name, intervals, b"" if plane is None else np.round(plane, 12).tobytes(), weights)
+        if key in grids:
+            kept: BlockedGrid = grids[key]
+            return kept
         shooting = MultipleShooting(intervals)
-        if intervals not in self._compiled:
-            method = method_named(self.numerics.transcription, intervals)
-            case = load_case("blocked", self.functions, self._declared, method)
-            problem = compile_problem(list(self._declared.values()), [case])
-            self._compiled[intervals] = (case, problem, CondensedSolver(self.functions, shooting))
-        case, problem, judge = self._compiled[intervals]
+        if (name, intervals) not in grids:
+            declared = self.equations.declared
+            case = load_case("blocked", self.functions, declared, method_named(name, intervals))
+            problem = compile_problem(list(declared.values()), [case])
+            grids[name, intervals] = (case, problem, CondensedSolver(self.functions, shooting))
+        case, problem, judge = grids[name, intervals]
         condensed = CondensedSolver(self.functions, shooting, plane)
-        linear = condensed if self.numerics.transcription == "multiple-shooting" else None
+        linear = condensed if name == "multiple-shooting" else None
         exact = Engine(problem, linear=linear)
         loose = Engine(problem, linear=linear, newton_only=linear is not None, max_iterations=8, tolerance=1e-7)
         engine: Engine | Weighted = exact
         stepper: Engine | Weighted = loose
-        if self.contact.closure == "weighted":
-            engine, stepper = (
-                Weighted(e, self.functions, case, condensed, plane, self.contact.weights) for e in (exact, loose)
-            )
-        self._grids[key] = BlockedGrid(case, engine, stepper, condensed, judge, intervals, self.functions.state_size)
-        return self._grids[key]
+        if weights is not None:
+            engine, stepper = (Weighted(e, self.functions, case, condensed, plane, weights) for e in (exact, loose))
+        made = BlockedGrid(case, engine, stepper, condensed, judge, intervals, self.functions.state_size)
+        grids[key] = made
+        return made
 
     def solve(
         self, pressure: Array, loads: Loads, wall: Wall | None, near: Blocked | None = None
@@ -352,7 +355,7 @@ class BlockedSolver:
             _, solved = self.poses.solve(situation.pressure, situation.loads)
             if solved is not None:
                 nodes = np.vstack([solved.nodes, np.zeros((states.shape[0] - STATE_SIZE, solved.nodes.shape[1]))])
-                moved = between_nodes(self._transfer, nodes, solved.constants, s)[: states.shape[0]]
+                moved = between_nodes(self.equations.shape, nodes, solved.constants, s)[: states.shape[0]]
                 states = np.vstack([moved[:STATE_SIZE], states[STATE_SIZE:]])
         return np.concatenate([[stretch], states.T.ravel(), np.zeros(self.functions.tip_unknowns)])
 
@@ -361,7 +364,7 @@ class BlockedSolver:
         if found.grid.intervals == grid.intervals:
             return found.solution.x
         s = grid.case.transcribed.points
-        states = between_nodes(self._transfer, found.grid.nodes(found.solution.x), found.constants, s)[
+        states = between_nodes(self.equations.shape, found.grid.nodes(found.solution.x), found.constants, s)[
             : grid.state_size
         ]
         return np.concatenate([found.solution.x[:1], states.T.ravel(), found.grid.tip_forces(found.solution.x)])

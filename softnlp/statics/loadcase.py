@@ -68,10 +68,14 @@ class RodFunctions:
         """The number of entries of y."""
         return len(self.conditions.unknowns)
 
-    def declared(self) -> dict[str, Quantity]:
-        """Return every quantity of a load case by name: those of the model, then those that the tip conditions take."""
-        taken = contact_quantities(self.model) if self.conditions.has_contact else {}
-        return {**quantities(self.model), **taken}
+    def declared(self, model: Model | None = None) -> dict[str, Quantity]:
+        """Return every quantity of a load case by name: those of the model, then those that the tip conditions take.
+
+        model : whose numbers are nominal, of the same kind; None is the one that these functions were compiled of.
+        """
+        numbers = model or self.model
+        taken = contact_quantities(numbers) if self.conditions.has_contact else {}
+        return {**quantities(numbers), **taken}
 
 
 def rod_functions(model: Model, conditions: TipConditions = DEAD_LOADS) -> RodFunctions:

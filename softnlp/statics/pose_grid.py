@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,7 +30,6 @@ class Grid:
     engine: Engine
     stepper: Engine
     reference: Engine
-    transition: ca.Function
     order: int
     iteration_cost: float
 

@@ -7,12 +7,13 @@ from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.status import Status
 from softnlp.model.numerics import Numerics
-from softnlp.model.quantities import Model, quantities
+from softnlp.model.quantities import Model
 from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.model.turning import carried, moved
 from softnlp.nlp.problem import compile_problem
@@ -27,22 +28,20 @@ from softnlp.nlp.solver import (
 )
 from softnlp.nlp.transcription import MultipleShooting, method_named
 from softnlp.statics.attempts import LOADS, Attempt, Goal, Neighbour, Work, attempts, from_near
-from softnlp.statics.branch import BranchPoint, branch_function, stretch_on_branch
+from softnlp.statics.branch import BranchPoint, stretch_on_branch
+from softnlp.statics.compiled import RodEquations, rod_equations
 from softnlp.statics.condensed import CondensedSolver
-from softnlp.statics.loadcase import load_case, rod_functions, unpack_section
+from softnlp.statics.loadcase import RodFunctions, load_case, unpack_section
 from softnlp.statics.pose import (
     SHAPE_POINTS,
     bending_angle,
     between_nodes,
     pose_of,
     pose_warnings,
-    shape_function,
     shape_of,
     stability,
 )
 from softnlp.statics.pose_grid import Grid, Solved, next_size
-from softnlp.statics.stability import MOST_INTERVALS as CONJUGATE_INTERVALS
-from softnlp.statics.stability import conjugate_points, transition_functions
 from softnlp.statics.step import Step
 
 Array = NDArray[np.float64]
@@ -69,46 +68,67 @@ class PoseSolver:
     where no load acts, if it is below that of the numerics.
     """
 
-    def __init__(self, model: Model, numerics: Numerics, *, unloaded_accuracy: float = UNLOADED_ACCURACY * 3) -> None:
-        self.model = model
+    def __init__(
+        self,
+        model: Model,
+        numerics: Numerics,
+        *,
+        unloaded_accuracy: float = UNLOADED_ACCURACY * 3,
+        equations: RodEquations | None = None,
+    ) -> None:
         self.numerics = numerics
         self._unloaded_accuracy = unloaded_accuracy
-        self.quantities = quantities(model)
-        self.branch = branch_function(model)
-        self.functions = rod_functions(model)
-        self.shape = shape_function(self.functions.field)
-        self._transition, self._tip_variation = transition_functions(self.functions.field)
-        self._grids: dict[tuple[str, int], Grid] = {}
-        self._numbers: dict[str, Array] = {}
+        self.equations = equations or rod_equations(model)
+        self._set_model(model)
+
+    def _set_model(self, model: Model) -> None:
+        self.model = model
+        self.quantities = self.equations.quantities_of(model)
+        self._numbers = {name: q.nominal for name, q in self.quantities.items()}
+
+    @property
+    def branch(self) -> ca.Function:
+        """The branch of the stretch, see `branch_function`."""
+        return self.equations.branch
+
+    @property
+    def functions(self) -> RodFunctions:
+        """The rod, see `RodFunctions`."""
+        return self.equations.functions
+
+    @property
+    def shape(self) -> ca.Function:
+        """The shape between nodes, see `shape_function`."""
+        return self.equations.shape
 
     def with_model(self, model: Model) -> PoseSolver:
         """Return a solver for other numbers that shares what is compiled; `ValueError` for another `Model.kind`."""
         self.model.check_kind(model)
         other = copy(self)
-        other.model = model
-        other._numbers = {name: q.nominal for name, q in quantities(model).items()}
+        other._set_model(model)
         return other
 
     def grid(self, intervals: int, transcription: str | None = None) -> Grid:
         """Return the compiled problem on a grid, building it at first use; transcribed as the numerics say, or so."""
         name = transcription or self.numerics.transcription
-        if (name, intervals) not in self._grids:
+        grids = self.equations.grids
+        if (name, intervals) not in grids:
             method = method_named(name, intervals)
             case = load_case("pose", self.functions, self.quantities, method)
             problem = compile_problem(list(self.quantities.values()), [case])
             linear: LinearSolver = SparseSolver(problem)
             if isinstance(method, MultipleShooting):
                 linear = CondensedSolver(self.functions, method)
-            self._grids[name, intervals] = Grid(
+            grids[name, intervals] = Grid(
                 case=case,
                 engine=Engine(problem, linear=linear, newton_only=True, moved=moved),
                 stepper=Engine(problem, linear=linear, newton_only=True, tolerance=1e-7, moved=moved),
                 reference=Engine(problem),
-                transition=self._transition.map(min(intervals, CONJUGATE_INTERVALS)),
                 order=method.order,
                 iteration_cost=_iteration_cost(intervals, name),
             )
-        return self._grids[name, intervals]
+        found: Grid = grids[name, intervals]
+        return found
 
     @property
     def most_intervals(self) -> int:
@@ -146,7 +166,7 @@ class PoseSolver:
         found, iterations, how_far = self._searched(values, branch, warm, work, first, loaded)
         most = self.most_intervals
         while found is not None:
-            own = self._grids.get((self.numerics.transcription, found.intervals)) is found.grid
+            own = self.equations.grids.get((self.numerics.transcription, found.intervals)) is found.grid
             chosen = own and found.intervals >= (given or 0)
             wanted = self.next_intervals(found.refinement_error, found.intervals, target) if chosen else first
             if wanted is None or (found.intervals >= most and found.refinement_error <= self.numerics.accuracy):
@@ -270,7 +290,7 @@ class PoseSolver:
                 reached = max(reached, attempt.fraction)
             elif attempt.solution.holds(self.numerics.tolerance):
                 try:
-                    solved = self._examine(grid, attempt.solution)
+                    solved = self._examine(grid, attempt.solution, goal.is_loaded)
                 except np.linalg.LinAlgError as error:
                     note = f"; a solution found on {grid.intervals} intervals cannot be judged: {error}"
                     continue
@@ -315,8 +335,8 @@ class PoseSolver:
         arcs = self.arc_guess(grid, p_old, x_old[0]), self.arc_guess(grid, p, stretch)
         return Neighbour(x=x, p=p_old, moved=carried(x, *arcs), stable=solved.stable)
 
-    def _examine(self, grid: Grid, solution: Solution) -> Solved:
-        """Estimate the discretisation error of a solution and test its stability.
+    def _examine(self, grid: Grid, solution: Solution, loaded: bool) -> Solved:
+        """Estimate the discretisation error of a solution and test its stability; an arc without loads is stable.
 
         Raises `numpy.linalg.LinAlgError` where they are not numbers.
         """
@@ -335,7 +355,7 @@ class PoseSolver:
             constants=constants,
             error=float(np.linalg.norm(tip[:3])),
             rotation_error=float(np.linalg.norm(tip[3:12]) / np.sqrt(2)),
-            stable=conjugate_points(grid.transition, self._tip_variation, nodes, constants) == 0,
+            stable=not loaded or self.equations.conjugate_points(nodes, constants) == 0,
         )
 
     def _finished(self, pressure: Array, loads: Loads, solved: Solved, iterations: int, began: float) -> Step:

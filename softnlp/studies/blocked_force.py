@@ -17,8 +17,8 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
-from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.kept import blocked_solver
 from softnlp.statics.multistart import other_equilibria
 from softnlp.statics.step import Run, Step
 from softnlp.statics.wall import Wall, checked_contact, standing_wall
@@ -80,7 +80,7 @@ def blocked_force(
         raise InputError(f"expected a number that is not negative, got {branches}", key="branches")
     if weight_sensitivity:
         given_weights(contact)
-    solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
+    solver = blocked_solver(Model(robot, material, coefficients, conventions), numerics, contact)
     wall = standing_wall(solver.poses, solver.contact, P, loads)
     steps: list[Step] = []
     near: Blocked | None = None
@@ -149,7 +149,7 @@ def force_against_offset(
     if h.ndim != 1 or h.size == 0 or not np.all(np.isfinite(h)):
         raise InputError("expected a list of finite offsets", key="offsets")
     loads, contact = checked_loads(loads), checked_contact(contact, [robot], h)
-    solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
+    solver = blocked_solver(Model(robot, material, coefficients, conventions), numerics, contact)
     given = contact.wall_point is not None
     first = standing_wall(solver.poses, contact if given else replace(contact, offset=0.0), P, loads)
     steps: list[Step] = []
@@ -211,5 +211,5 @@ def constrained_pose(
     if len(P) != 1:
         raise InputError(f"expected one pressure a set, got {len(P)} steps", key="pressure")
     contact = checked_contact(ContactSettings(closure=closure, weights=weights))  # type: ignore[arg-type]
-    solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact, wall=False)
+    solver = blocked_solver(Model(robot, material, coefficients, conventions), numerics, contact, wall=False)
     return solver.solve(P[0], checked_loads(loads), None)[0]

@@ -68,7 +68,7 @@ def quantities_of(solver: PoseSolver | BlockedSolver) -> dict[str, Quantity]:
     """Return what outputs can be differentiated by, by name: the model's quantities, and the wall's where there is."""
     if isinstance(solver, PoseSolver):
         return dict(solver.quantities)
-    declared = solver.functions.declared()
+    declared = solver.functions.declared(solver.model)
     return {k: q for k, q in declared.items() if not k.startswith("contact.") or k in _CONTACT}
 
 
@@ -208,7 +208,7 @@ def blocked_point(solver: BlockedSolver, found: Blocked, names: Sequence[str]) -
     Free and blocked shape are one problem here, solved once more together. Raises as `PoseDerivatives.at`.
     """
     intervals = found.grid.intervals
-    declared = solver.functions.declared()
+    declared = solver.functions.declared(solver.model)
     cases = joint_cases(solver, declared, intervals)
     given = [q for name, q in declared.items() if name != "contact.free_lengths"]
     problem = compile_problem(given, cases)

@@ -15,12 +15,11 @@ from softnlp.base.status import Status
 from softnlp.model.quantities import Model
 from softnlp.model.robot import SELF_INTERSECTION, Robot, touching_stretch, violations
 from softnlp.model.rules import neighbours
-from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
 from softnlp.statics.branch import stretch_on_branch
+from softnlp.statics.kept import blocked_solver, pose_solver
 from softnlp.statics.loadcase import RodFunctions
 from softnlp.statics.pose_grid import Solved
-from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Pose, Step
 from softnlp.statics.unloaded import unloaded_case
 from softnlp.statics.wall import Wall, standing_wall
@@ -138,8 +137,8 @@ class Evaluator:
         self.direction = np.zeros(model.robot.chamber_sets)
         self.direction[list(task.sets)] = 1.0
         self.is_loaded = bool(np.any([setting.loads.tip_force, setting.loads.tip_moment, setting.loads.gravity]))
-        self.solver = BlockedSolver(model, setting.numerics, setting.contact) if task.needs_force else None
-        self.poses = self.solver.poses if self.solver else PoseSolver(model, setting.numerics)
+        self.solver = blocked_solver(model, setting.numerics, setting.contact) if task.needs_force else None
+        self.poses = self.solver.poses if self.solver else pose_solver(model, setting.numerics)
         case = unloaded_case("free", self.functions, self.poses.quantities)
         found = free_outputs(case.outputs, self.poses.quantities["robot.length"].symbol)
         symbols = [q.symbol for q in self.poses.quantities.values()]

@@ -131,7 +131,7 @@ def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) ->
     plane : of symmetry, as for `CondensedSolver`, in which the blocked shape folds.
     """
     task, functions = evaluator.task, evaluator.functions
-    declared = functions.declared()
+    declared = functions.declared(evaluator.poses.model)
     free_lengths = declared.pop("contact.free_lengths", None)
     for name, values in task.ranges.items():
         key = f"robot.{name}"

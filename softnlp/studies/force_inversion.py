@@ -24,6 +24,7 @@ from softnlp.nlp.solver import Engine
 from softnlp.nlp.transcription import method_named
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.kept import blocked_solver
 from softnlp.statics.loadcase import LoadCase, load_case
 from softnlp.statics.step import Step
 from softnlp.statics.wall import checked_contact, standing_wall
@@ -90,7 +91,7 @@ def pressure_for_force(
             raise InputError(f"expected a number above 0, got {value}", key=key)
     direction = np.zeros(robot.chamber_sets)
     direction[chosen] = 1.0
-    solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
+    solver = blocked_solver(Model(robot, material, coefficients, conventions), numerics, contact)
     wall = standing_wall(solver.poses, solver.contact, (direction * highest)[None, :], loads)
 
     def solve(P: float, near: Blocked | None) -> tuple[Step, Blocked | None, float]:
@@ -165,7 +166,7 @@ def joint_problem(solver: BlockedSolver, intervals: int, *, free_pressure: bool)
     force is found for a pressure. With `free_pressure` the pressure is "pressure scale" (free) times "pressure", and
     the wall's force has to be "target force" [N].
     """
-    declared = solver.functions.declared()
+    declared = solver.functions.declared(solver.model)
     scale = quantity("pressure scale", "1", 1.0, lower=0.0)
     shared = dict(declared)
     if free_pressure:

@@ -17,7 +17,7 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
-from softnlp.statics.solver import PoseSolver
+from softnlp.statics.kept import pose_solver
 from softnlp.statics.step import Run, Step
 
 
@@ -72,7 +72,7 @@ def forward(
     loads = checked_loads(loads)
     if times is not None and len(times) != len(P):
         raise InputError(f"expected one time a step, got {len(times)} times for {len(P)} steps", key="times")
-    solver = PoseSolver(Model(robot, material, coefficients, conventions), numerics)
+    solver = pose_solver(Model(robot, material, coefficients, conventions), numerics)
     steps: list[Step] = []
     near = None
     for k, pressure in enumerate(P):

@@ -28,9 +28,9 @@ from softnlp.nlp.solver import Engine
 from softnlp.nlp.transcription import method_named
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.kept import pose_solver
 from softnlp.statics.loadcase import LoadCase, load_case, rod_functions
 from softnlp.statics.pose_grid import Solved
-from softnlp.statics.solver import PoseSolver
 from softnlp.statics.wall import checked_contact, standing_wall
 from softnlp.studies.forward import checked_loads
 from softnlp.studies.free_constants import FreeConstants, free_constants
@@ -78,7 +78,7 @@ class _Nlp:
 
     def add_robot(self, data: Data, model: Model, contact: ContactSettings, loads: Loads, label: str) -> None:
         """Add the load cases of everything measured of one robot."""
-        poses = PoseSolver(model, self.numerics)
+        poses = pose_solver(model, self.numerics)
         given = {}
         for name, q in poses.quantities.items():
             if name.startswith("robot."):

@@ -25,8 +25,8 @@ from softnlp.model.rod import Loads
 from softnlp.nlp.bounded import Limits, Map, Measured, could_gain, least_norm, nearest
 from softnlp.nlp.optimality import OPTIMAL, not_optimal
 from softnlp.statics.branch import stretch_on_branch
+from softnlp.statics.kept import pose_solver
 from softnlp.statics.pose_grid import Solved
-from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Aimed, Step
 from softnlp.studies.aiming import Aim, Table, aim_of, spread, tabulated
 from softnlp.studies.derivatives import PoseDerivatives
@@ -79,7 +79,7 @@ class InverseSolver:
     def __init__(
         self, model: Model, numerics: Numerics, loads: Loads, task: InverseTask, method: Literal["newton", "nlp"]
     ) -> None:
-        self.poses = PoseSolver(model, numerics)
+        self.poses = pose_solver(model, numerics)
         self.loads = loads
         self.task = task
         self.limits, self.ends = self._limits()

@@ -19,6 +19,7 @@ from softnlp.model.quantities import Model
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
 from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.kept import blocked_solver, pose_solver
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
 from softnlp.statics.wall import checked_contact, standing_wall
@@ -173,7 +174,7 @@ def sensitivities(
     loads = checked_loads(loads)
     model = Model(robot, material, coefficients, conventions)
     if contact is None:
-        poses = PoseSolver(model, numerics)
+        poses = pose_solver(model, numerics)
         return pose_sensitivities(PoseDerivatives(poses), P[0], loads, outputs, by)
     return _blocked_sensitivities(model, numerics, P[0], loads, contact, outputs, by)
 
@@ -220,7 +221,7 @@ def _blocked_sensitivities(
             "equation fixes",
             key="closure",
         )
-    solver = BlockedSolver(model, numerics, contact)
+    solver = blocked_solver(model, numerics, contact)
     rows = checked_names(outputs, list(UNITS), "outputs")
     columns = checked_names(by, list(quantities_of(solver)), "by")
     wall = standing_wall(solver.poses, contact, pressure[None, :], loads)

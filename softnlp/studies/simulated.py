@@ -18,6 +18,7 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.rod import Loads
 from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.kept import blocked_solver, pose_solver
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
 from softnlp.statics.wall import standing_wall
@@ -79,14 +80,14 @@ class RowSolver:
     def _free_solve(self, model: Model) -> Solve:
         kind = model.kind
         if kind not in self._free:
-            self._free[kind] = PoseSolver(model, self._numerics)
+            self._free[kind] = pose_solver(model, self._numerics)
         solver = self._free[kind].with_model(model)
         return lambda P, near: solver.solve(P, self._loads, near)
 
     def _blocked_solve(self, model: Model, pressure: Array, contact: ContactSettings) -> Solve:
         kind = (model.kind, contact)
         if kind not in self._blocked:
-            self._blocked[kind] = BlockedSolver(model, self._numerics, contact)
+            self._blocked[kind] = blocked_solver(model, self._numerics, contact)
         solver = self._blocked[kind].with_model(model)
         wall = standing_wall(solver.poses, contact, pressure, self._loads)
         return lambda P, near: solver.solve(P, self._loads, wall, near)

@@ -18,6 +18,7 @@ from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.kept import blocked_solver
 from softnlp.statics.step import Step, WeightSensitivity
 from softnlp.statics.wall import checked_contact, standing_wall
 from softnlp.studies.forward import checked_loads, pressure_table
@@ -105,6 +106,6 @@ def weight_sensitivity(
     given_weights(contact)
     if len(P) != 1:
         raise InputError(f"expected one pressure a set, got {len(P)} steps", key="pressure")
-    solver = BlockedSolver(Model(robot, material, coefficients, conventions), numerics, contact)
+    solver = blocked_solver(Model(robot, material, coefficients, conventions), numerics, contact)
     step, found = solver.solve(P[0], loads, standing_wall(solver.poses, contact, P, loads))
     return step, () if found is None else sensitivities(solver, found, factor)

@@ -1,0 +1,69 @@
+"""What is compiled for one kind of model and one kind of tip conditions; other numbers need nothing built."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.base.quantity import Quantity
+from softnlp.model.quantities import Model
+from softnlp.model.tip import DEAD_LOADS, TipConditions
+from softnlp.statics.branch import branch_function
+from softnlp.statics.loadcase import RodFunctions, rod_functions
+from softnlp.statics.pose import shape_function
+from softnlp.statics.stability import MOST_INTERVALS, conjugate_points, transition_functions
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class RodEquations:
+    """The rod of one kind of model under one kind of tip conditions, with the grids compiled for it so far.
+
+    declared : every quantity, with the numbers of the model for which it was made. grids : by what tells them apart.
+    """
+
+    functions: RodFunctions
+    declared: dict[str, Quantity]
+    grids: dict[Hashable, Any] = field(default_factory=dict)
+    _mapped: dict[int, ca.Function] = field(default_factory=dict)
+
+    @cached_property
+    def branch(self) -> ca.Function:
+        """The stretch's branch, see `branch_function`; built at first use, as all that follows."""
+        return branch_function(self.functions.model)
+
+    @cached_property
+    def shape(self) -> ca.Function:
+        """The shape between nodes, see `shape_function`."""
+        return shape_function(self.functions.field)
+
+    @cached_property
+    def _variations(self) -> tuple[ca.Function, ca.Function]:
+        return transition_functions(self.functions.field)
+
+    def conjugate_points(self, nodes: Array, constants: Array) -> int:
+        """Count the directions in which the energy falls, 0 where the pose is stable; see `conjugate_points`."""
+        transition, tip_variation = self._variations
+        K = min(nodes.shape[1] - 1, MOST_INTERVALS)
+        if K not in self._mapped:
+            self._mapped[K] = transition.map(K)
+        return conjugate_points(self._mapped[K], tip_variation, nodes, constants)
+
+    def quantities_of(self, model: Model) -> dict[str, Quantity]:
+        """Return the quantities of a model of the same kind with its numbers, under the compiled symbols."""
+        return {
+            name: replace(q, symbol=self.declared[name].symbol) for name, q in self.functions.declared(model).items()
+        }
+
+
+def rod_equations(model: Model, conditions: TipConditions = DEAD_LOADS) -> RodEquations:
+    """Compile the rod of a model."""
+    functions = rod_functions(model, conditions)
+    return RodEquations(functions, functions.declared())

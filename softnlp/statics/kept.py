@@ -1,0 +1,59 @@
+"""Solvers that keep what they compile: a second one for the same kind of model has nothing to build.
+
+Kept for each thread by itself, since CasADi releases the interpreter's lock while it computes.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+
+from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
+from softnlp.model.tip import DEAD_LOADS, TipConditions, tip_conditions
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.compiled import RodEquations, rod_equations
+from softnlp.statics.solver import PoseSolver
+
+MOST_KINDS = 8
+"""How many rods are kept; those that were used least recently go."""
+
+
+def pose_solver(model: Model, numerics: Numerics) -> PoseSolver:
+    """Return a solver for use in this thread, which shares what it compiles with all others for models of its kind."""
+    return PoseSolver(model, numerics, equations=kept_equations(model))
+
+
+def blocked_solver(model: Model, numerics: Numerics, contact: ContactSettings, *, wall: bool = True) -> BlockedSolver:
+    """Return a solver for use in this thread, which shares what it compiles as `pose_solver`."""
+    kept = kept_equations(model, (contact.closure, wall), lambda: tip_conditions(contact.closure, wall=wall))
+    poses = PoseSolver(model, numerics, unloaded_accuracy=numerics.accuracy, equations=kept_equations(model))
+    return BlockedSolver(model, numerics, contact, wall=wall, poses=poses, equations=kept)
+
+
+def kept_equations(
+    model: Model, key: Hashable = (), conditions: Callable[[], TipConditions] = lambda: DEAD_LOADS
+) -> RodEquations:
+    """Return the equations of the model's kind, compiled at their first use in this thread.
+
+    key : what tells tip conditions apart. conditions : makes them.
+    """
+    kept, name = _KEPT.equations, (model.kind, key)
+    if name not in kept:
+        kept[name] = rod_equations(model, conditions())
+        while len(kept) > MOST_KINDS:
+            kept.popitem(last=False)
+    kept.move_to_end(name)
+    return kept[name]
+
+
+class _Kept(threading.local):
+    """The equations of one thread, least recently used first."""
+
+    def __init__(self) -> None:
+        self.equations: OrderedDict[Hashable, RodEquations] = OrderedDict()
+
+
+_KEPT = _Kept()
