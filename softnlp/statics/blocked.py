@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.contact_settings import ClosureWeights, ContactSettings
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.model.tip import tip_conditions
 from softnlp.nlp.continuation import follow
-from softnlp.nlp.problem import compile_problem
+from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.solver import Engine, Solution
 from softnlp.nlp.transcription import MultipleShooting, method_named
 from softnlp.statics.blocked_grid import Blocked, BlockedGrid
@@ -25,7 +25,7 @@ from softnlp.statics.blocked_step import failed_step, solved_step, touching_step
 from softnlp.statics.compiled import RodEquations, rod_equations
 from softnlp.statics.condensed import CondensedSolver
 from softnlp.statics.free_shape import Free, FreeShapes, free_shape, from_zero
-from softnlp.statics.loadcase import RodFunctions, load_case
+from softnlp.statics.loadcase import LoadCase, RodFunctions, load_case
 from softnlp.statics.pose import between_nodes
 from softnlp.statics.solver import MOST_INTERVALS, PoseSolver
 from softnlp.statics.step import Step
@@ -94,6 +94,10 @@ class BlockedSolver:
         """The rod under the closure, see `RodFunctions`."""
         return self.equations.functions
 
+    @property
+    def _weights(self) -> ClosureWeights | None:
+        return self.contact.weights if self.contact.closure == "weighted" else None
+
     def with_model(self, model: Model) -> BlockedSolver:
         """Return a solver for other numbers that shares what is compiled; `ValueError` for another `Model.kind`."""
         other = copy(self)
@@ -102,19 +106,20 @@ class BlockedSolver:
 
     def grid(self, intervals: int, plane: Array | None) -> BlockedGrid:
         """Return the compiled problem on a grid and in a plane (None: in space), building it at first use."""
-        grids, name = self.equations.grids, self.numerics.transcription
-        weights = self.contact.weights if self.contact.closure == "weighted" else None
-        key = (name, intervals, b"" if plane is None else np.round(plane, 12).tobytes(), weights)
-        if key in grids:
-            kept: BlockedGrid = grids[key]
-            return kept
+        direction = None if plane is None else np.round(plane, 12).tobytes()
+        key = (self.numerics.transcription, intervals, direction, self._weights)
+        return self.equations.kept(key, lambda: self._compiled(intervals, plane))
+
+    def _compiled(self, intervals: int, plane: Array | None) -> BlockedGrid:
+        name, weights = self.numerics.transcription, self._weights
         shooting = MultipleShooting(intervals)
-        if (name, intervals) not in grids:
+
+        def in_space() -> tuple[LoadCase, CompiledProblem, CondensedSolver]:
             declared = self.equations.declared
             case = load_case("blocked", self.functions, declared, method_named(name, intervals))
-            problem = compile_problem(list(declared.values()), [case])
-            grids[name, intervals] = (case, problem, CondensedSolver(self.functions, shooting))
-        case, problem, judge = grids[name, intervals]
+            return case, compile_problem(list(declared.values()), [case]), CondensedSolver(self.functions, shooting)
+
+        case, problem, judge = self.equations.kept((name, intervals), in_space)
         condensed = CondensedSolver(self.functions, shooting, plane)
         linear = condensed if name == "multiple-shooting" else None
         exact = Engine(problem, linear=linear)
@@ -123,9 +128,7 @@ class BlockedSolver:
         stepper: Engine | Weighted = loose
         if weights is not None:
             engine, stepper = (Weighted(e, self.functions, case, condensed, plane, weights) for e in (exact, loose))
-        made = BlockedGrid(case, engine, stepper, condensed, judge, intervals, self.functions.state_size)
-        grids[key] = made
-        return made
+        return BlockedGrid(case, engine, stepper, condensed, judge, intervals, self.functions.state_size)
 
     def solve(
         self, pressure: Array, loads: Loads, wall: Wall | None, near: Blocked | None = None

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -20,13 +20,18 @@ from softnlp.statics.pose import shape_function
 from softnlp.statics.stability import MOST_INTERVALS, conjugate_points, transition_functions
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
+
+MOST_GRIDS = 64
+"""How many grids, and problems on grids, are kept of one rod."""
 
 
 @dataclass(frozen=True, eq=False)
 class RodEquations:
     """The rod of one kind of model under one kind of tip conditions, with the grids compiled for it so far.
 
-    declared : every quantity, with the numbers of the model for which it was made. grids : by what tells them apart.
+    declared : every quantity, with the numbers of the model for which it was made. grids : by what tells them apart,
+    those used last at the end.
     """
 
     functions: RodFunctions
@@ -55,6 +60,16 @@ class RodEquations:
         if K not in self._mapped:
             self._mapped[K] = transition.map(K)
         return conjugate_points(self._mapped[K], tip_variation, nodes, constants)
+
+    def kept(self, key: Hashable, make: Callable[[], T]) -> T:
+        """Return what was compiled under a key, made at first use; what was used least recently goes."""
+        if key not in self.grids:
+            self.grids[key] = make()
+            while len(self.grids) > MOST_GRIDS:
+                del self.grids[next(iter(self.grids))]
+        found: T = self.grids.pop(key)
+        self.grids[key] = found
+        return found
 
     def quantities_of(self, model: Model) -> dict[str, Quantity]:
         """Return the quantities of a model of the same kind with its numbers, under the compiled symbols."""

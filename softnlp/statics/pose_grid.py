@@ -8,13 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.model.rod import STATE_SIZE
-from softnlp.nlp.problem import CompiledProblem
-from softnlp.nlp.solver import Engine, Solution
-from softnlp.statics.loadcase import LoadCase
+from softnlp.model.turning import moved
+from softnlp.nlp.problem import CompiledProblem, compile_problem
+from softnlp.nlp.solver import Engine, LinearSolver, Solution, SparseSolver
+from softnlp.nlp.transcription import MultipleShooting, method_named
+from softnlp.statics.compiled import RodEquations
+from softnlp.statics.condensed import CondensedSolver
+from softnlp.statics.loadcase import LoadCase, load_case
 
 Array = NDArray[np.float64]
 
 _ROUGH = 1e-2  # error of a grid whose word on stability does not count
+
+# Of an iteration, in intervals: beside its own, and of one of them.
+_OVERHEAD, _COST = 15, {"multiple-shooting": 1, "collocation": 25}
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +58,30 @@ class Grid:
     def constants(self, solution: Solution) -> Array:
         """Return what the field takes beside the state."""
         return np.asarray(self.problem.case_constants(solution.x, solution.p)).ravel()
+
+
+def iteration_cost(intervals: int, transcription: str) -> int:
+    """Return the time of a Newton iteration on a grid, see `Grid`."""
+    return _OVERHEAD + _COST[transcription] * intervals
+
+
+def compiled_grid(equations: RodEquations, transcription: str, intervals: int) -> Grid:
+    """Return the problem of one pose on a grid, with every quantity fixed, and what solves it."""
+    method = method_named(transcription, intervals)
+    given = equations.declared
+    case = load_case("pose", equations.functions, given, method)
+    problem = compile_problem(list(given.values()), [case])
+    linear: LinearSolver = SparseSolver(problem)
+    if isinstance(method, MultipleShooting):
+        linear = CondensedSolver(equations.functions, method)
+    return Grid(
+        case=case,
+        engine=Engine(problem, linear=linear, newton_only=True, moved=moved),
+        stepper=Engine(problem, linear=linear, newton_only=True, tolerance=1e-7, moved=moved),
+        reference=Engine(problem),
+        order=method.order,
+        iteration_cost=iteration_cost(intervals, transcription),
+    )
 
 
 @dataclass(frozen=True, eq=False)

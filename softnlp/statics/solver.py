@@ -16,22 +16,17 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.model.turning import carried, moved
-from softnlp.nlp.problem import compile_problem
 from softnlp.nlp.solver import (
-    Engine,
-    LinearSolver,
     Solution,
-    SparseSolver,
     certificate,
     discretisation_correction,
     outputs,
 )
-from softnlp.nlp.transcription import MultipleShooting, method_named
+from softnlp.nlp.transcription import method_named
 from softnlp.statics.attempts import LOADS, Attempt, Goal, Neighbour, Work, attempts, from_near
 from softnlp.statics.branch import BranchPoint, stretch_on_branch
 from softnlp.statics.compiled import RodEquations, rod_equations
-from softnlp.statics.condensed import CondensedSolver
-from softnlp.statics.loadcase import RodFunctions, load_case, unpack_section
+from softnlp.statics.loadcase import RodFunctions, unpack_section
 from softnlp.statics.pose import (
     SHAPE_POINTS,
     bending_angle,
@@ -41,7 +36,7 @@ from softnlp.statics.pose import (
     shape_of,
     stability,
 )
-from softnlp.statics.pose_grid import Grid, Solved, next_size
+from softnlp.statics.pose_grid import Grid, Solved, compiled_grid, iteration_cost, next_size
 from softnlp.statics.step import Step
 
 Array = NDArray[np.float64]
@@ -56,7 +51,6 @@ _FINER = 4  # how much finer a grid is tried where a coarse one finds no solutio
 # Work is counted in Runge-Kutta intervals of Newton iterations, some 0.07 ms each.
 _MOST_WORK, _KEPT_TO_SHOW = 9_000, 3_000  # to find one pose, and then to solve it on the grid that its accuracy needs
 _TO_SHOW = 4  # iterations on that grid, the error and stability counted
-_OVERHEAD, _COST = 15, {"multiple-shooting": 1, "collocation": 25}  # of an iteration: beside its intervals, and of one
 # Without loads the exact answer is a circular arc; a solution is good enough to show it.
 UNLOADED_ACCURACY = 5e-9
 
@@ -111,24 +105,7 @@ class PoseSolver:
     def grid(self, intervals: int, transcription: str | None = None) -> Grid:
         """Return the compiled problem on a grid, building it at first use; transcribed as the numerics say, or so."""
         name = transcription or self.numerics.transcription
-        grids = self.equations.grids
-        if (name, intervals) not in grids:
-            method = method_named(name, intervals)
-            case = load_case("pose", self.functions, self.quantities, method)
-            problem = compile_problem(list(self.quantities.values()), [case])
-            linear: LinearSolver = SparseSolver(problem)
-            if isinstance(method, MultipleShooting):
-                linear = CondensedSolver(self.functions, method)
-            grids[name, intervals] = Grid(
-                case=case,
-                engine=Engine(problem, linear=linear, newton_only=True, moved=moved),
-                stepper=Engine(problem, linear=linear, newton_only=True, tolerance=1e-7, moved=moved),
-                reference=Engine(problem),
-                order=method.order,
-                iteration_cost=_iteration_cost(intervals, name),
-            )
-        found: Grid = grids[name, intervals]
-        return found
+        return self.equations.kept((name, intervals), lambda: compiled_grid(self.equations, name, intervals))
 
     @property
     def most_intervals(self) -> int:
@@ -172,7 +149,7 @@ class PoseSolver:
             if wanted is None or (found.intervals >= most and found.refinement_error <= self.numerics.accuracy):
                 return self._finished(pressure, loads, found, iterations, began), found
             wanted = min(wanted, most)
-            cost = _iteration_cost(wanted, self.numerics.transcription)
+            cost = iteration_cost(wanted, self.numerics.transcription)
             dear = given is None and _TO_SHOW * cost > work.left + _KEPT_TO_SHOW
             if dear or (chosen and found.intervals >= most):
                 status, residual = Status.INACCURATE, found.solution.residual
@@ -388,8 +365,3 @@ class PoseSolver:
             solve_time=time.perf_counter() - began,
             warnings=tuple(warnings),
         )
-
-
-def _iteration_cost(intervals: int, transcription: str) -> int:
-    """Return the time of a Newton iteration on a grid, see `Grid`."""
-    return _OVERHEAD + _COST[transcription] * intervals

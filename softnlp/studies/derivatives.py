@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from softnlp.base.errors import InputError, nearest
 from softnlp.base.quantity import Quantity
 from softnlp.nlp.implicit import ImplicitDerivatives
-from softnlp.nlp.problem import CompiledProblem, compile_problem
+from softnlp.nlp.problem import CompiledProblem
 from softnlp.nlp.solver import Engine, Solution
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
-from softnlp.studies.force_inversion import joint_cases
+from softnlp.studies.force_inversion import joint_engine
 
 Array = NDArray[np.float64]
 
@@ -182,15 +182,12 @@ class PoseDerivatives:
 
     def __init__(self, poses: PoseSolver) -> None:
         self.poses = poses
-        self._compiled: dict[tuple[int, tuple[str, ...]], ImplicitDerivatives] = {}
 
     def on_grid(self, intervals: int, names: tuple[str, ...]) -> ImplicitDerivatives:
         """Return the derivatives by quantities on a grid, compiled at first use."""
-        key = (intervals, names)
-        if key not in self._compiled:
-            grid = self.poses.grid(intervals)
-            self._compiled[key] = ImplicitDerivatives(grid.problem, names, grid.engine.linear)
-        return self._compiled[key]
+        grid = self.poses.grid(intervals)
+        key = ("derivatives", self.poses.numerics.transcription, intervals, names)
+        return self.poses.equations.kept(key, lambda: ImplicitDerivatives(grid.problem, names, grid.engine.linear))
 
     def at(self, solved: Solved, names: Sequence[str]) -> LinearPoint:
         """Return a solved pose with its derivatives by the named quantities.
@@ -208,10 +205,8 @@ def blocked_point(solver: BlockedSolver, found: Blocked, names: Sequence[str]) -
     Free and blocked shape are one problem here, solved once more together. Raises as `PoseDerivatives.at`.
     """
     intervals = found.grid.intervals
-    declared = solver.functions.declared(solver.model)
-    cases = joint_cases(solver, declared, intervals)
-    given = [q for name, q in declared.items() if name != "contact.free_lengths"]
-    problem = compile_problem(given, cases)
+    engine = joint_engine(solver, intervals, free_pressure=False)
+    problem = engine.problem
     values = solver.values(found.situation, found.pressed, np.zeros(0))
     del values["contact.free_lengths"]
     grid = solver.poses.grid(intervals)
@@ -220,13 +215,14 @@ def blocked_point(solver: BlockedSolver, found: Blocked, names: Sequence[str]) -
     arc = solver.poses.arc_guess(grid, near.column, near.stretch)
     guess = arc if near.solved is None else solver.poses.transfer(near.solved, grid)
     free = grid.engine.solve(grid.problem.pack(values_free), guess)
-    engine = Engine(problem)
     start = np.concatenate([free.x, found.solution.x])
     solution = engine.solve(problem.pack(values), start)
     # The blocked shape took its free lengths from the closed form or from another grid: nearly the same ones.
     if not solution.holds(solver.numerics.tolerance) or float(np.max(np.abs(solution.x - start))) > 1e-2:
         return None
-    derivatives = ImplicitDerivatives(problem, tuple(dict.fromkeys(names)))
+    chosen = tuple(dict.fromkeys(names))
+    key = ("derivatives", solver.numerics.transcription, intervals, chosen)
+    derivatives = solver.equations.kept(key, lambda: ImplicitDerivatives(problem, chosen))
     return LinearPoint(engine, solution, derivatives, derivatives.states(solution.x, solution.p), "blocked_")
 
 

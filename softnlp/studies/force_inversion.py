@@ -184,10 +184,17 @@ def joint_problem(solver: BlockedSolver, intervals: int, *, free_pressure: bool)
     )
 
 
+def joint_engine(solver: BlockedSolver, intervals: int, *, free_pressure: bool) -> Engine:
+    """Return what solves `joint_problem`, kept with what the solver has compiled."""
+    key = ("joint", solver.numerics.transcription, intervals, free_pressure)
+    return solver.equations.kept(key, lambda: Engine(joint_problem(solver, intervals, free_pressure=free_pressure)))
+
+
 def _jointly(solver: BlockedSolver, near: Blocked, direction: Array, pressure: float, force: float) -> float | None:
     """Solve both shapes with the pressure free, from a blocked solution nearby; return the pressure [Pa]."""
     intervals = near.grid.intervals
-    problem = joint_problem(solver, intervals, free_pressure=True)
+    engine = joint_engine(solver, intervals, free_pressure=True)
+    problem = engine.problem
     values = solver.values(near.situation, near.pressed, np.zeros(0))
     values.pop("contact.free_lengths")
     p = problem.pack({**values, "pressure": direction * pressure, "target force": force})
@@ -198,7 +205,7 @@ def _jointly(solver: BlockedSolver, near: Blocked, direction: Array, pressure: f
         else solver.poses.arc_guess(grid, near.free.column, near.free.stretch)
     )
     free = grid.engine.solve(near.free.column, x_free)
-    solution = Engine(problem).solve(p, np.concatenate([[1.0], free.x, near.solution.x]))
+    solution = engine.solve(p, np.concatenate([[1.0], free.x, near.solution.x]))
     if not solution.holds(solver.numerics.tolerance):
         return None
     return float(problem.free_values(solution.x)["pressure scale"][0]) * pressure
