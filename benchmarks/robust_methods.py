@@ -33,7 +33,6 @@ from softnlp.statics.attempts import LOADS
 from softnlp.statics.branch import stretch_on_branch
 from softnlp.statics.pose_grid import Grid, pose_distance
 from softnlp.statics.solver import PoseSolver
-from softnlp.statics.stability import conjugate_points, transition_functions
 
 INTERVALS, COLLOCATION_INTERVALS = 40, 10
 MOST_ITERATIONS = 50
@@ -70,7 +69,6 @@ class Methods:
         self._collocation_grid = self._collocated.grid(COLLOCATION_INTERVALS)
         self._ipopt = Engine(self.grid.problem, max_iterations=MOST_ITERATIONS)
         self._sparse = SparseSolver(self._collocation_grid.problem)
-        self._tip_variation = transition_functions(self.solver.functions.field)[1]
         self._shoot, self._shoot_slope = self._shooting()
         self.by_name: dict[str, Callable[[Pose], Found]] = {
             "multiple shooting": self.multiple_shooting,
@@ -177,7 +175,7 @@ class Methods:
         """Return whether an equilibrium is a minimum of the energy."""
         solution = Solution(x, grid.problem.pack(self.values(pose)), 0.0, 0, "")
         try:
-            return conjugate_points(grid.transition, self._tip_variation, grid.nodes(x), grid.constants(solution)) == 0
+            return self.solver.equations.conjugate_points(grid.nodes(x), grid.constants(solution)) == 0
         except np.linalg.LinAlgError:
             return False
 

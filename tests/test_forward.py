@@ -318,9 +318,9 @@ def test_force_and_moment_balance_over_any_part_of_the_rod(name: str, transcript
         h = (s[1] - s[0]) / 3 if j < 60 else 0.0
         weight = h * weights @ np.cross(arms[j, j:], f_e)
         np.testing.assert_allclose(moment[j], M + np.cross(arms[j, -1], F) + weight, atol=2e-7 * EI / L)
-    # constitutive law and kinematics along the rod
-    n = np.einsum("sji,sj->si", shape.rotation, shape.force)
-    m = np.einsum("sji,sj->si", shape.rotation, shape.moment)
+    # constitutive law of wall and fluid, R^T N = ... and R^T M + M_P = K u, and kinematics along the rod
+    n = np.einsum("sji,sj->si", shape.rotation, force) + np.array([0, 0, sec.F_P])
+    m = np.einsum("sji,sj->si", shape.rotation, moment) + sec.M_P
     stiffness = np.array([sec.GA, sec.GA, sec.EA])
     np.testing.assert_allclose(stiffness * (shape.shear_extension - [0, 0, 1]), n - [0, 0, sec.F_P], atol=1e-9 * sec.EA)
     np.testing.assert_allclose([*sec.EI, sec.GJ] * shape.curvature, m, atol=1e-9 * EI / L)

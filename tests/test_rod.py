@@ -41,7 +41,7 @@ FIELD = field_function()
 
 
 class Drawn(NamedTuple):
-    """A state of a random rod in the units of its EI and L, as the witness and as the package hold it."""
+    """A state of a random rod in the units of its EI and L, n and m in the witness's, N and M in ours."""
 
     section: WitnessSection
     f_e: np.ndarray
@@ -55,7 +55,7 @@ def drawn(seed: int) -> Drawn:
     p, n, m, f_e = (scale * rng.normal(size=3) for scale in (1.0, 3.0, 2.0, 1.0))
     R = Rotation.random(random_state=rng).as_matrix()
     n = n + problem.sec.F_P * R[:, 2]
-    ours = np.concatenate([p, R.T.ravel(), n, m])
+    ours = np.concatenate([p, R.T.ravel(), n - problem.sec.F_P * R[:, 2], m - R @ problem.sec.M_P])
     theirs = np.zeros(20 + len(problem.sec.PA))
     theirs[:18] = np.concatenate([p, R.ravel(), n, m])
     return Drawn(problem.sec, f_e, ours, theirs)
@@ -68,6 +68,9 @@ def test_the_field_is_the_witness_s_sum_over_chambers(seed: int) -> None:
     expected = witness._field(case.section, case.f_e, case.witness_state[:, None], False)[:18, 0]
     found = np.asarray(FIELD(case.state, np.array(plain(case.section, case.f_e)))[0]).ravel()
     scale = np.abs(expected).max()
+    dR = expected[3:12].reshape(3, 3)
+    expected[12:15] -= case.section.F_P * dR[:, 2]
+    expected[15:18] -= dR @ case.section.M_P
     np.testing.assert_allclose(found[:3], expected[:3], atol=1e-13 * scale)
     np.testing.assert_allclose(found[3:12].reshape(3, 3).T, expected[3:12].reshape(3, 3), atol=1e-13 * scale)
     np.testing.assert_allclose(found[12:], expected[12:18], atol=1e-12 * scale)
@@ -94,15 +97,14 @@ def test_along_the_field_force_and_moment_balance_and_the_rotation_stays_one(see
     case = drawn(seed)
     sec, R = case.section, case.state[3:12].reshape(3, 3).T
     dx = np.asarray(FIELD(case.state, np.array(plain(sec, case.f_e)))[0]).ravel()
-    dp, dR, dn, dm = dx[:3], dx[3:12].reshape(3, 3).T, dx[12:15], dx[15:18]
+    dp, dR, dN, dM = dx[:3], dx[3:12].reshape(3, 3).T, dx[12:15], dx[15:18]
     scale = np.abs(dx).max()
     # R^T R' is skew, so R stays orthonormal
     W = R.T @ dR
     np.testing.assert_allclose(W + W.T, 0, atol=1e-12 * scale)
-    # n - F_P R e3 and m - R M_P are what the silicone carries: they change by the weight and by p' x that force alone
-    np.testing.assert_allclose(dn - sec.F_P * dR[:, 2], -case.f_e, atol=1e-11 * scale)
-    carried = case.state[12:15] - sec.F_P * R[:, 2]
-    np.testing.assert_allclose(dm - dR @ sec.M_P, -np.cross(dp, carried), atol=1e-10 * scale)
+    # wall and fluid together: they change by the weight and by p' x the force alone
+    np.testing.assert_allclose(dN, -case.f_e, atol=1e-11 * scale)
+    np.testing.assert_allclose(dM, -np.cross(dp, case.state[12:15]), atol=1e-10 * scale)
 
 
 @given(st.integers(0, 100_000), st.floats(0, 1))
@@ -117,7 +119,7 @@ def test_the_arc_obeys_the_field_and_the_balances_at_both_ends(seed: int, s: flo
     size = 1 + np.abs(expected).max()
     np.testing.assert_allclose(slope, expected, atol=3e-7 * size * (1 + np.hypot(*sec.M_P[:2])) ** 2)
     np.testing.assert_allclose(np.asarray(rod.base_balance(arc(0.0))).ravel(), 0, atol=1e-15)
-    tip = rod.tip_balance(arc(1.0), section, ca.DM.zeros(3), ca.DM.zeros(3))
+    tip = rod.tip_balance(arc(1.0), ca.DM.zeros(3), ca.DM.zeros(3))
     np.testing.assert_allclose(np.asarray(tip).ravel(), 0, atol=1e-12 * size)
     exact = witness.arc(sec)
     np.testing.assert_allclose(np.asarray(arc(1.0))[:3].ravel(), exact["tip_position"], atol=1e-13)
@@ -146,9 +148,12 @@ def test_the_arc_stays_smooth_where_the_curvature_vanishes(seed: int, exponent: 
 
 def test_the_base_is_clamped_at_the_origin_upright() -> None:
     case = drawn(11)
-    p, R, n, m = (np.asarray(ca.DM(part)) for part in rod.unpack(ca.DM(case.state)))
+    p, R, N, M = (np.asarray(ca.DM(part)) for part in rod.unpack(ca.DM(case.state)))
+    n, m = rod.wall_resultants(ca.DM(case.state), plain(case.section))
+    np.testing.assert_array_equal(np.concatenate([N.ravel(), M.ravel()]), case.state[12:])
     theirs = case.witness_state
-    np.testing.assert_array_equal(np.concatenate([p.ravel(), R.ravel(), n.ravel(), m.ravel()]), theirs[:18])
+    np.testing.assert_array_equal(np.concatenate([p.ravel(), R.ravel()]), theirs[:12])
+    np.testing.assert_allclose(np.asarray(ca.vertcat(n, m)).ravel(), theirs[12:18], rtol=1e-12)
     rows = np.asarray(rod.base_balance(ca.DM(case.state))).ravel()
     assert rows.size == 12
     np.testing.assert_array_equal(rows[:3], theirs[:3])
@@ -161,7 +166,7 @@ def test_the_tip_balance_is_the_witness_s() -> None:
         F, M = np.array([0.3, -0.2, 0.5]), np.array([0.1, 0.7, -0.4])
         problem = replace(witness.scaled(random_design(np.random.default_rng(seed)).section), F_e=F, M_e=M)
         expected = witness.tip_imbalance(problem, case.witness_state[:, None])[:, 0]
-        found = np.asarray(rod.tip_balance(ca.DM(case.state), plain(case.section), ca.DM(F), ca.DM(M))).ravel()
+        found = np.asarray(rod.tip_balance(ca.DM(case.state), ca.DM(F), ca.DM(M))).ravel()
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
 
 
@@ -169,7 +174,7 @@ def test_the_strains_are_those_of_the_constitutive_law() -> None:
     case = drawn(3)
     sec, R = case.section, case.state[3:12].reshape(3, 3).T
     _, v, u = (np.asarray(a).ravel() for a in FIELD(case.state, np.array(plain(sec, case.f_e))))
-    n, m = R.T @ case.state[12:15], R.T @ case.state[15:18]
+    n, m = R.T @ case.witness_state[12:15], R.T @ case.witness_state[15:18]
     np.testing.assert_allclose([sec.GA * v[0], sec.GA * v[1], sec.EA * (v[2] - 1) + sec.F_P], n, rtol=1e-12)
     np.testing.assert_allclose(u * [*sec.EI, sec.GJ], m, rtol=1e-12)
 

@@ -226,7 +226,7 @@ def tip_error(method: Transcription, w: Witnessed) -> tuple[float, float]:
         (MultipleShooting(1), (20, 40, 80), 4),
         (Collocation(1, 1, "legendre"), (20, 40, 80), 2),
         (Collocation(1, 2, "legendre"), (8, 16, 32), 4),
-        (Collocation(1, 3, "legendre"), (4, 8, 16), 6),
+        (Collocation(1, 3, "legendre"), (3, 6, 10), 6),
         (Collocation(1, 4, "legendre"), (2, 3, 4), 8),
         (Collocation(1, 2, "radau"), (12, 24, 48), 3),
         (Collocation(1, 3, "radau"), (4, 8, 16), 5),
@@ -379,8 +379,12 @@ def test_near_vanishing_stiffness_a_pose_ends_in_a_named_status(
     last = stretch_on_branch(solver.branch, column, np.array([1e6, 0, 0])).fraction * 1e6
     assert solver.solve(np.array([0.4 * last, 0, 0]), Loads())[0].status is Status.SOLVED
     step, found = solver.solve(np.array([0.99 * last, 0, 0]), Loads())
-    assert step.status is Status.DIVERGED
-    assert "curls" in step.message
+    if transcription == "collocation":  # a coarse grid holds the equations, though nothing like the coil
+        assert step.status is Status.INACCURATE
+        assert "with 80 intervals it is 22 L_0, and 320 would take too long" in step.message
+    else:
+        assert step.status is Status.DIVERGED
+        assert "curls" in step.message
     assert step.pose is None
     assert found is None
     # with a load there are many paths to try, but only so much work

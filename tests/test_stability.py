@@ -21,7 +21,7 @@ from softnlp.model.robot import ROBOTS, Robot
 from softnlp.model.rod import Loads
 from softnlp.nlp.transcription import MultipleShooting
 from softnlp.statics.solver import PoseSolver
-from softnlp.statics.stability import conjugate_points, transition_functions
+from softnlp.statics.stability import conjugate_points, transition_function
 from softnlp.statics.step import Step
 from softnlp.studies.forward import forward
 
@@ -125,7 +125,7 @@ def test_the_index_counts_every_mode_of_a_straight_column(intervals: int) -> Non
     sec = at_rest(model.robot, FIRM)
     euler = np.pi**2 / 4 * sec.EI[0] / sec.L**2
     posed = pose(model, method=MultipleShooting(intervals))
-    transition, tip_variation = transition_functions(posed.functions.field)
+    transition = transition_function(posed.functions.field)
     for factor, expected in [
         (-5, 0),
         (0, 0),
@@ -143,7 +143,7 @@ def test_the_index_counts_every_mode_of_a_straight_column(intervals: int) -> Non
         nodes = solution.x[1:].reshape(-1, 18).T
         assert np.abs(nodes[:2]).max() < 1e-12  # straight
         constants = np.asarray(posed.problem.case_constants(solution.x, solution.p)).ravel()
-        assert conjugate_points(transition.map(intervals), tip_variation, nodes, constants) == expected, factor
+        assert conjugate_points(transition.map(intervals), nodes, constants) == expected, factor
 
 
 @pytest.mark.parametrize("seed", some_slow(8, quick=3))

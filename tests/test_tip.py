@@ -79,7 +79,9 @@ def at_tip(case: Drawn, section: RodSection, unknowns: Any) -> AtTip:
         *(ca.DM(v) for v in (case.point, case.normal, case.cap, case.k_c, case.free, case.pressed)),
         *(ca.DM(v) for v in (case.left_n, case.left_m, case.left_h)),
     )
-    state = np.concatenate([case.p, case.R.T.ravel(), case.n, case.m])
+    N = case.n - section.pressure_force * case.R @ E3
+    M = case.m - case.R @ [section.pressure_moment_x, section.pressure_moment_y, 0.0]
+    state = np.concatenate([case.p, case.R.T.ravel(), N, M])
     centres = [(float(x), float(y)) for x, y, _ in case.d]
     stiffness, force, moment = case.stiffness, ca.DM(case.force), ca.DM(case.moment)
     return AtTip(ca.DM(state), section, ca.DM(case.lengths), centres, stiffness, force, moment, ca.DM(unknowns), given)
@@ -90,7 +92,7 @@ def column(value: Any) -> np.ndarray:
 
 
 def balances(case: Drawn, T: np.ndarray, F_b: float) -> np.ndarray:
-    """Eqs. (9), (16), (17) chamber by chamber: what n and m of the rod's end lack."""
+    """Eqs. (9), (16), (17) chamber by chamber: what the wall's n and m at the rod's end lack."""
     e3 = case.R @ E3
     push = F_b * case.normal
     pull = case.PA + T

@@ -15,7 +15,7 @@ from typing import Any
 _MOVED = (
     ("", "base", "errors palette processes ranges reading status units"),
     ("", "model", "contact_settings conventions formula gravity laws material_reading materials numerics quantities"),
-    ("", "model", "robot rod rules section tip turning"),
+    ("", "model", "robot rod rules section tip"),
     ("", "nlp", "continuation implicit optimality problem solver transcription"),
     ("", "scenario", "measured_rows pressures schema_design schema_identify schema_inverse schema_workspace"),
     ("", "statics", "body branch condensed loadcase stability unloaded"),

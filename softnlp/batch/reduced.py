@@ -1,7 +1,7 @@
 """The rod under known dead loads with the base moment as its only unknown: single shooting over many poses at once.
 
-Without contact the internal force is known in closed form, n(s) = F_P R e3 + F_e + f_e (L - s), which turns Eq. (2)
-for n into an identity. A Runge-Kutta step is linear in the rates, so it keeps the identity to round-off: nodes found
+Without contact the force of wall and fluid is known in closed form, N(s) = F_e + f_e (L - s), which turns Eq. (2) for
+it into an identity. A Runge-Kutta step is linear in the rates, so it keeps the identity to round-off: nodes found
 with three unknowns solve the multiple-shooting equations of all eighteen states. They are judged by those.
 
 States are in the units of `softnlp.statics.loadcase`. A step is a function (state, data, s, h) -> state a step h
@@ -28,12 +28,12 @@ _TURNING = slice(3, 15)  # rotation and moment; nothing depends on the position
 class ReducedRod:
     """The steps of a rod under dead loads; N chambers.
 
-    value : state [p, R, m] (15). directions : [p, R, m, d/dm(0) of each (15 x 3), certainty] (61); certainty is the
-    least leading minor so far of the symmetric part of d(rotation)/dm(0): while it is positive there is no conjugate
-    point. check : [p, R, m, gap, chamber lengths (N), bending angle, backbone length, curvature]; gap is the largest so
+    value : state [p, R, M] (15). directions : [p, R, M, d/dM(0) of each (15 x 3), certainty] (61); certainty is the
+    least leading minor so far of the symmetric part of d(rotation)/dM(0): while it is positive there is no conjugate
+    point. check : [p, R, M, gap, chamber lengths (N), bending angle, backbone length, curvature]; gap is the largest so
     far of the full equations between two nodes, curvature that of the axis at nodes.
     onward : [state, data, s, h] -> the state a step h further.
-    ends : [state, data] -> [the state p, R, n, m at the tip (18), its six residuals].
+    ends : [state, data] -> [the state p, R, N, M at the tip (18), its six residuals].
     """
 
     value: ca.Function
@@ -53,10 +53,8 @@ def reduced_rod(functions: RodFunctions) -> ReducedRod:
     weight = L * ca.vertcat(section.load_x, section.load_y, section.load_z)
 
     def full(state: Any, at: Any) -> Any:
-        """Return [p, R, n, m] with the force in closed form."""
-        R = ca.reshape(state[ROTATION], 3, 3)
-        n = force + weight * (1 - at) + section.pressure_force * R[:, 2]
-        return ca.vertcat(state[:12], n, state[MOMENT])
+        """Return [p, R, N, M] with the force in closed form."""
+        return ca.vertcat(state[:12], force + weight * (1 - at), state[MOMENT])
 
     def rates(state: Any, at: Any) -> Any:
         every = functions.field(full(state, at), c)
@@ -79,14 +77,14 @@ def reduced_rod(functions: RodFunctions) -> ReducedRod:
         ends=ca.Function(
             "ends",
             [ca.vertcat(state, data)],
-            [ca.vertcat(full(state, 1), rod.tip_balance(full(state, 1), section, force, moment))],
+            [ca.vertcat(full(state, 1), rod.tip_balance(full(state, 1), force, moment))],
             {"cse": True},
         ),
     )
 
 
 def _directions(state: Any, reached: Any, given: list[Any]) -> ca.Function:
-    """Return the step with the derivatives by m(0) beside the state."""
+    """Return the step with the derivatives by M(0) beside the state."""
     V, worst = ca.SX.sym("V", STATE, 3), ca.SX.sym("certainty")
     moved = ca.jtimes(reached, state, V)
     R = ca.reshape(reached[ROTATION], 3, 3)

@@ -1,7 +1,7 @@
 """The rod against a wall with its base force and moment as unknowns: single shooting over many poses at once.
 
-As in `softnlp.batch.reduced` the force is known up to a constant, n(s) = N_0 + F_P R e3 - f_e s; with a wall and
-chamber reactions N_0 is unknown beside m(0) and the forces y of the tip conditions. A state is [p, R, m, chamber
+As in `softnlp.batch.reduced` the force is known up to a constant, N(s) = N_0 - f_e s; with a wall and
+chamber reactions N_0 is unknown beside M(0) and the forces y of the tip conditions. A state is [p, R, M, chamber
 lengths]; data stacks the constants c of the load case and N_0.
 """
 
@@ -12,23 +12,23 @@ from typing import Any
 
 import casadi as ca
 
-from softnlp.batch.reduced import MOMENT, ROTATION, STATE, larger_curvature, rk_integral
+from softnlp.batch.reduced import MOMENT, STATE, larger_curvature, rk_integral
 from softnlp.model import rod
 from softnlp.nlp.transcription import RK4, rk_step
 from softnlp.statics.loadcase import RodFunctions, unpack_section
 
 UNKNOWN = 6
-"""Directions of a shooting: N_0, then m(0)."""
+"""Directions of a shooting: N_0, then M(0)."""
 
 
 @dataclass(frozen=True, eq=False)
 class ReducedContact:
     """Steps and maps for tip conditions with a wall; N chambers, ny forces of the conditions.
 
-    value : state (15 + N). directions : [state, its derivatives by N_0 and m(0) ((15 + N) x 6)]. check : [state, gap,
+    value : state (15 + N). directions : [state, its derivatives by N_0 and M(0) ((15 + N) x 6)]. check : [state, gap,
     bending angle, backbone length, curvature]; gap and curvature are as in `softnlp.batch.reduced`, as is onward.
     tip : [state, derivatives, data, tip force, tip moment, y, a, units] -> [residual (6 + ny), its derivatives by N_0,
-    m(0) and y, column by column]; a is what the conditions take (`softnlp.statics.loadcase.RodFunctions`).
+    M(0) and y, column by column]; a is what the conditions take (`softnlp.statics.loadcase.RodFunctions`).
     arc : [quantities, stretch] -> the unloaded state.
     """
 
@@ -50,10 +50,8 @@ def reduced_contact(functions: RodFunctions) -> ReducedContact:
     weight = c[len(rod.RodSection._fields)] * ca.vertcat(section.load_x, section.load_y, section.load_z)
 
     def full(state: Any, force: Any, at: Any) -> Any:
-        """Return [p, R, n, m, lengths] with the force in closed form."""
-        R = ca.reshape(state[ROTATION], 3, 3)
-        n = force - weight * at + section.pressure_force * R[:, 2]
-        return ca.vertcat(state[:12], n, state[MOMENT], state[STATE:])
+        """Return [p, R, N, M, lengths] with the force in closed form."""
+        return ca.vertcat(state[:12], force - weight * at, state[MOMENT], state[STATE:])
 
     def advance(state: Any, force: Any) -> Any:
         k: list[Any] = []

@@ -1,8 +1,9 @@
 """The Cosserat rod: Eqs. (2), (5), (8), (13), (17) as a field along s, and its tip balance, Eq. (9).
 
-The state is x = [p (3), R (9, column by column), n (3), m (3)]: position, rotation (columns are the body axes),
-internal force and moment, all in the world frame. Pure functions of numbers or symbols in any consistent system of
-units.
+The state is x = [p (3), R (9, column by column), N (3), M (3)]: position, rotation (columns are the body axes), and the
+force and moment that wall and fluid carry together, all in the world frame. Of the paper's n and m, which the wall
+alone carries, these are N = n - F_P R e3 and M = m - R sum d_i x P_i A_c e3: pressure leaves every balance and stays in
+the material law alone. Pure functions of numbers or symbols in any consistent system of units.
 """
 
 from __future__ import annotations
@@ -99,38 +100,41 @@ def hat(a: Any) -> Any:
 
 
 def unpack(x: Any) -> tuple[Any, Any, Any, Any]:
-    """Split a state into p, R (3x3), n, m."""
+    """Split a state into p, R (3x3), N, M."""
     return x[0:3], ca.reshape(x[3:12], 3, 3), x[12:15], x[15:18]
 
 
 def strains(x: Any, section: RodSection) -> tuple[Any, Any]:
-    """Return the linear strain v and the curvature u in the body frame, Eq. (5)."""
-    _, R, n, m = unpack(x)
-    n_b, m_b = R.T @ n, R.T @ m
-    v = ca.vertcat(
-        n_b[0] / section.shear, n_b[1] / section.shear, (n_b[2] - section.pressure_force) / section.axial + 1
-    )
+    """Return the linear strain v and the curvature u in the body frame, Eq. (5): R^T M + M_P = K u."""
+    _, R, N, M = unpack(x)
+    N_b, m_b = R.T @ N, R.T @ M + pressure_moment(section)
+    v = ca.vertcat(N_b[0] / section.shear, N_b[1] / section.shear, N_b[2] / section.axial + 1)
     u = ca.vertcat(m_b[0] / section.bending_x, m_b[1] / section.bending_y, m_b[2] / section.torsion)
     return v, u
+
+
+def pressure_moment(section: RodSection) -> Any:
+    """Return M_P, the sum of d_i x P_i A_c e3 in the body frame."""
+    return ca.vertcat(section.pressure_moment_x, section.pressure_moment_y, 0)
+
+
+def wall_resultants(x: Any, section: RodSection) -> tuple[Any, Any]:
+    """Return the paper's n and m, force and moment of the wall alone, world frame."""
+    _, R, N, M = unpack(x)
+    return N + section.pressure_force * R[:, 2], M + R @ pressure_moment(section)
 
 
 def field(x: Any, section: RodSection) -> Any:
     """Return dx/ds, Eqs. (2), (8), (13), for the stretched arc length s in 0..L.
 
-    The pressure term of the moment balance, sum P_i A_c [(v + u x d_i) x e3 + d_i x (u x e3)], is by the Jacobi
-    identity F_P v x e3 + u x (sum d_i x P_i A_c e3), so the rod needs two sums of its section and not every chamber.
+    The pressure term of the paper's moment balance, sum P_i A_c [(v + u x d_i) x e3 + d_i x (u x e3)], is by the Jacobi
+    identity F_P v x e3 + u x M_P, which is what N and M take out of n and m: N' = -f_e, M' = -p' x N.
     """
-    _, R, n, _ = unpack(x)
+    _, R, N, _ = unpack(x)
     v, u = strains(x, section)
-    e3 = ca.vertcat(0, 0, 1)
-    F_P = section.pressure_force
-    M_P = ca.vertcat(section.pressure_moment_x, section.pressure_moment_y, 0)
     f_e = ca.vertcat(section.load_x, section.load_y, section.load_z)
     dp = R @ v
-    dR = R @ hat(u)
-    dn = -f_e + F_P * (dR @ e3)
-    dm = -ca.cross(dp, n) + R @ (F_P * ca.cross(v, e3) + ca.cross(u, M_P))
-    return ca.vertcat(dp, ca.reshape(dR, 9, 1), dn, dm)
+    return ca.vertcat(dp, ca.reshape(R @ hat(u), 9, 1), -f_e, -ca.cross(dp, N))
 
 
 def base_balance(x: Any) -> Any:
@@ -139,11 +143,10 @@ def base_balance(x: Any) -> Any:
     return ca.vertcat(p, ca.reshape(R - ca.DM.eye(3), 9, 1))
 
 
-def tip_balance(x: Any, section: RodSection, force: Any, moment: Any) -> Any:
-    """Return the 6 tip residuals n(L) - F_e - F_P R e3 and m(L) - M_e - R sum d_i x P_i A_c e3, Eq. (9)."""
-    _, R, n, m = unpack(x)
-    M_P = ca.vertcat(section.pressure_moment_x, section.pressure_moment_y, 0)
-    return ca.vertcat(n - force - section.pressure_force * R[:, 2], m - moment - R @ M_P)
+def tip_balance(x: Any, force: Any, moment: Any) -> Any:
+    """Return the 6 tip residuals N(L) - F_e and M(L) - M_e, Eq. (9)."""
+    _, _, N, M = unpack(x)
+    return ca.vertcat(N - force, M - moment)
 
 
 def arc_state(s: Any, section: RodSection) -> Any:
@@ -164,5 +167,4 @@ def arc_state(s: Any, section: RodSection) -> Any:
     R = ca.DM.eye(3) + sinc * K + cosc * (K @ K)
     e3 = ca.vertcat(0, 0, 1)
     p = s * (e3 + cosc * (K @ e3) + sinc3 * (K @ (K @ e3)))
-    M_P = ca.vertcat(section.pressure_moment_x, section.pressure_moment_y, 0)
-    return ca.vertcat(p, ca.reshape(R, 9, 1), section.pressure_force * R[:, 2], R @ M_P)
+    return ca.vertcat(p, ca.reshape(R, 9, 1), ca.DM.zeros(6, 1))

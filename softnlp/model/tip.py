@@ -75,9 +75,7 @@ def _no_reaction(at: AtTip) -> Any:
     return ca.DM.zeros(len(at.centres))
 
 
-DEAD_LOADS = TipConditions(
-    (), (), lambda at: rod.tip_balance(at.state, at.section, at.force, at.moment), _no_reaction, False
-)
+DEAD_LOADS = TipConditions((), (), lambda at: rod.tip_balance(at.state, at.force, at.moment), _no_reaction, False)
 
 
 def length_error(at: AtTip) -> Any:
@@ -132,7 +130,7 @@ def _balance(at: AtTip, T: Any, F_b: Any) -> Any:
     M_T = ca.vertcat(M_x, M_y, 0)
     force = at.force + push + ca.sum1(T) * e3 + at.given.force_error
     moment = at.moment + at.given.tip_cap * ca.cross(e3, push) + R @ M_T + at.given.moment_error
-    return rod.tip_balance(at.state, at.section, force, moment)
+    return rod.tip_balance(at.state, force, moment)
 
 
 def tip_conditions(closure: str | Closure, *, wall: bool = True) -> TipConditions:

@@ -46,15 +46,13 @@ def follow(
     same_branch: Callable[[float, Solution], bool] | None = None,
     predict: Callable[[Array, Array], Array] | None = None,
     same_way: Callable[[Array, Array], bool] | None = None,
-    moved: Callable[[Array, Array], Array] = np.add,
-    change: Callable[[Array, Array], Array] = lambda x, y: y - x,
 ) -> Followed:
     """Follow a solution along p = path(t) from t = 0, where `start` is a solution or close to one, to t = 1.
 
     The step is halved when a solve fails or lands further than `largest_jump` (scaled) from its prediction, which is
-    how another branch shows, and grows again after success. The predictor is the secant, moved(x, part of the last
-    change), or predict(x, p) of a solution x and the values p of the next one; same_way(predicted change, change) may
-    refuse a step that went another way.
+    how another branch shows, and grows again after success. The predictor is the secant, or
+    predict(x, p) of a solution x and the values p of the next one; same_way(predicted change, change) may refuse a step
+    that went another way.
     `distance` measures a change of x. A solve counts when it meets ten times the engine's own tolerance, so an engine
     for a path may be a loose one. `most_iterations` bounds what is spent.
     `same_branch(t, solution)` may refuse a solution that the distance does not tell from the branch.
@@ -75,7 +73,7 @@ def follow(
         if predict is not None:
             guess = predict(current.x, path(target))
         elif previous is not None:
-            guess = moved(guess, change(previous[1], guess) * ((target - done) / (done - previous[0])))
+            guess = guess + (guess - previous[1]) * ((target - done) / (done - previous[0]))
         trial = engine.solve(path(target), guess)
         iterations += max(trial.iterations, 1)
         found = trial.holds(tolerance) and distance(trial.x - guess) <= largest_jump

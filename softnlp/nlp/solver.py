@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
@@ -120,7 +119,7 @@ class Engine:
 
     IPOPT is the reference: it solves what Newton does not, unless `newton_only` or too large for it in bounded time (no
     limit reaches into one sparse factorisation). A square problem needs no Hessian: with a zero one IPOPT's step is
-    Newton's too. `moved` is how a step of Newton's is taken. Safe to share between threads: calls wait for each other.
+    Newton's too. Safe to share between threads: calls wait for each other.
     """
 
     def __init__(
@@ -131,11 +130,9 @@ class Engine:
         newton_only: bool = False,
         max_iterations: int | None = None,
         tolerance: float = 1e-11,
-        moved: Callable[[Array, Array], Array] = np.add,
     ) -> None:
         self.problem = problem
         self.linear = linear
-        self._moved = moved
         self.newton_only = newton_only
         self.tolerance = tolerance
         self._lock = threading.Lock()
@@ -202,7 +199,7 @@ class Engine:
                 if size <= self.tolerance:
                     return Solution(x, p, size, k, "Newton converged")
                 try:
-                    trial = self._moved(x, linear.solve(x, p, g))
+                    trial = x + linear.solve(x, p, g)
                 except np.linalg.LinAlgError:
                     return Solution(x, p, size, k, "Newton met a singular Jacobian")
                 g = np.asarray(problem.residual(trial, p)).ravel()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.model.rod import STATE_SIZE, Loads
+from softnlp.model.rod import Loads
 from softnlp.statics.branch import BranchPoint, stretch_on_branch
 from softnlp.statics.pose import SHAPE_POINTS, pose_of, shape_of
 from softnlp.statics.solver import PoseSolver
@@ -50,7 +50,7 @@ def arc_pose(poses: PoseSolver, arc: Arc) -> Pose:
     L_0, F_0 = (float(v) for v in np.asarray(units).ravel())
     s = np.linspace(0, 1, SHAPE_POINTS)
     states = np.asarray(poses.functions.arc(column, stretch, s[None, :]))
-    strains = np.asarray(poses.shape(states[:, 0], constants, 0.0))[STATE_SIZE:]  # the same all along
+    along = np.asarray(poses.shape.map(s.size)(states, constants, np.zeros((1, s.size))))
     integrals = _along(poses, column, stretch)
     N = poses.model.robot.chambers
     outputs = {
@@ -60,7 +60,7 @@ def arc_pose(poses: PoseSolver, arc: Arc) -> Pose:
         "chamber_lengths": arc.lengths,
         "backbone_length": L_0 * integrals[N + 1 :],
     }
-    shape = shape_of(np.vstack([states, np.tile(strains, (1, s.size))]), s, L_0, F_0)
+    shape = shape_of(along, s, L_0, F_0)
     return pose_of(poses.model, outputs, shape, float(integrals[N]), arc.position, True)
 
 

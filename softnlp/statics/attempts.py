@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.model.rod import STATE_SIZE
-from softnlp.model.turning import change, moved
 from softnlp.nlp.continuation import Followed, Path, around_folds, follow, straight_path
 from softnlp.nlp.solver import Solution
 from softnlp.statics.pose_grid import Grid, pose_distance, pose_weight
@@ -182,8 +181,6 @@ def _follow(
         start,
         distance=pose_distance,
         most_iterations=most,
-        moved=moved,
-        change=change,
         first_step=steps[0],
         smallest_step=steps[1],
     )

@@ -17,7 +17,7 @@ from softnlp.model.tip import DEAD_LOADS, TipConditions
 from softnlp.statics.branch import branch_function
 from softnlp.statics.loadcase import RodFunctions, rod_functions
 from softnlp.statics.pose import shape_function
-from softnlp.statics.stability import MOST_INTERVALS, conjugate_points, transition_functions
+from softnlp.statics.stability import MOST_INTERVALS, conjugate_points, transition_function
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -50,16 +50,15 @@ class RodEquations:
         return shape_function(self.functions.field)
 
     @cached_property
-    def _variations(self) -> tuple[ca.Function, ca.Function]:
-        return transition_functions(self.functions.field)
+    def _transition(self) -> ca.Function:
+        return transition_function(self.functions.field)
 
     def conjugate_points(self, nodes: Array, constants: Array) -> int:
         """Count the directions in which the energy falls, 0 where the pose is stable; see `conjugate_points`."""
-        transition, tip_variation = self._variations
         K = min(nodes.shape[1] - 1, MOST_INTERVALS)
         if K not in self._mapped:
-            self._mapped[K] = transition.map(K)
-        return conjugate_points(self._mapped[K], tip_variation, nodes, constants)
+            self._mapped[K] = self._transition.map(K)
+        return conjugate_points(self._mapped[K], nodes, constants)
 
     def kept(self, key: Hashable, make: Callable[[], T]) -> T:
         """Return what was compiled under a key, made at first use; what was used least recently goes."""

@@ -25,18 +25,22 @@ _MOST_PARTS = 225
 
 
 def shape_function(field: ca.Function) -> ca.Function:
-    """Return (state, c, h) -> [state a step h further, strains (v, u)], scaled, for the field of a load case."""
+    """Return (state, c, h) -> [state a step h further, strains (v, u), n, m], scaled, for the field of a load case.
+
+    n and m are the paper's, of the wall alone.
+    """
     x, c, h = ca.SX.sym("x", field.size1_in(0)), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("h")
     step = rk_step(field, RK4)
     end = x
     for _ in range(_SUBSTEPS):
         end = step(end, c, h / _SUBSTEPS)
-    v, u = rod.strains(end, unpack_section(c))
-    return ca.Function("shape", [x, c, h], [ca.vertcat(end, v, u)], {"cse": True})
+    section = unpack_section(c)
+    every = ca.vertcat(end, *rod.strains(end, section), *rod.wall_resultants(end, section))
+    return ca.Function("shape", [x, c, h], [every], {"cse": True})
 
 
 def between_nodes(function: ca.Function, nodes: Array, constants: Array, s: Array) -> Array:
-    """Evaluate `shape_function` at any s in 0..1 from the node to its left; (24, len(s))."""
+    """Evaluate `shape_function` at any s in 0..1 from the node to its left; (30, len(s))."""
     K = nodes.shape[1] - 1
     left = np.minimum(np.floor(s * K + 1e-9).astype(int), K)
     return np.asarray(function.map(s.size)(nodes[:, left], constants, (s - left / K)[None, :]))
@@ -85,13 +89,13 @@ def bending_angle(function: ca.Function, nodes: Array, constants: Array) -> floa
 
 
 def shape_of(values: Array, s: Array, length_unit: float, force_unit: float) -> Shape:
-    """Return the shape in SI units from scaled states and strains (24, M)."""
+    """Return the shape in SI units from scaled states, strains, n and m (30, M)."""
     return Shape(
         arc=s,
         position=values[0:3].T * length_unit,
         rotation=values[3:12].T.reshape(-1, 3, 3).transpose(0, 2, 1),
-        force=values[12:15].T * force_unit,
-        moment=values[15:18].T * force_unit * length_unit,
+        force=values[24:27].T * force_unit,
+        moment=values[27:30].T * force_unit * length_unit,
         shear_extension=values[18:21].T,
         curvature=values[21:24].T / length_unit,
     )

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.model.rod import STATE_SIZE
-from softnlp.model.turning import moved
 from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.solver import Engine, LinearSolver, Solution, SparseSolver
 from softnlp.nlp.transcription import MultipleShooting, method_named
@@ -76,8 +75,8 @@ def compiled_grid(equations: RodEquations, transcription: str, intervals: int) -
         linear = CondensedSolver(equations.functions, method)
     return Grid(
         case=case,
-        engine=Engine(problem, linear=linear, newton_only=True, moved=moved),
-        stepper=Engine(problem, linear=linear, newton_only=True, tolerance=1e-7, moved=moved),
+        engine=Engine(problem, linear=linear, newton_only=True),
+        stepper=Engine(problem, linear=linear, newton_only=True, tolerance=1e-7),
         reference=Engine(problem),
         order=method.order,
         iteration_cost=iteration_cost(intervals, transcription),

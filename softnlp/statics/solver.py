@@ -15,7 +15,6 @@ from softnlp.base.status import Status
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.rod import STATE_SIZE, Loads
-from softnlp.model.turning import carried, moved
 from softnlp.nlp.solver import (
     Solution,
     certificate,
@@ -50,6 +49,7 @@ _DEARER = 3  # an iteration on a neighbour's grid than on a coarse one, where th
 _FINER = 4  # how much finer a grid is tried where a coarse one finds no solution
 # Work is counted in Runge-Kutta intervals of Newton iterations, some 0.07 ms each.
 _MOST_WORK, _KEPT_TO_SHOW = 9_000, 3_000  # to find one pose, and then to solve it on the grid that its accuracy needs
+_HOPELESS = 1.0  # estimated error of a given grid, in lengths, from which its solution is none of the rod
 _TO_SHOW = 4  # iterations on that grid, the error and stability counted
 # Without loads the exact answer is a circular arc; a solution is good enough to show it.
 UNLOADED_ACCURACY = 5e-9
@@ -146,12 +146,14 @@ class PoseSolver:
             own = self.equations.grids.get((self.numerics.transcription, found.intervals)) is found.grid
             chosen = own and found.intervals >= (given or 0)
             wanted = self.next_intervals(found.refinement_error, found.intervals, target) if chosen else first
-            if wanted is None or (found.intervals >= most and found.refinement_error <= self.numerics.accuracy):
+            hopeless = given is not None and not found.refinement_error <= _HOPELESS
+            enough = found.intervals >= most and found.refinement_error <= self.numerics.accuracy
+            if (wanted is None and not hopeless) or enough:
                 return self._finished(pressure, loads, found, iterations, began), found
-            wanted = min(wanted, most)
+            wanted = min(wanted or found.intervals, most)
             cost = iteration_cost(wanted, self.numerics.transcription)
             dear = given is None and _TO_SHOW * cost > work.left + _KEPT_TO_SHOW
-            if dear or (chosen and found.intervals >= most):
+            if dear or hopeless or (chosen and found.intervals >= most):
                 status, residual = Status.INACCURATE, found.solution.residual
                 how_far = f"; with {found.intervals} intervals it is {found.refinement_error:.2g} L_0"
                 how_far += f", and {wanted} would take too long" if dear else ""
@@ -310,7 +312,7 @@ class PoseSolver:
         x_old, p_old = solved.solution.x, solved.solution.p
         x = np.concatenate([[x_old[0]], states])
         arcs = self.arc_guess(grid, p_old, x_old[0]), self.arc_guess(grid, p, stretch)
-        return Neighbour(x=x, p=p_old, moved=carried(x, *arcs), stable=solved.stable)
+        return Neighbour(x=x, p=p_old, moved=x + arcs[1] - arcs[0], stable=solved.stable)
 
     def _examine(self, grid: Grid, solution: Solution, loaded: bool) -> Solved:
         """Estimate the discretisation error of a solution and test its stability; an arc without loads is stable.
@@ -328,7 +330,7 @@ class PoseSolver:
             grid=grid,
             solution=solution,
             nodes=nodes,
-            limit=grid.nodes(moved(solution.x, correction)),
+            limit=grid.nodes(solution.x + correction),
             constants=constants,
             error=float(np.linalg.norm(tip[:3])),
             rotation_error=float(np.linalg.norm(tip[3:12]) / np.sqrt(2)),

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from softnlp.model import rod
 from softnlp.nlp.transcription import RK4, rk_step
-from softnlp.statics.loadcase import unpack_section
 
 Array = NDArray[np.float64]
 
@@ -27,17 +26,16 @@ MOST_INTERVALS = 225
 
 
 def _perturbed(x: Any, delta: Any) -> Any:
-    """Move a state along 12 independent directions: p, a rotation about the world axes, n, m."""
-    p, R, n, m = rod.unpack(x)
+    """Move a state along 12 independent directions: p, a rotation about the world axes, N, M."""
+    p, R, N, M = rod.unpack(x)
     R_moved = (ca.SX.eye(3) + rod.hat(delta[3:6])) @ R
-    return ca.vertcat(p + delta[0:3], ca.reshape(R_moved, 9, 1), n + delta[6:9], m + delta[9:12])
+    return ca.vertcat(p + delta[0:3], ca.reshape(R_moved, 9, 1), N + delta[6:9], M + delta[9:12])
 
 
-def transition_functions(field: ca.Function) -> tuple[ca.Function, ca.Function]:
-    """Return the linearised step over one interval and the linearised tip balance.
+def transition_function(field: ca.Function) -> ca.Function:
+    """Return (x, c, h) -> the 12x12 matrix from variations at x to those a step h further.
 
-    field : of a load case. The first maps (x, c, h) to the 12x12 matrix from variations at x to those a step h
-    further; the second maps the tip's (x, c) to the 6x6 matrix A with d(n, m) = -A d(pose) at the tip, for a dead load.
+    field : of a load case.
     """
     x, c, h = ca.SX.sym("x", rod.STATE_SIZE), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("h")
     delta = ca.SX.sym("delta", 12)
@@ -54,19 +52,13 @@ def transition_functions(field: ca.Function) -> tuple[ca.Function, ca.Function]:
         turn = ca.vertcat(W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]) / 2
         rows.append(ca.vertcat(moved[0:3, j], turn, moved[12:18, j]))
     transition = ca.substitute(ca.horzcat(*rows), delta, ca.SX.zeros(12))
-
-    balance = rod.tip_balance(_perturbed(x, delta), unpack_section(c), ca.SX.zeros(3), ca.SX.zeros(3))
-    tip = ca.substitute(ca.jacobian(balance, delta[:6]), delta, ca.SX.zeros(12))
-    return (
-        ca.Function("transition", [x, c, h], [transition], {"cse": True}),
-        ca.Function("tip_variation", [x, c], [tip], {"cse": True}),
-    )
+    return ca.Function("transition", [x, c, h], [transition], {"cse": True})
 
 
-def conjugate_points(transition: ca.Function, tip_variation: ca.Function, nodes: Array, constants: Array) -> int:
+def conjugate_points(transition: ca.Function, nodes: Array, constants: Array) -> int:
     """Count the directions in which the energy falls, from tip to base; 0 means stable.
 
-    transition : of `transition_functions`, mapped over the intervals, at most `MOST_INTERVALS`. nodes : (18, K + 1)
+    transition : of `transition_function`, mapped over the intervals, at most `MOST_INTERVALS`. nodes : (18, K + 1)
     states of a solution.
     """
     K = min(nodes.shape[1] - 1, MOST_INTERVALS)
@@ -75,7 +67,7 @@ def conjugate_points(transition: ca.Function, tip_variation: ca.Function, nodes:
     Phi = np.asarray(transition(nodes[:, :K], constants, h[None, :])).reshape(12, K, 12).transpose(1, 0, 2)
     A, B, C, D = Phi[:, :6, :6], Phi[:, :6, 6:], Phi[:, 6:, :6], Phi[:, 6:, 6:]
     before = D @ np.linalg.inv(B)  # force at a node by its pose, with the node before it held
-    beyond = -np.asarray(tip_variation(nodes[:, K], constants))  # and by the part of the rod beyond it
+    beyond = np.zeros((6, 6))  # and by what is beyond it: a dead load answers with nothing
     every = np.empty((K, 6, 6))
     for k in range(K - 1, -1, -1):
         every[k] = before[k] - beyond
