@@ -265,8 +265,7 @@ def test_a_wall_that_would_have_to_pull_is_no_solution() -> None:
         solved_step(solver.poses, solver.functions, solver.contact, f, pose, 3, time.perf_counter())
         for f in (pulled, found)
     )
-    assert step.status is Status.INACCURATE
-    assert re.search(r"with 1 intervals it is [0-9.e+]+ L_0", step.message)
+    assert step.status is Status.DIVERGED
     assert step.contact is None
     assert float(step.message.split("pull with ")[1].split(" N")[0]) == pytest.approx(force(reference), rel=5e-3)
     assert force(pushed) == force(reference)

@@ -24,6 +24,7 @@ from softnlp.base.status import Status
 from softnlp.cli import main
 from softnlp.model.conventions import COEFFICIENT_SETS, CONVENTIONS
 from softnlp.model.formula import FUNCTIONS
+from softnlp.model.ipopt_options import IPOPT_OPTIONS
 from softnlp.model.laws import LAWS
 from softnlp.scenario.check import SCHEMAS
 from softnlp.scenario.read import scenario_from_text
@@ -130,7 +131,7 @@ def tables(model: type[BaseModel]) -> Iterator[tuple[str, type[BaseModel]]]:
 
 def keys_of_tables() -> set[str]:
     found = {key for _, table in tables(BlockedForceFile) for key in table.model_fields}
-    return found | set(RampTable.model_fields) | set(OffsetRampTable.model_fields)
+    return found | set(IPOPT_OPTIONS) | set(RampTable.model_fields) | set(OffsetRampTable.model_fields)
 
 
 def test_every_table_and_key_of_a_scenario_is_documented() -> None:

@@ -107,8 +107,9 @@ def test_a_wrong_call_names_the_function_to_use(case: str, tmp_path: Path) -> No
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_the_old_places_still_have_them() -> None:
-    from softnlp.scenario.run_design import run_design as old_design
-    from softnlp.sweep.run import run_sweep as old_sweep
+    from softnlp.runner_design import run_design as old_design
+    from softnlp.workspace.run import run_sweep as old_sweep
 
     assert (softnlp.run_design, softnlp.run_sweep) == (old_design, old_sweep)

@@ -34,6 +34,7 @@ from softnlp.scenario.read import load_scenario
 from softnlp.scenario.run_workspace import run_sweep
 from softnlp.statics.solver import PoseSolver
 from softnlp.sweep import pool
+from softnlp.sweep.audit import Audit
 from softnlp.sweep.dataset import data_hash, write_csv, write_workspace
 from softnlp.sweep.journal import Journal
 from softnlp.sweep.run import CSV_FILE, JOURNAL_FILE, WORKSPACE_FILE, SweepError, SweepProgress
@@ -57,6 +58,7 @@ def use(monkeypatch: pytest.MonkeyPatch, solver: type[Any]) -> None:
     monkeypatch.setattr("softnlp.sweep.run.ChunkSolver", solver)
     monkeypatch.setattr("softnlp.sweep.worker.ChunkSolver", solver)
     monkeypatch.setattr("softnlp.sweep.worker._solvers", {})
+    monkeypatch.setattr("softnlp.sweep.run.audit", lambda plan, journal: Audit())  # IPOPT would not confirm them
     monkeypatch.setattr(pool, "process_context", lambda: multiprocessing.get_context("fork"))
 
 

@@ -11,6 +11,7 @@ import pytest
 from softnlp import BAR, Loads, Numerics, material, robot
 from softnlp.base.status import Status
 from softnlp.batch import newton, pose_lane, shooting, stretches
+from softnlp.batch.alone import Alone
 from softnlp.batch.chunk import ChunkSolver
 from softnlp.batch.compiled import compiler
 from softnlp.batch.contact_newton import PATH, BlockedShot, ContactBatch, Stage
@@ -115,7 +116,7 @@ def test_reduced_nodes_solve_the_multiple_shooting_equations() -> None:
         state = np.concatenate([np.zeros(3), np.eye(3).ravel(), found.shot.base[:, k]])
         nodes = []
         for j in range(16):
-            n = data[-6:-3] + c[11] * c[8:11] * (1 - j / 15) + c[5] * state[9:12]
+            n = data[-6:-3] + c[11] * c[8:11] * (1 - j / 15)
             nodes.append(np.concatenate([state[:12], n, state[12:]]))
             state = np.asarray(step(state, data, j / 15, 1 / 15)).ravel()
         x = np.concatenate([[found.sections.stretch[k]], *nodes])
@@ -141,7 +142,7 @@ def test_dimensions_constants_and_loads_may_vary_too() -> None:
     asked = plan(random_pressures(6, 1.0), **varied)
     rows = ChunkSolver(asked).solve(0).rows
     assert (rows["lane"] == Lane.BATCH).all()
-    alone = ChunkSolver(asked)
+    alone = Alone(asked, asked.numerics)
     columns = asked.full_values(np.arange(6))
     for k in range(6):
         model, pressure, loads = alone._pose(columns[:, k])

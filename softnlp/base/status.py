@@ -17,6 +17,7 @@ class Status(StrEnum):
     FOLD = "fold"
     OUT_OF_REACH = "out_of_reach"
     NOT_OPTIMAL = "not_optimal"
+    DISPUTED = "disputed"
 
     @property
     def has_solution(self) -> bool:
@@ -45,6 +46,10 @@ _ADVICE = {
     ),
     Status.FOLD: "the branch followed from zero pressure turns back before this step",
     Status.OUT_OF_REACH: "no pressure within the bounds reaches the target",
+    Status.DISPUTED: (
+        "IPOPT, started at the solution of Newton's method, does not confirm it; set [solver] intervals or accuracy, "
+        'or look at both with the engines "ipopt" and "newton"'
+    ),
     Status.NOT_OPTIMAL: (
         "every equation holds, but the point is not shown to be a minimum; start nearer, free less, or allow more steps"
     ),

@@ -8,18 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.status import Status
+from softnlp.batch.alone import Alone
 from softnlp.batch.arrays import some
-from softnlp.batch.blocked_lane import CLOSURES, BlockedLane, BlockedPoses, wall_of_plan
+from softnlp.batch.blocked_lane import CLOSURES, BlockedLane, BlockedPoses
 from softnlp.batch.plan import Plan
 from softnlp.batch.pose_lane import PoseLane, Poses, entries
 from softnlp.batch.poses import STATUSES, Block, Lane, Rows, unsolved_rows
 from softnlp.batch.reduced import POSITION, ROTATION, STATE
-from softnlp.model.quantities import Model, with_symbols
-from softnlp.model.rod import Loads
-from softnlp.statics.blocked import BlockedSolver
-from softnlp.statics.blocked_grid import Blocked
-from softnlp.statics.pose_grid import Solved
-from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step, stable_flag
 
 Array = NDArray[np.float64]
@@ -31,15 +26,21 @@ class ChunkSolver:
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
-        self._problem: PoseSolver | None = None
-        self._blocked_problem: BlockedSolver | None = None
-        self._free = PoseLane(plan) if plan.numerics.transcription == "multiple-shooting" else None
-        self._wall = None if plan.contact is None else wall_of_plan(plan, plan.contact)
+        # The batch proposes and some poses are audited; what is solved alone is not closed one by one.
+        self._alone = Alone(plan, plan.numerics if self.by_ipopt else plan.numerics.without_ipopt())
+        together = plan.numerics.transcription == "multiple-shooting" and not self.by_ipopt
+        self._free = PoseLane(plan) if together else None
+        self._wall = self._alone.wall
         self._blocked: BlockedLane | None = None
         together = self._free is not None and plan.numerics.intervals is None
         if self._free is not None and plan.contact is not None and self._wall is not None:
             together = together and plan.contact.closure in CLOSURES
             self._blocked = BlockedLane(plan, plan.contact, self._wall, self._free) if together else None
+
+    @property
+    def by_ipopt(self) -> bool:
+        """Whether IPOPT solves every pose."""
+        return self.plan.numerics.engine == "ipopt"
 
     def solve(self, chunk: int) -> Block:
         """Return the poses of a chunk; never raises for a pose that cannot be solved."""
@@ -51,7 +52,7 @@ class ChunkSolver:
         messages: list[tuple[int, str]] = []
         near: Any = None
         for k in np.flatnonzero(rows["lane"] == Lane.PROBLEM).tolist():
-            step, solved = self._solve_alone(columns[:, k], near)
+            step, solved = self._alone.solve(columns[:, k], near)
             near = solved or near
             _fill(rows, k, step)
             if step.status is not Status.SOLVED:
@@ -79,28 +80,6 @@ class ChunkSolver:
                 gaps = np.full(len(rows), np.nan)
                 gaps[free.numbers] = gap
                 _fill_blocked(rows, found, gaps[found.numbers], self._blocked.self_intersecting(found, columns))
-
-    def _solve_alone(self, column: Array, near: Any) -> tuple[Step, Solved | Blocked | None]:
-        """Solve one pose by the problem itself, from a neighbour where there is one."""
-        model, pressure, loads = self._pose(column)
-        plan = self.plan
-        if plan.contact is None:
-            self._problem = self._problem or PoseSolver(plan.model, plan.numerics)
-            return self._problem.with_model(model).solve(pressure, loads, near)
-        self._blocked_problem = self._blocked_problem or BlockedSolver(plan.model, plan.numerics, plan.contact)
-        # from zero pressure: the neighbours in a chunk are not on the way to each other
-        return self._blocked_problem.with_model(model).solve(pressure, loads, self._wall)
-
-    def _pose(self, column: Array) -> tuple[Model, Array, Loads]:
-        """Return the model, the pressures and the loads of one pose from every quantity."""
-        values: dict[str, Any] = {}
-        start = 0
-        for name, nominal in self.plan.nominal.items():
-            part = column[start : start + nominal.size]
-            values[name] = float(part[0]) if nominal.size == 1 and name != "pressure" else part
-            start += nominal.size
-        named = with_symbols(self.plan.model, values)
-        return named, values["pressure"], Loads(values["tip_force"], values["tip_moment"], values["gravity"])
 
 
 def some_poses(poses: Poses, mask: NDArray[np.bool_]) -> Poses:

@@ -49,7 +49,7 @@ class Stage:
 class BlockedShot:
     """What came of blocked poses; scaled units.
 
-    unknowns : N_0, m(0), y. state : [p, R, m, chamber lengths] at the tip. integrals : bending angle and backbone.
+    unknowns : N_0, M(0), y. state : [p, R, m, chamber lengths] at the tip. integrals : bending angle and backbone.
     curvature : the largest at a node.
     determinant : of the tip equations. error : estimated error of the tip's position; worst_error : also of rotation
     and forces, as refinement holds them against the accuracy.
@@ -129,7 +129,6 @@ class ContactBatch:
         weight = stage.constants[11] * stage.constants[8:11]
         guess[:3, new] = (stage.force + weight)[:, new]
         guess[3:6, new] = 0.0
-        guess[3:5, new] = stage.constants[6:8, new]
         guess[6:, new] = 0.0
         if before:
             along = done >= 2
@@ -236,7 +235,7 @@ class ContactBatch:
         )
 
     def start(self, unknowns: Array) -> Array:
-        """Return the state at the base with its derivatives by N_0 and m(0)."""
+        """Return the state at the base with its derivatives by N_0 and M(0)."""
         size = STATE + self._chambers
         state = np.zeros((size * (UNKNOWN + 1), unknowns.shape[1]))
         state[[3, 7, 11]] = 1.0

@@ -42,7 +42,7 @@ class Batch:
 class Shot:
     """What came of the poses of a batch; scaled units.
 
-    base : m(0) (3, poses). tip : [p, R, n, m] (18, poses). integrals : chamber lengths, bending angle, backbone length.
+    base : M(0) (3, poses). tip : [p, R, N, M] (18, poses). integrals : chamber lengths, bending angle, backbone length.
     curvature : the largest at a node. residual : the largest of the tip equations and of the full equations between
     nodes. error, turn_error : estimated error of the tip's position and rotation.
     certain : whether no conjugate point and a positive definite tip show that the pose is stable.
@@ -81,13 +81,11 @@ class BatchSolver:
         features : (poses, columns) of what differs between the poses, for the predictor.
         """
         n = batch.data.shape[1]
-        arcs = np.zeros((3, n))
-        arcs[:2] = batch.data[6:8]
         sample = np.arange(0, n, _SAMPLE)
-        first = self._shoot(batch, sample, arcs[:, sample], self._first_grids(batch.bend[sample]))
+        first = self._shoot(batch, sample, np.zeros((3, sample.size)), self._first_grids(batch.bend[sample]))
         solved = first.residual < _CONVERGED * 1e3
         good = sample[solved]
-        guess = arcs + predicted(features, good, first.base[:, solved] - arcs[:, good])
+        guess = predicted(features, good, first.base[:, solved])
         grids = self._first_grids(batch.bend)
         if self._intervals is None and good.size:
             # RK4's error is C / K^4; log C is what varies smoothly
@@ -143,13 +141,9 @@ class BatchSolver:
         return some(shot, back)
 
     def _tip(self, reached: Array, data: Array) -> tuple[Array, Array]:
-        """Return the tip's moment residual (3, poses) and its derivative by m(0) (3, 3, poses)."""
-        M_x, M_y, moment = data[6], data[7], data[self._constants + 3 :]
-        R, m = reached[ROTATION], reached[MOMENT]
-        off = m - moment - R[0:3] * M_x - R[3:6] * M_y
-        V = reached[STATE : 4 * STATE].reshape(3, STATE, -1)
-        J = V[:, MOMENT] - V[:, ROTATION][:, 0:3] * M_x - V[:, ROTATION][:, 3:6] * M_y
-        return off, J.transpose(1, 0, 2)
+        """Return the tip's moment residual (3, poses) and its derivative by M(0) (3, 3, poses)."""
+        off = reached[MOMENT] - data[self._constants + 3 :]
+        return off, reached[STATE : 4 * STATE].reshape(3, STATE, -1)[:, MOMENT].transpose(1, 0, 2)
 
     def _judged(
         self,
@@ -195,7 +189,7 @@ class BatchSolver:
 
 
 def base_state(base: Array) -> Array:
-    """Return the state at the base for m(0), with its derivatives by m(0)."""
+    """Return the state at the base for M(0), with its derivatives by M(0)."""
     state = np.zeros((4 * STATE + 1, base.shape[1]))
     state[[3, 7, 11]] = 1.0
     state[MOMENT] = base

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,7 +33,9 @@ class _StopRun(Exception):
     """Ends a run between two steps."""
 
 
-def run(scenario: Path, /, *, out: Path | None = None, json: bool = False, branches: int = 0) -> int:
+def run(
+    scenario: Path, /, *, out: Path | None = None, json: bool = False, branches: int = 0, ipopt_log: bool = False
+) -> int:
     """Solve every step of a scenario file in order, each started from the last.
 
     Prints a table and writes results.nc, table.csv, results.json, versions.json, figure.png and a copy of the scenario.
@@ -49,11 +52,15 @@ def run(scenario: Path, /, *, out: Path | None = None, json: bool = False, branc
     branches
         Of a blocked force only: start each step from so many other places as well, and warn where that finds another
         equilibrium. The result stays the one followed from zero pressure.
+    ipopt_log
+        Print the log of IPOPT on standard error.
     """
     from softnlp.results import json_text
     from softnlp.scenario.read import load_scenario
 
     asked = load_scenario(scenario)
+    if ipopt_log:
+        asked = _with_log(asked)
     _require_branches(asked, branches)
     if asked.study in _COMMANDS:
         return int(import_module(f"softnlp.cli.{_COMMANDS[asked.study]}").run_study(asked, out, json))
@@ -73,6 +80,14 @@ def run(scenario: Path, /, *, out: Path | None = None, json: bool = False, branc
         complain(f"stopped after {len(done.steps)} of {asked.step_count} steps{kept}")
         return STOPPED
     return SOME_UNSOLVED if done.failed else SOLVED
+
+
+def _with_log(asked: Scenario) -> Scenario:
+    """Let IPOPT print its log. Raises `InputError` where it takes no part."""
+    if asked.numerics.engine == "newton" or asked.study in ("identify", "design"):
+        raise InputError("IPOPT takes no part that a log shows here", key="--ipopt-log")
+    told = {"print_level": 5, **dict(asked.numerics.ipopt)}
+    return replace(asked, numerics=replace(asked.numerics, ipopt=told))
 
 
 def _require_branches(asked: Scenario, branches: int) -> None:

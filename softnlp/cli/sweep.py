@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_module
+import math
 import os
 import shlex
 import sys
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softnlp.base.errors import InputError
+from softnlp.base.units import MILLIMETRE
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, interrupt_asked, say
 from softnlp.model.gravity import gravity_lines
 
@@ -142,6 +144,14 @@ def _told(asked: Scenario, folder: Path, summary: SweepSummary) -> int:
         say("ended otherwise than solved: " + ", ".join(f"{n} {status}" for status, n in unsolved.items()))
     if summary.self_intersecting:
         say(f"warning: {summary.self_intersecting} of the poses pass through themselves, which no body can")
+    if summary.audit.audited:
+        away = f"{summary.audit.largest / MILLIMETRE:.2g} mm"
+        say(f"{summary.audit.audited} poses audited by IPOPT, whose tips are at most {away} away")
+    if summary.audit.disputed:
+        told = ", ".join(str(number) for number in summary.audit.disputed[:10])
+        more = len(summary.audit.disputed) - 10
+        told += f" and {more} more" if more > 0 else ""
+        say(f"warning: IPOPT does not confirm the audited poses {told}; look at them with the engine 'ipopt'")
     if summary.stopped:
         again = shlex.join(["softnlp", "sweep", str(asked.path), "--out", str(folder), "--resume"])
         complain(f"stopped after {summary.done} of {summary.poses} poses, which are kept; `{again}` continues")
@@ -152,7 +162,7 @@ def _told(asked: Scenario, folder: Path, summary: SweepSummary) -> int:
 
 
 def _status(summary: SweepSummary) -> int:
-    return SOME_UNSOLVED if summary.failed else SOLVED
+    return SOME_UNSOLVED if summary.failed or summary.audit.disputed else SOLVED
 
 
 def _document(asked: Scenario, folder: Path, summary: SweepSummary, *, kept: bool) -> dict[str, Any]:
@@ -171,6 +181,9 @@ def _document(asked: Scenario, folder: Path, summary: SweepSummary, *, kept: boo
         "already": summary.already,
         "statuses": dict(summary.statuses),
         "self_intersecting": summary.self_intersecting,
+        "audited": summary.audit.audited,
+        "audit_largest_mm": summary.audit.largest / MILLIMETRE if math.isfinite(summary.audit.largest) else None,
+        "audit_disputed": list(summary.audit.disputed),
         "seconds": summary.seconds,
         "poses_per_s": summary.rate,
         "file": str(folder / WORKSPACE_FILE) if kept and not summary.stopped else None,

@@ -21,8 +21,9 @@ from softnlp.model.rod import RodSection
 class AtTip(NamedTuple):
     """What the conditions may use; N chambers.
 
-    state : p, R, n, m at s = L. section : the rod's. lengths : (N,) of the chambers. centres : N pairs d_i.
-    chamber_stiffness : E_t pi r_co^2. force, moment : dead loads. unknowns : forces of the conditions. given : `Given`.
+    state : p, R, N, M at s = L, see `softnlp.model.rod`. section : the rod's. lengths : (N,) of the chambers.
+    centres : N pairs d_i. chamber_stiffness : E_t pi r_co^2. force, moment : dead loads. unknowns : forces of the
+    conditions. given : `Given`.
     """
 
     state: Any

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 import threading
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
@@ -45,13 +48,33 @@ class EquationResidual:
     scaled: float
 
 
+@dataclass(frozen=True)
+class Ipopt:
+    """What IPOPT said of a solution.
+
+    Attributes
+    ----------
+    status
+        Its own word.
+    iterations
+        That it took.
+    multipliers
+        Largest multiplier of any row or bound [1].
+    """
+
+    status: str
+    iterations: int
+    multipliers: float
+
+
 @dataclass(frozen=True, eq=False)
 class Solution:
     """A point x of a problem at fixed values p, and what is known of it.
 
     residual : largest scaled violation of any equation or bound, evaluated again; inf when it is not a number.
     kkt : error of the first-order conditions, evaluated again, see `softnlp.nlp.optimality.kkt_error`; 0 where
-    nothing is minimised. iterations : of every attempt that led here. engine_status : IPOPT's own word.
+    nothing is minimised. iterations : of every attempt that led here. engine_status : the engine's own
+    word. ipopt : what IPOPT said, where it took part.
     """
 
     x: Array
@@ -60,6 +83,7 @@ class Solution:
     iterations: int
     engine_status: str
     kkt: float = 0.0
+    ipopt: Ipopt | None = None
 
     def holds(self, tolerance: float) -> bool:
         """Whether every equation and bound holds within the tolerance: feasible, which is not yet optimal."""
@@ -118,8 +142,9 @@ class Engine:
     """Newton's method where a structured linear solver is given, and IPOPT, on one compiled problem.
 
     IPOPT is the reference: it solves what Newton does not, unless `newton_only` or too large for it in bounded time (no
-    limit reaches into one sparse factorisation). A square problem needs no Hessian: with a zero one IPOPT's step is
-    Newton's too. Safe to share between threads: calls wait for each other.
+    limit reaches into one sparse factorisation), and solves alone where `ipopt_only`. options : of IPOPT. A square
+    problem needs no Hessian: with a zero one IPOPT's step is Newton's too. Safe to share between threads:
+    calls wait for each other.
     """
 
     def __init__(
@@ -128,12 +153,16 @@ class Engine:
         *,
         linear: LinearSolver | None = None,
         newton_only: bool = False,
+        ipopt_only: bool = False,
         max_iterations: int | None = None,
         tolerance: float = 1e-11,
+        options: Mapping[str, Any] | Sequence[tuple[str, Any]] = (),
     ) -> None:
         self.problem = problem
         self.linear = linear
         self.newton_only = newton_only
+        self.ipopt_only = ipopt_only
+        self._options = dict(options)
         self.tolerance = tolerance
         self._lock = threading.Lock()
         # Newton at given values either converges soon or has left the basin of the first guess; with quantities free,
@@ -158,6 +187,9 @@ class Engine:
                 "nlp_scaling_method": "none",
                 "max_iter": self._max_iterations,
                 "max_wall_time": _LONGEST_SOLVE,
+                # A square problem has no use for a first estimate of the multipliers, which costs a factorisation.
+                **({"constr_mult_init_max": 0.0} if self.problem.is_square else {}),
+                **self._options,
             },
         }
         if self.problem.is_square:
@@ -171,7 +203,7 @@ class Engine:
         """Solve at fixed values p from a first guess; judge the result by the residual, evaluated again."""
         x_start = np.asarray(x_start, dtype=float)
         spent = 0
-        if self.linear is not None:
+        if self.linear is not None and not self.ipopt_only:
             quick = self._newton(self.linear, p, x_start)
             if self.newton_only or quick.holds(self.tolerance * _SLACK):
                 return quick
@@ -185,6 +217,11 @@ class Engine:
             return Solution(x_start, p, start_residual, spent, "the first guess is out of all proportion")
         reference = self._ipopt(p, x_start)
         return replace(reference, iterations=reference.iterations + spent)
+
+    def closed(self, solution: Solution) -> Solution:
+        """Return IPOPT's solution of the whole program from that of Newton's method, judged anew."""
+        found = self._ipopt(solution.p, solution.x)
+        return replace(found, iterations=solution.iterations, kkt=found.kkt or solution.kkt)
 
     def _newton(self, linear: LinearSolver, p: Array, x_start: Array) -> Solution:
         """Take full Newton steps while they help."""
@@ -211,9 +248,13 @@ class Engine:
                 x, size, best = trial, new_size, min(best, new_size)
         return Solution(x, p, size, _NEWTON_STEPS, "Newton reached its iteration limit")
 
+    def _log(self) -> AbstractContextManager[Any]:
+        """Send IPOPT's log, where it is asked for, to standard error: standard output is for results."""
+        return redirect_stdout(sys.stderr) if self._options.get("print_level") else nullcontext()
+
     def _ipopt(self, p: Array, x_start: Array) -> Solution:
         problem = self.problem
-        with self._lock:
+        with self._lock, self._log():
             try:
                 result = self._solver(
                     x0=x_start,
@@ -224,11 +265,14 @@ class Engine:
                     ubg=problem.upper_g,
                 )
             except RuntimeError as error:  # the engine gave up on a number that is not finite
-                return Solution(x_start, p, float("inf"), 0, str(error).splitlines()[-1])
+                word = str(error).splitlines()[-1]
+                return Solution(x_start, p, float("inf"), 0, word, ipopt=Ipopt(word, 0, float("nan")))
             stats = self._solver.stats()
         x, *lam = (np.asarray(result[key], dtype=float).ravel() for key in ("x", "lam_x", "lam_g"))
         kkt = kkt_error(problem.slopes, problem.bounds, p, x_start, x, *lam) if problem.has_objective else 0.0
-        return Solution(x, p, violation(problem, x, p), int(stats["iter_count"]), str(stats["return_status"]), kkt)
+        status, iterations = str(stats["return_status"]), int(stats["iter_count"])
+        said = Ipopt(status, iterations, float(max((np.max(np.abs(v), initial=0.0) for v in lam), default=0.0)))
+        return Solution(x, p, violation(problem, x, p), iterations, status, kkt, said)
 
 
 def _size(g: Array) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -204,7 +204,8 @@ def _scenario(text: str, path: Path) -> Scenario:
         table, read_task = TASKS[file.study]
         given = Read(file, data, made[0], chosen, steps, path.parent)
         task = _attempt(errors, table, lambda: read_task(given))
-    if errors or made is None or chosen is None or steps is None:
+    numerics = _attempt(errors, "solver", lambda: _numerics(file))
+    if errors or made is None or chosen is None or steps is None or numerics is None:
         raise first_of(errors)
     robot, warnings = made
     return Scenario(
@@ -219,11 +220,20 @@ def _scenario(text: str, path: Path) -> Scenario:
         loads=_loads(file),
         pressures=steps.pressures,
         times=steps.times,
-        numerics=Numerics(**dict(file.solver)),
+        numerics=numerics,
         contact=contact,
         task=task,
         warnings=(*warnings, *steps.notes),
     )
+
+
+def _numerics(file: ScenarioFile) -> Numerics:
+    """Return the choices of [solver]; identification and design have one engine of their own."""
+    solver, options = file.solver, cast(Any, file.solver.ipopt)
+    if file.study in ("identify", "design") and (solver.engine != "auto" or options.model_fields_set):
+        key = "engine" if solver.engine != "auto" else "ipopt"
+        raise InputError(f"study {file.study!r} chooses its engine itself; remove it", key=key)
+    return Numerics(**{**dict(solver), "ipopt": options.model_dump(exclude_unset=True)})
 
 
 def _steps(file: ScenarioFile, sets: int, folder: Path) -> PressurePath:

@@ -7,16 +7,18 @@ checked in `scenario` and `pressures`.
 
 from __future__ import annotations
 
+from functools import partial
 from math import hypot
 from typing import Annotated, Any, Literal
 from unicodedata import category
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator, create_model
 from pydantic_core import PydanticCustomError
 
 from softnlp.base.reading import BACKSLASH_HINT, as_typed, choices, shown
 from softnlp.base.units import MILLIMETRE
 from softnlp.model.gravity import DIRECTIONS, unknown_direction
+from softnlp.model.ipopt_options import IPOPT_OPTIONS
 from softnlp.model.numerics import Numerics
 from softnlp.model.robot import MINIMUM_WALL
 
@@ -208,9 +210,24 @@ class ContactTable(Table):
     weight_sensitivity: bool = False
 
 
+def _ipopt_option(name: str, value: Any) -> Any:
+    """Return the value of an option of IPOPT that takes it."""
+    if not IPOPT_OPTIONS[name].takes(value):
+        raise wrong(f"expected {IPOPT_OPTIONS[name].expected}, got {shown(value)}")
+    return value
+
+
+_OPTIONS: dict[str, Any] = {
+    name: (Annotated[Any, PlainValidator(partial(_ipopt_option, name))], None) for name in IPOPT_OPTIONS
+}
+IpoptTable = create_model("IpoptTable", __base__=Table, __doc__="[solver.ipopt].", **_OPTIONS)
+
+
 class SolverTable(Table):
     """[solver]."""
 
+    engine: Literal["auto", "ipopt", "newton"] = Numerics.engine
+    ipopt: IpoptTable = IpoptTable()  # type: ignore[valid-type]
     intervals: Annotated[int | None, PlainValidator(_intervals)] = Numerics.intervals
     accuracy: Positive = Numerics.accuracy
     transcription: Literal["multiple-shooting", "collocation"] = Numerics.transcription

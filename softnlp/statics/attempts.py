@@ -62,12 +62,16 @@ class Neighbour:
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """A pose to reach on a grid. arc : x of the unloaded arc at given values; the first guess without a neighbour."""
+    """A pose to reach on a grid. arc : x of the unloaded arc at given values; the first guess without a neighbour.
+
+    last_by_ipopt : whether IPOPT may try what nothing else solves.
+    """
 
     grid: Grid
     values: Values
     arc: Callable[[Values], Array]
     near: Neighbour | None
+    last_by_ipopt: bool = True
 
     @property
     def is_loaded(self) -> bool:
@@ -124,7 +128,7 @@ def attempts(goal: Goal, work: Work) -> Iterator[Attempt]:
     for part in () if goal.is_a_column else _PRESSURE_PARTS:  # every path keeps a column straight
         partly = {**values, "pressure": part * values["pressure"]}
         yield from _along(goal, [{**partly, **no_loads}, partly, values], work)
-    if work.iterations_left(grid) >= _REFERENCE:
+    if goal.last_by_ipopt and work.iterations_left(grid) >= _REFERENCE:
         work.spend(grid, _REFERENCE)
         yield Attempt(grid.reference.solve(p, arc if near is None else near.moved))
 

@@ -11,26 +11,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.model.contact_settings import ClosureWeights, ContactSettings
+from softnlp.base.status import Status
+from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.model.tip import tip_conditions
 from softnlp.nlp.continuation import follow
-from softnlp.nlp.problem import CompiledProblem, compile_problem
-from softnlp.nlp.solver import Engine, Solution
-from softnlp.nlp.transcription import MultipleShooting, method_named
-from softnlp.statics.blocked_grid import Blocked, BlockedGrid
+from softnlp.nlp.solver import Solution
+from softnlp.nlp.transcription import method_named
+from softnlp.statics.blocked_grid import Blocked, BlockedGrid, kept_grid
 from softnlp.statics.blocked_step import failed_step, solved_step, touching_step
+from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.compiled import RodEquations, rod_equations
-from softnlp.statics.condensed import CondensedSolver
 from softnlp.statics.free_shape import Free, FreeShapes, free_shape, from_zero
-from softnlp.statics.loadcase import LoadCase, RodFunctions, load_case
+from softnlp.statics.loadcase import RodFunctions
 from softnlp.statics.pose import between_nodes
 from softnlp.statics.solver import MOST_INTERVALS, PoseSolver
 from softnlp.statics.step import Step
 from softnlp.statics.wall import Situation, Wall
-from softnlp.statics.weighted import Weighted
 
 Array = NDArray[np.float64]
 
@@ -94,10 +93,6 @@ class BlockedSolver:
         """The rod under the closure, see `RodFunctions`."""
         return self.equations.functions
 
-    @property
-    def _weights(self) -> ClosureWeights | None:
-        return self.contact.weights if self.contact.closure == "weighted" else None
-
     def with_model(self, model: Model) -> BlockedSolver:
         """Return a solver for other numbers that shares what is compiled; `ValueError` for another `Model.kind`."""
         other = copy(self)
@@ -106,29 +101,8 @@ class BlockedSolver:
 
     def grid(self, intervals: int, plane: Array | None) -> BlockedGrid:
         """Return the compiled problem on a grid and in a plane (None: in space), building it at first use."""
-        direction = None if plane is None else np.round(plane, 12).tobytes()
-        key = (self.numerics.transcription, intervals, direction, self._weights)
-        return self.equations.kept(key, lambda: self._compiled(intervals, plane))
-
-    def _compiled(self, intervals: int, plane: Array | None) -> BlockedGrid:
-        name, weights = self.numerics.transcription, self._weights
-        shooting = MultipleShooting(intervals)
-
-        def in_space() -> tuple[LoadCase, CompiledProblem, CondensedSolver]:
-            declared = self.equations.declared
-            case = load_case("blocked", self.functions, declared, method_named(name, intervals))
-            return case, compile_problem(list(declared.values()), [case]), CondensedSolver(self.functions, shooting)
-
-        case, problem, judge = self.equations.kept((name, intervals), in_space)
-        condensed = CondensedSolver(self.functions, shooting, plane)
-        linear = condensed if name == "multiple-shooting" else None
-        exact = Engine(problem, linear=linear)
-        loose = Engine(problem, linear=linear, newton_only=linear is not None, max_iterations=8, tolerance=1e-7)
-        engine: Engine | Weighted = exact
-        stepper: Engine | Weighted = loose
-        if weights is not None:
-            engine, stepper = (Weighted(e, self.functions, case, condensed, plane, weights) for e in (exact, loose))
-        return BlockedGrid(case, engine, stepper, condensed, judge, intervals, self.functions.state_size)
+        weights = self.contact.weights if self.contact.closure == "weighted" else None
+        return kept_grid(self.equations, self.numerics, weights, intervals, plane)
 
     def solve(
         self, pressure: Array, loads: Loads, wall: Wall | None, near: Blocked | None = None
@@ -156,8 +130,19 @@ class BlockedSolver:
         spent += free.iterations
         if isinstance(found, _Ended):
             return failed_step(situation.pressure, found.situation.pressure, found.folded, spent, began), None
+        try:
+            found = self._closed(found)
+        except DisputedError as error:
+            seconds = time.perf_counter() - began
+            return Step(situation.pressure, Status.DISPUTED, str(error), iterations=spent, solve_time=seconds), None
         pose = free.pose(self.poses)
         return solved_step(self.poses, self.functions, self.contact, found, pose, spent, began), found
+
+    def _closed(self, found: Blocked) -> Blocked:
+        """Let IPOPT close a solution, where it takes part. Raises `DisputedError` where it does not confirm it."""
+        grid = found.grid
+        solution = closed(grid.reference, found.solution, self.numerics, grid.tip)
+        return found if solution is found.solution else replace(found, solution=solution)
 
     def _settle(self, situation: Situation, free: Free, near: Blocked | None) -> tuple[Blocked | _Ended, int]:
         """Follow the branch to a situation and refine the grid until its accuracy is met."""

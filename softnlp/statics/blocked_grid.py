@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.nlp.problem import CompiledProblem
-from softnlp.nlp.solver import Engine, Solution, discretisation_correction
+from softnlp.model.contact_settings import ClosureWeights
+from softnlp.model.numerics import Numerics
+from softnlp.nlp.problem import CompiledProblem, compile_problem
+from softnlp.nlp.solver import Engine, LinearSolver, Solution, SparseSolver, discretisation_correction
+from softnlp.nlp.transcription import MultipleShooting, method_named
+from softnlp.statics.compiled import RodEquations
 from softnlp.statics.condensed import CondensedSolver, plane_directions
 from softnlp.statics.free_shape import Free
-from softnlp.statics.loadcase import LoadCase
+from softnlp.statics.loadcase import LoadCase, load_case
 from softnlp.statics.wall import Situation
 from softnlp.statics.weighted import Weighted
 
@@ -23,16 +28,23 @@ _LARGEST_MISS = 0.5  # of a step's change: a prediction that is off by more does
 _SMALL = 1e-3  # a change that tells nothing of its prediction
 
 
+def has_nodes_only(case: LoadCase) -> bool:
+    """Whether the nodes are the only states, as the condensed solver takes it."""
+    return case.transcribed.node_index.size == len(case.transcribed.points)
+
+
 @dataclass(frozen=True, eq=False)
 class BlockedGrid:
     """Everything compiled for one number of intervals, in a plane of symmetry or in space.
 
-    condensed : the tip equations at the nodes, in the plane. judge : in space.
+    engine, stepper : to full tolerance, and loosely for points of a path. reference : of the square problem, which
+    IPOPT closes. condensed : the tip equations at the nodes, in the plane. judge : in space.
     """
 
     case: LoadCase
     engine: Engine | Weighted
     stepper: Engine | Weighted
+    reference: Engine
     condensed: CondensedSolver
     judge: CondensedSolver
     intervals: int
@@ -52,6 +64,12 @@ class BlockedGrid:
         """Return the node states (nx, K + 1) in x."""
         return np.ascontiguousarray(self.states(x)[:, self.case.transcribed.node_index])
 
+    @property
+    def tip(self) -> slice:
+        """Where x holds the tip's position."""
+        start = 1 + self.state_size * (len(self.case.transcribed.points) - 1)
+        return slice(start, start + 3)
+
     def tip_forces(self, x: Array) -> Array:
         """Return the scaled forces that the tip conditions add."""
         return x[1 + self.state_size * len(self.case.transcribed.points) :]
@@ -64,7 +82,7 @@ class BlockedGrid:
     @property
     def has_tangent(self) -> bool:
         """Whether `predicted` can be used: not for a minimum, and where the nodes are the only states."""
-        return not self.is_minimum and self.engine.linear is not None
+        return not self.is_minimum and has_nodes_only(self.case)
 
     def predicted(self, x: Array, p: Array) -> Array:
         """Return x moved along the tangent from a solution towards the one at p; x where the tangent is singular."""
@@ -134,3 +152,47 @@ class Blocked:
     slips: float | None
     determinants: tuple[float, float]
     free: Free
+
+
+def kept_grid(
+    equations: RodEquations, numerics: Numerics, weights: ClosureWeights | None, intervals: int, plane: Array | None
+) -> BlockedGrid:
+    """Return what is compiled on a grid and in a plane (None: in space), building it at first use.
+
+    weights : of the closure `weighted`, None for any other.
+    """
+    direction = None if plane is None else np.round(plane, 12).tobytes()
+    key = (numerics.transcription, numerics.engine, numerics.ipopt, intervals, direction, weights)
+    return equations.kept(key, lambda: _compiled(equations, numerics, weights, intervals, plane))
+
+
+def _compiled(
+    equations: RodEquations, numerics: Numerics, weights: ClosureWeights | None, intervals: int, plane: Array | None
+) -> BlockedGrid:
+    name, functions = numerics.transcription, equations.functions
+    shooting = MultipleShooting(intervals)
+
+    def in_space() -> tuple[LoadCase, CompiledProblem, CondensedSolver]:
+        case = load_case("blocked", functions, equations.declared, method_named(name, intervals))
+        return case, compile_problem(list(equations.declared.values()), [case]), CondensedSolver(functions, shooting)
+
+    case, problem, judge = equations.kept((name, intervals), in_space)
+    condensed = CondensedSolver(functions, shooting, plane)
+    exact, loose = _engines(problem, condensed, numerics)
+    engine: Engine | Weighted = exact
+    stepper: Engine | Weighted = loose
+    if weights is not None:
+        engine, stepper = (Weighted(e, functions, case, condensed, plane, weights) for e in (exact, loose))
+    return BlockedGrid(case, engine, stepper, exact, condensed, judge, intervals, functions.state_size)
+
+
+def _engines(problem: CompiledProblem, condensed: CondensedSolver, numerics: Numerics) -> tuple[Engine, Engine]:
+    """Return what solves a blocked problem to full tolerance, and loosely for points of a path."""
+    shooting = numerics.transcription == "multiple-shooting"
+    linear: LinearSolver | None = condensed if shooting else None
+    if numerics.engine == "newton" and not shooting:
+        linear = SparseSolver(problem)
+    common: dict[str, Any] = {"linear": linear, "options": numerics.ipopt, "ipopt_only": numerics.engine == "ipopt"}
+    quick = linear is not None and numerics.engine != "ipopt"
+    exact = Engine(problem, **common, newton_only=numerics.engine == "newton")
+    return exact, Engine(problem, **common, newton_only=quick, max_iterations=8, tolerance=1e-7)

@@ -122,6 +122,8 @@ def solved_step(
         iterations=iterations,
         solve_time=time.perf_counter() - began,
         warnings=tuple(warnings),
+        engine=poses.numerics.engine,
+        ipopt=solution.ipopt,
         contact=Contact(
             force=max(float(y[0]) * F_0, 0.0) if situation.wall is not None else 0.0,
             normal=wall.normal,

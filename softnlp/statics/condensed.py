@@ -32,7 +32,7 @@ _LARGEST = 1e150  # whose square is finite
 
 @dataclass(frozen=True, eq=False)
 class TipSystem:
-    """The last equations: matrix (6 + n_y, d + n_y) times d(n(0), m(0) along d directions, y) = -right.
+    """The last equations: matrix (6 + n_y, d + n_y) times d(N(0), M(0) along d directions, y) = -right.
 
     directions : (nx, K + 1, d + 1), how the states follow those and, last, the known part. d_stretch : solved.
     """
@@ -47,7 +47,7 @@ class CondensedSolver:
     """Solves J dx = -g for a load case with every quantity fixed, transcribed by multiple shooting.
 
     The fixed values p are those of `functions.declared()`, in order. plane : unit normal of a plane of symmetry through
-    +z, in which the shape is held: n(0), m(0) have three directions in it. None: in space, where they have six.
+    +z, in which the shape is held: N(0), M(0) have three directions in it. None: in space, where they have six.
     """
 
     def __init__(self, functions: RodFunctions, method: MultipleShooting, plane: Array | None = None) -> None:

@@ -39,7 +39,7 @@ def _pack(model: Model, pressures: Any, gravity: Any, stretch: Any) -> list[Any]
 class RodFunctions:
     """The rod of a model as functions, in scaled units; c are its constants at one stretch and pressure.
 
-    The state x has the chamber lengths behind p, R, n, m where the tip conditions need them; y are the forces that the
+    The state x has the chamber lengths behind p, R, N, M where the tip conditions need them; y are the forces that the
     conditions add, a the quantities that they take (SI).
 
     section : (quantities, stretch) -> c, scaled stretch imbalance, units (L_0, EI / L_0^2). field : (x, c) -> dx/ds on

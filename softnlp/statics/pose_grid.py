@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.model.numerics import Numerics
 from softnlp.model.rod import STATE_SIZE
 from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.solver import Engine, LinearSolver, Solution, SparseSolver
@@ -21,6 +23,10 @@ _ROUGH = 1e-2  # error of a grid whose word on stability does not count
 
 # Of an iteration, in intervals: beside its own, and of one of them.
 _OVERHEAD, _COST = 15, {"multiple-shooting": 1, "collocation": 25}
+
+
+TIP = slice(-STATE_SIZE, -STATE_SIZE + 3)
+"""Where x of a pose holds the tip's position."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,22 +70,25 @@ def iteration_cost(intervals: int, transcription: str) -> int:
     return _OVERHEAD + _COST[transcription] * intervals
 
 
-def compiled_grid(equations: RodEquations, transcription: str, intervals: int) -> Grid:
+def compiled_grid(equations: RodEquations, numerics: Numerics, intervals: int) -> Grid:
     """Return the problem of one pose on a grid, with every quantity fixed, and what solves it."""
-    method = method_named(transcription, intervals)
+    method = method_named(numerics.transcription, intervals)
     given = equations.declared
     case = load_case("pose", equations.functions, given, method)
     problem = compile_problem(list(given.values()), [case])
     linear: LinearSolver = SparseSolver(problem)
     if isinstance(method, MultipleShooting):
         linear = CondensedSolver(equations.functions, method)
+    chosen: dict[str, Any] = {"linear": linear, "newton_only": True}
+    if numerics.engine == "ipopt":
+        chosen = {"linear": linear, "ipopt_only": True, "options": numerics.ipopt}
     return Grid(
         case=case,
-        engine=Engine(problem, linear=linear, newton_only=True),
-        stepper=Engine(problem, linear=linear, newton_only=True, tolerance=1e-7),
-        reference=Engine(problem),
+        engine=Engine(problem, **chosen),
+        stepper=Engine(problem, **chosen, tolerance=1e-7),
+        reference=Engine(problem, options=numerics.ipopt),
         order=method.order,
-        iteration_cost=iteration_cost(intervals, transcription),
+        iteration_cost=iteration_cost(intervals, numerics.transcription),
     )
 
 

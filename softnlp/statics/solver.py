@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping
 from copy import copy
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.status import Status
-from softnlp.model.numerics import Numerics
+from softnlp.model.numerics import Numerics, Transcribing
 from softnlp.model.quantities import Model
 from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.nlp.solver import (
@@ -24,6 +25,7 @@ from softnlp.nlp.solver import (
 from softnlp.nlp.transcription import method_named
 from softnlp.statics.attempts import LOADS, Attempt, Goal, Neighbour, Work, attempts, from_near
 from softnlp.statics.branch import BranchPoint, stretch_on_branch
+from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.compiled import RodEquations, rod_equations
 from softnlp.statics.loadcase import RodFunctions, unpack_section
 from softnlp.statics.pose import (
@@ -35,7 +37,7 @@ from softnlp.statics.pose import (
     shape_of,
     stability,
 )
-from softnlp.statics.pose_grid import Grid, Solved, compiled_grid, iteration_cost, next_size
+from softnlp.statics.pose_grid import TIP, Grid, Solved, compiled_grid, iteration_cost, next_size
 from softnlp.statics.step import Step
 
 Array = NDArray[np.float64]
@@ -44,7 +46,7 @@ FIRST_INTERVALS = {"multiple-shooting": 10, "collocation": 5}
 MOST_INTERVALS = 1810
 _MOST_COLLOCATION = 320  # as many points; order 8 needs no more
 _TURN = 0.25  # largest angle [rad] of the unloaded arc within one RK4 interval of a first grid
-_SEARCHED_BY = "multiple-shooting"
+_SEARCHED_BY: Transcribing = "multiple-shooting"
 _DEARER = 3  # an iteration on a neighbour's grid than on a coarse one, where the neighbour's is still tried first
 _FINER = 4  # how much finer a grid is tried where a coarse one finds no solution
 # Work is counted in Runge-Kutta intervals of Newton iterations, some 0.07 ms each.
@@ -102,10 +104,12 @@ class PoseSolver:
         other._set_model(model)
         return other
 
-    def grid(self, intervals: int, transcription: str | None = None) -> Grid:
+    def grid(self, intervals: int, transcription: Transcribing | None = None) -> Grid:
         """Return the compiled problem on a grid, building it at first use; transcribed as the numerics say, or so."""
-        name = transcription or self.numerics.transcription
-        return self.equations.kept((name, intervals), lambda: compiled_grid(self.equations, name, intervals))
+        numerics = self.numerics if transcription is None else replace(self.numerics, transcription=transcription)
+        by_ipopt = numerics.engine == "ipopt"
+        key = (numerics.transcription, intervals, by_ipopt, numerics.ipopt)
+        return self.equations.kept(key, lambda: compiled_grid(self.equations, numerics, intervals))
 
     @property
     def most_intervals(self) -> int:
@@ -143,13 +147,13 @@ class PoseSolver:
         found, iterations, how_far = self._searched(values, branch, warm, work, first, loaded)
         most = self.most_intervals
         while found is not None:
-            own = self.equations.grids.get((self.numerics.transcription, found.intervals)) is found.grid
+            own = self.grid(found.intervals) is found.grid
             chosen = own and found.intervals >= (given or 0)
             wanted = self.next_intervals(found.refinement_error, found.intervals, target) if chosen else first
             hopeless = given is not None and not found.refinement_error <= _HOPELESS
             enough = found.intervals >= most and found.refinement_error <= self.numerics.accuracy
             if (wanted is None and not hopeless) or enough:
-                return self._finished(pressure, loads, found, iterations, began), found
+                return self._closed(pressure, loads, found, iterations, began)
             wanted = min(wanted or found.intervals, most)
             cost = iteration_cost(wanted, self.numerics.transcription)
             dear = given is None and _TO_SHOW * cost > work.left + _KEPT_TO_SHOW
@@ -174,7 +178,8 @@ class PoseSolver:
         first : intervals of the grid that the pose is shown on first, at once where it is an arc. Returns as
         `_solve_on`.
         """
-        given, name, size, spent = self.numerics.intervals, None, first, 0
+        given, size, spent = self.numerics.intervals, first, 0
+        name: Transcribing | None = None
         if loaded:
             name = _SEARCHED_BY
             quick = self.first_intervals(self.column(values), branch.stretch, transcription=name)
@@ -261,7 +266,8 @@ class PoseSolver:
         spent, reached, note = 0, 0.0, ""
         kept: Solved | None = None
         kept_from_path = False
-        goal = Goal(grid, values, arc, None if near is None else self._neighbour(near, grid, p, branch.stretch))
+        neighbour = None if near is None else self._neighbour(near, grid, p, branch.stretch)
+        goal = Goal(grid, values, arc, neighbour, last_by_ipopt=self.numerics.engine == "auto")
         for attempt in (tried or attempts)(goal, work):
             spent += attempt.solution.iterations
             work.spend(grid, attempt.solution.iterations)
@@ -337,6 +343,20 @@ class PoseSolver:
             stable=not loaded or self.equations.conjugate_points(nodes, constants) == 0,
         )
 
+    def _closed(
+        self, pressure: Array, loads: Loads, found: Solved, iterations: int, began: float
+    ) -> tuple[Step, Solved | None]:
+        """Let IPOPT close a solution, where it takes part, and return its step."""
+        grid = found.grid
+        try:
+            solution = closed(grid.reference, found.solution, self.numerics, TIP)
+        except DisputedError as error:
+            seconds = time.perf_counter() - began
+            return Step(pressure, Status.DISPUTED, str(error), iterations=iterations, solve_time=seconds), None
+        if solution is not found.solution:
+            found = replace(found, solution=solution, nodes=grid.nodes(solution.x), constants=grid.constants(solution))
+        return self._finished(pressure, loads, found, iterations, began), found
+
     def _finished(self, pressure: Array, loads: Loads, solved: Solved, iterations: int, began: float) -> Step:
         """Turn the solution of a pose into a step in SI units, with its certificate."""
         grid, solution = solved.grid, solved.solution
@@ -366,4 +386,6 @@ class PoseSolver:
             iterations=iterations,
             solve_time=time.perf_counter() - began,
             warnings=tuple(warnings),
+            engine=self.numerics.engine,
+            ipopt=solution.ipopt,
         )

@@ -14,7 +14,7 @@ from softnlp.model.conventions import Coefficients, Conventions
 from softnlp.model.materials import Material
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
-from softnlp.nlp.solver import EquationResidual
+from softnlp.nlp.solver import EquationResidual, Ipopt
 from softnlp.statics.body import Fit, fit_of
 
 Array = NDArray[np.float64]
@@ -251,6 +251,10 @@ class Step:
         Of a blocked force, else None.
     aimed
         Of inverse kinematics, else None.
+    engine
+        Which engine solved it, of `Numerics`; None without a solution.
+    ipopt
+        What IPOPT said, None where it took no part.
     """
 
     pressure: Array
@@ -267,6 +271,8 @@ class Step:
     warnings: tuple[str, ...] = ()
     contact: Contact | None = None
     aimed: Aimed | None = None
+    engine: str | None = None
+    ipopt: Ipopt | None = None
 
 
 @dataclass(frozen=True, eq=False)

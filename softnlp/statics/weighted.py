@@ -1,6 +1,6 @@
 """The paper's closure: the tip equations and the chamber constraint are met as well as their weights ask, Eq. (14).
 
-The sum of squares of W_n e_n, W_m e_m, W_h e_h and W_L e_L is minimised over n(0), m(0) and the wall's force, with the
+The sum of squares of W_n e_n, W_m e_m, W_h e_h and W_L e_L is minimised over N(0), M(0) and the wall's force, with the
 equations along the rod held: Gauss-Newton steps, in which the interior nodes are eliminated as in `CondensedSolver`,
 sped up by Anderson's mixing. A weight W_h of None holds e_h = 0 exactly.
 
@@ -117,7 +117,8 @@ class Weighted:
         self._rows = int(functions.tip.size1_out(0))  # 6 without a wall
         self._weights = weights
         self.tolerance = engine.tolerance
-        self._step = MinimumStep(functions, condensed, plane, weights) if engine.linear is not None else None
+        nodes_only = self._node_index.size == self._states and not engine.ipopt_only
+        self._step = MinimumStep(functions, condensed, plane, weights) if nodes_only else None
 
     @property
     def problem(self) -> CompiledProblem:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from softnlp.base.errors import InputError, nearest
 from softnlp.base.quantity import Quantity
+from softnlp.model.rod import RodSection
 from softnlp.nlp.implicit import ImplicitDerivatives
 from softnlp.nlp.problem import CompiledProblem
 from softnlp.nlp.solver import Engine, Solution
@@ -84,6 +85,9 @@ def checked_names(names: Sequence[str], known: Sequence[str], key: str) -> tuple
     return tuple(dict.fromkeys(names))
 
 
+_STIFFNESSES = RodSection._fields.index("pressure_force")  # come first among the constants of a case
+
+
 @dataclass(frozen=True, eq=False)
 class LinearPoint:
     """A solution and how everything in it moves with chosen quantities.
@@ -140,6 +144,12 @@ class LinearPoint:
         p = self.solution.p.copy()
         p[self.derivatives.columns] = theta
         return self.engine.solve(p, self.solution.x + self.moves @ (theta - self.theta))
+
+    def is_solution(self, other: Solution, tolerance: float) -> bool:
+        """Whether the equations hold at another point and no stiffness has lost its sign there."""
+        constants = np.asarray(self.problem.case_constants(other.x, other.p)).reshape(len(self.problem.cases), -1)
+        stiffnesses = constants[:, :_STIFFNESSES]
+        return other.holds(tolerance) and bool(np.all(stiffnesses > 0))
 
     def change(self, output: str, other: Solution) -> Array:
         """Return how an output differs at another solution; of the rotation, the rotation vector from here to there."""

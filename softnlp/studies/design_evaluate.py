@@ -137,8 +137,9 @@ class Evaluator:
         self.direction = np.zeros(model.robot.chamber_sets)
         self.direction[list(task.sets)] = 1.0
         self.is_loaded = bool(np.any([setting.loads.tip_force, setting.loads.tip_moment, setting.loads.gravity]))
-        self.solver = blocked_solver(model, setting.numerics, setting.contact) if task.needs_force else None
-        self.poses = self.solver.poses if self.solver else pose_solver(model, setting.numerics)
+        numerics = setting.numerics.without_ipopt()
+        self.solver = blocked_solver(model, numerics, setting.contact) if task.needs_force else None
+        self.poses = self.solver.poses if self.solver else pose_solver(model, numerics)
         case = unloaded_case("free", self.functions, self.poses.quantities)
         found = free_outputs(case.outputs, self.poses.quantities["robot.length"].symbol)
         symbols = [q.symbol for q in self.poses.quantities.values()]

@@ -20,7 +20,7 @@ from softnlp.model.quantities import Model
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
 from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
-from softnlp.nlp.solver import Engine
+from softnlp.nlp.solver import Engine, SparseSolver
 from softnlp.nlp.transcription import method_named
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
@@ -186,8 +186,16 @@ def joint_problem(solver: BlockedSolver, intervals: int, *, free_pressure: bool)
 
 def joint_engine(solver: BlockedSolver, intervals: int, *, free_pressure: bool) -> Engine:
     """Return what solves `joint_problem`, kept with what the solver has compiled."""
-    key = ("joint", solver.numerics.transcription, intervals, free_pressure)
-    return solver.equations.kept(key, lambda: Engine(joint_problem(solver, intervals, free_pressure=free_pressure)))
+    numerics = solver.numerics
+    key = ("joint", numerics.transcription, numerics.engine, numerics.ipopt, intervals, free_pressure)
+
+    def made() -> Engine:
+        problem = joint_problem(solver, intervals, free_pressure=free_pressure)
+        by_ipopt = numerics.engine == "ipopt"
+        linear = None if by_ipopt else SparseSolver(problem)
+        return Engine(problem, linear=linear, newton_only=numerics.engine == "newton", options=numerics.ipopt)
+
+    return solver.equations.kept(key, made)
 
 
 def _jointly(solver: BlockedSolver, near: Blocked, direction: Array, pressure: float, force: float) -> float | None:

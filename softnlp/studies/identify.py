@@ -111,7 +111,7 @@ def identify(
     for d in data:
         kind = (d.robot.chamber_sets, d.robot.chambers_per_set)
         if kind not in poses:
-            poses[kind] = TrialPoses(Model(d.robot, material, coefficients, conventions), numerics)
+            poses[kind] = TrialPoses(Model(d.robot, material, coefficients, conventions), numerics.without_ipopt())
         if kind not in forces and np.any(d.measured[:, -1]):
             forces[kind] = TrialBlocked(poses[kind], contact)
         models.append(_Predicted(d, poses[kind].of(d.robot), forces.get(kind), chosen, loads))

@@ -152,7 +152,7 @@ def monte_carlo(
         theta = point.theta.copy()
         theta[columns] += draw
         solution = point.solved_at(np.maximum(theta, lower))
-        if solution.holds(1e-8):
+        if point.is_solution(solution, 1e-8):
             changes = {name: point.change(name, solution) for name in names}
             found.append(_ordered(sensitivities.outputs, changes))
         if progress is not None:

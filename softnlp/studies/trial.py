@@ -47,7 +47,7 @@ class TrialPoses(PoseSolver):
 
     def values(self, pressure: Array, loads: Loads) -> dict[str, Any]:
         """Return the quantities that a step sets, and those that are tried."""
-        return {**self._robot, **self._constants, **super().values(pressure, loads)}
+        return {**super().values(pressure, loads), **self._robot, **self._constants}
 
     def at(self, constants: Mapping[str, Any]) -> TrialPoses:
         """Return the solver at other values [SI], sharing all that is compiled; those of a wall are left out."""

@@ -39,7 +39,7 @@ _TEXTS_AT_ONCE = 65_536
 _AXES = ("x", "y", "z")
 
 
-def write_workspace(path: str | PathLike[str], plan: Plan, journal: Journal, about: Mapping[str, str]) -> Path:
+def write_workspace(path: str | PathLike[str], plan: Plan, journal: Journal, about: Mapping[str, Any]) -> Path:
     """Write every pose of a finished journal as netCDF, whole or not at all; return its path.
 
     Dimensions: `pose`, `set` and `chamber` count from 1; `axis`, `row` (world) and `col` (body) are x, y, z; `unsolved`

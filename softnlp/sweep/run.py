@@ -11,6 +11,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from softnlp.batch.chunk import ChunkSolver
 from softnlp.batch.plan import Plan
 from softnlp.batch.poses import STATUSES, Block
 from softnlp.model.inputs import package_version
+from softnlp.sweep.audit import Audit, audit
 from softnlp.sweep.dataset import fingerprint_of, write_csv, write_workspace
 from softnlp.sweep.journal import Journal
 from softnlp.sweep.pool import Crew, executor_crew, process_crew
@@ -76,6 +78,8 @@ class SweepSummary:
         The files that this run wrote.
     notes
         Versions of other packages with which some of the poses were solved before.
+    audit
+        What IPOPT said of a sample, at the end of the run that wrote the result.
     """
 
     poses: int
@@ -87,7 +91,8 @@ class SweepSummary:
     seconds: float
     stopped: bool
     written: tuple[Path, ...]
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...]
+    audit: Audit
 
     @property
     def rate(self) -> float:
@@ -113,7 +118,7 @@ def sweep(
     csv: bool = False,
 ) -> SweepSummary:
     """Solve every pose of a plan; as `softnlp.run_sweep`. about : attributes of the result file."""
-    told = dict(about)
+    told: dict[str, Any] = dict(about)
     began = time.monotonic()
     folder = make_folder(folder)
     result, table = folder / WORKSPACE_FILE, folder / CSV_FILE
@@ -137,10 +142,14 @@ def sweep(
         def summary(stopped: bool, *written: Path) -> SweepSummary:
             seconds = time.monotonic() - began
             counts = {status.value: int(n) for status, n in zip(STATUSES, journal.counts, strict=True) if n}
-            poses, failed, through = journal.poses, journal.failed, journal.self_intersecting
-            return SweepSummary(plan.poses, poses, failed, already, counts, through, seconds, stopped, written, notes)
+            poses, failed = journal.poses, journal.failed
+            through = journal.self_intersecting
+            return SweepSummary(
+                plan.poses, poses, failed, already, counts, through, seconds, stopped, written, notes, sample
+            )
 
         todo = [int(chunk) for chunk in np.flatnonzero(~journal.done)]
+        sample = Audit()
         finished = not todo and fingerprint_of(result) == plan.fingerprint()
         if not finished:
             stopped = _solve(plan, todo, journal, executor, workers, report, stop or _never)
@@ -150,7 +159,8 @@ def sweep(
                 return summary(True)
             for left in folder.glob(f".{WORKSPACE_FILE[:-3]}.*.part"):  # of a process that was killed while writing
                 left.unlink(missing_ok=True)
-        written = [] if finished else [write_workspace(result, plan, journal, told)]
+            sample = audit(plan, journal)
+        written = [] if finished else [write_workspace(result, plan, journal, told | sample.attributes)]
         if (csv and not table.exists()) or (written and table.exists()):
             written.append(write_csv(table, plan, journal))
         return summary(False, *written)

@@ -1,4 +1,4 @@
-"""Transcription, intervals, accuracy and tolerance."""
+"""Engine, transcription, intervals, accuracy and tolerance."""
 
 from __future__ import annotations
 
@@ -8,9 +8,18 @@ from softnlp.model.numerics import Numerics
 
 _TRANSCRIPTIONS = {"multiple-shooting": "multiple shooting, RK4", "collocation": "collocation"}
 
+_ENGINES = {
+    "auto": "Newton, closed by IPOPT",
+    "ipopt": "IPOPT for every solve",
+    "newton": "Newton alone",
+}
+
 
 def solver_panel(session: Session) -> None:
     """Build the controls of [solver]."""
+    choice_field(session, "solver", "engine", "Engine", _ENGINES, default=Numerics.engine).props(
+        "data-testid=solver-engine"
+    )
     choice_field(
         session, "solver", "transcription", "Transcription", _TRANSCRIPTIONS, default=Numerics.transcription
     ).props("data-testid=solver-transcription")

@@ -1,0 +1,58 @@
+"""Single poses of a plan by the general solver, one after the other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.batch.blocked_lane import wall_of_plan
+from softnlp.batch.plan import Plan
+from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model, with_symbols
+from softnlp.model.rod import Loads
+from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.pose_grid import Solved
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.step import Step
+
+Array = NDArray[np.float64]
+
+
+class Alone:
+    """Solves single poses of a plan; what it compiles is made at the first one and kept."""
+
+    def __init__(self, plan: Plan, numerics: Numerics) -> None:
+        self.plan = plan
+        self._numerics = numerics
+        self.wall = None if plan.contact is None else wall_of_plan(plan, plan.contact)
+        self._free: PoseSolver | None = None
+        self._blocked: BlockedSolver | None = None
+
+    def solve(self, column: Array, near: Any = None) -> tuple[Step, Solved | Blocked | None]:
+        """Solve one pose, given by every quantity, from a neighbour where there is one."""
+        model, pressure, loads = self._pose(column)
+        plan = self.plan
+        if plan.contact is None:
+            self._free = self._free or PoseSolver(plan.model, self._numerics)
+            return self._free.with_model(model).solve(pressure, loads, near)
+        self._blocked = self._blocked or BlockedSolver(plan.model, self._numerics, plan.contact)
+        # from zero pressure: the neighbours in a chunk are not on the way to each other
+        return self._blocked.with_model(model).solve(pressure, loads, self.wall)
+
+    def length(self, column: Array) -> float:
+        """Return the length L_0 of a pose's robot [m]."""
+        return float(self._pose(column)[0].robot.length)
+
+    def _pose(self, column: Array) -> tuple[Model, Array, Loads]:
+        """Return the model, the pressures and the loads of one pose from every quantity."""
+        values: dict[str, Any] = {}
+        start = 0
+        for name, nominal in self.plan.nominal.items():
+            part = column[start : start + nominal.size]
+            values[name] = float(part[0]) if nominal.size == 1 and name != "pressure" else part
+            start += nominal.size
+        named = with_symbols(self.plan.model, values)
+        return named, values["pressure"], Loads(values["tip_force"], values["tip_moment"], values["gravity"])

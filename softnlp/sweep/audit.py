@@ -1,0 +1,64 @@
+"""A sample of a sweep solved again by the general solver and closed by IPOPT, on the whole program."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from softnlp.base.status import Status
+from softnlp.base.units import MILLIMETRE
+from softnlp.batch.alone import Alone
+from softnlp.batch.plan import Plan
+from softnlp.batch.poses import STATUSES, Lane
+from softnlp.sweep.journal import Journal
+
+EVERY = 1000
+"""One of so many poses that the batch solved is audited, at least one of a chunk."""
+
+
+@dataclass(frozen=True)
+class Audit:
+    """What IPOPT said of a sample.
+
+    Attributes
+    ----------
+    audited
+        How many poses.
+    largest
+        Distance between the tips of the batch and of the general solver [m].
+    disputed
+        The numbers of the poses, from 1, that it does not confirm.
+    """
+
+    audited: int = 0
+    largest: float = 0.0
+    disputed: tuple[int, ...] = ()
+
+    @property
+    def attributes(self) -> dict[str, float | int]:
+        """What the result file says of it, the distance in [mm]; nothing where nothing was audited."""
+        return {"audited": self.audited, "audit_largest_mm": self.largest / MILLIMETRE} if self.audited else {}
+
+
+def audit(plan: Plan, journal: Journal) -> Audit:
+    """Audit the poses that were solved together. Only with the engine "auto"."""
+    if plan.numerics.engine != "auto":
+        return Audit()
+    solver: Alone | None = None
+    solved = STATUSES.index(Status.SOLVED)
+    audited, largest, disputed = 0, 0.0, []
+    for block in journal.blocks():
+        rows = block.rows[(block.rows["lane"] == Lane.BATCH) & (block.rows["status"] == solved)]
+        count = -(-len(rows) // EVERY)
+        for row in rows[:: EVERY if count else 1][:count]:
+            solver = solver or Alone(plan, plan.numerics)
+            number = int(row["pose"])
+            column = plan.full_values(np.array([number]))[:, 0]
+            step, _ = solver.solve(column)
+            audited += 1
+            away = np.inf if step.pose is None else float(np.linalg.norm(step.pose.tip_position - row["tip_position"]))
+            if not away <= plan.numerics.accuracy * solver.length(column):
+                disputed.append(number + 1)
+            largest = max(largest, away)
+    return Audit(audited, largest, tuple(disputed))

@@ -1,0 +1,240 @@
+"""Who solves: Newton's method, IPOPT, or both; they agree, and IPOPT has the last word."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from softnlp import (
+    BAR,
+    ContactSettings,
+    InputError,
+    Loads,
+    Numerics,
+    Status,
+    Step,
+    blocked_force,
+    constrained_pose,
+    forward,
+    load_scenario,
+    material,
+    pressure_for_force,
+    robot,
+    run_sweep,
+    to_json,
+)
+from softnlp.batch.poses import Lane
+from softnlp.cli import main
+from softnlp.model.ipopt_options import IPOPT_OPTIONS
+from softnlp.nlp.solver import Engine
+from softnlp.sweep import audit as auditing
+from softnlp.sweep.read import load_workspace
+
+D25, ECOFLEX = robot("D25L60"), material("Ecoflex 00-50")
+PRESSURES = np.array([[0.2, 0.05, 0.0], [0.4, 0.1, 0.0]]) * BAR
+LOADED = Loads(tip_force=(0.03, 0.02, -0.01), gravity="hanging")
+ENGINES = ("newton", "auto", "ipopt")
+STUDIES: dict[str, Any] = {
+    "forward": lambda n: forward(D25, ECOFLEX, PRESSURES, numerics=n).steps,
+    "loaded": lambda n: forward(D25, ECOFLEX, PRESSURES, loads=LOADED, numerics=n).steps,
+    "collocation": lambda n: (
+        forward(D25, ECOFLEX, PRESSURES, loads=LOADED, numerics=replace(n, transcription="collocation")).steps
+    ),
+    **{
+        closure: lambda n, closure=closure: (
+            blocked_force(
+                D25, ECOFLEX, PRESSURES[:, :] * [1, 0, 0], contact=ContactSettings(closure=closure), numerics=n
+            ).steps
+        )
+        for closure in ("free", "compliant", "rigid", "weighted")
+    },
+    "constrained": lambda n: (constrained_pose(D25, ECOFLEX, PRESSURES[0], loads=LOADED, numerics=n),),
+}
+
+
+@pytest.mark.parametrize("study", STUDIES)
+def test_the_engines_agree(study: str) -> None:
+    runs: dict[Any, tuple[Step, ...]] = {engine: STUDIES[study](Numerics(engine=engine)) for engine in ENGINES}
+    for engine, steps in runs.items():
+        for step, reference in zip(steps, runs["newton"], strict=True):
+            assert step.status is Status.SOLVED
+            assert step.engine == engine
+            assert step.pose is not None
+            assert reference.pose is not None
+            off = np.abs(step.pose.tip_position - reference.pose.tip_position).max()
+            assert off <= 1e-9 * D25.length
+            if step.contact is not None and reference.contact is not None:
+                assert step.contact.force == pytest.approx(reference.contact.force, rel=1e-9, abs=1e-12)
+            assert (step.ipopt is None) == (engine == "newton")
+            if step.ipopt is not None:
+                assert step.ipopt.status == "Solve_Succeeded"
+                assert step.ipopt.multipliers < 1e-6  # nothing is minimised
+    for step in runs["auto"]:
+        assert step.ipopt is not None
+        assert step.ipopt.iterations <= 1  # it starts at the solution
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_pressure_for_a_force_is_the_same(engine: Any) -> None:
+    pressure, step = pressure_for_force(D25, ECOFLEX, [0], 0.2, numerics=Numerics(engine=engine))
+    assert step.status is Status.SOLVED
+    assert step.engine == engine
+    assert step.contact is not None
+    assert step.contact.force == pytest.approx(0.2, rel=1e-9)
+    assert pressure[0] == pytest.approx(EXPECTED.setdefault("pressure", pressure[0]), rel=1e-9)
+
+
+EXPECTED: dict[str, float] = {}
+
+
+@pytest.mark.parametrize("moved", [True, False])
+def test_what_ipopt_does_not_confirm_is_disputed(moved: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """IPOPT that ends elsewhere, or at no solution, leaves no numbers, and the message says both tips."""
+    real = Engine.closed
+
+    def elsewhere(self: Engine, solution: Any) -> Any:
+        found = real(self, solution)
+        return replace(found, x=found.x + 1e-3) if moved else replace(found, residual=1.0)
+
+    monkeypatch.setattr(Engine, "closed", elsewhere)
+    for run in (
+        forward(D25, ECOFLEX, PRESSURES[:1], loads=LOADED),
+        blocked_force(D25, ECOFLEX, PRESSURES[:1] * [1, 0, 0]),
+    ):
+        (step,) = run.steps
+        assert step.status is Status.DISPUTED
+        assert (step.pose, step.contact) == (None, None)
+        assert "by Newton's method and at (" in step.message
+        assert "mm by IPOPT (Solve_Succeeded)" in step.message
+        assert run.failed == run.steps
+        assert to_json(run)["steps"][0]["tip_position_mm"] is None
+
+
+def test_options_reach_ipopt() -> None:
+    few = forward(D25, ECOFLEX, PRESSURES[-1:], loads=LOADED, numerics=Numerics(engine="ipopt", ipopt={"max_iter": 0}))
+    assert few.steps[0].status is Status.DIVERGED
+    same = Numerics(ipopt={"print_level": 0, "max_iter": 5})
+    assert same == Numerics(ipopt={"max_iter": 5, "print_level": 0})
+    assert hash(same) == hash(Numerics(ipopt=same.ipopt))
+    assert same.without_ipopt() == Numerics(engine="newton")
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"engine": "newton", "ipopt": {"tol": 1e-9}}, "ipopt: not used with the engine 'newton'"),
+        ({"ipopt": {"output_file": "x"}}, "output_file: this option of IPOPT cannot be set here: a scenario names no"),
+        ({"ipopt": {"hsllib": "x.so"}}, "hsllib: this option of IPOPT cannot be set here: a scenario names no file"),
+        ({"ipopt": {"max_itr": 3}}, "max_itr: this option of IPOPT cannot be set here: not known; did you mean"),
+        ({"ipopt": {"max_iter": 3.5}}, "max_iter: expected a whole number from 0 to 100000, got 3.5"),
+        ({"ipopt": {"tol": True}}, "tol: expected a number from 1e-14 to 1, got true"),
+        ({"ipopt": {"linear_solver": "ma57"}}, 'linear_solver: expected "mumps", got'),
+    ],
+)
+def test_options_that_cannot_be_are_refused(given: Any, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        Numerics(**given)
+    assert words in str(caught.value)
+
+
+def test_no_option_names_a_file_or_a_library() -> None:
+    for name, option in IPOPT_OPTIONS.items():
+        assert option.words or option.most > option.least, name
+        assert not any(part in name for part in ("file", "lib", "dir")), name
+
+
+HEAD = 'study = "{study}"\n[robot]\nname = "D25L60"\n[material]\nname = "Ecoflex 00-50"\nmodel = "mooney-rivlin"\n'
+STEPS = "[pressure]\nsequence_bar = [[0.2, 0.0, 0.0]]\n"
+
+
+def written(folder: Path, solver: str, study: str = "forward", rest: str = STEPS) -> Path:
+    path = folder / "scenario.toml"
+    path.write_text(HEAD.format(study=study) + rest + solver)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("solver", "words"),
+    [
+        ('[solver]\nengine = "ipopt2"', "[solver] engine: expected 'auto', 'ipopt' or 'newton', got 'ipopt2'"),
+        ('[solver]\nengine = "newton"\nipopt = { tol = 1e-9 }', "[solver] ipopt: not used with the engine 'newton'"),
+        ('[solver.ipopt]\noutput_file = "x"', "[solver] ipopt.output_file: unknown key"),
+        ('[solver.ipopt]\nlinear_solver = "ma57"', '[solver] ipopt.linear_solver: expected "mumps"'),
+    ],
+)
+def test_a_scenario_is_refused_on_one_line(
+    solver: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", str(written(tmp_path, solver))]) == 2
+    told = capsys.readouterr().err
+    assert words in told
+    assert told.count("\n") == 1
+
+
+def test_a_scenario_chooses_the_engine_and_the_document_says_who_solved(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = written(tmp_path, '[solver]\nengine = "ipopt"\n[solver.ipopt]\nmax_iter = 50\nprint_level = 0\n')
+    assert load_scenario(path).numerics == Numerics(engine="ipopt", ipopt={"max_iter": 50, "print_level": 0})
+    assert main(["run", str(path), "--json"]) == 0
+    (step,) = json.loads(capsys.readouterr().out)["steps"]
+    assert (step["engine"], step["ipopt_status"]) == ("ipopt", "Solve_Succeeded")
+    assert step["ipopt_iterations"] >= 0
+    assert step["ipopt_multipliers"] == pytest.approx(0.0, abs=1e-6)
+    assert main(["run", str(written(tmp_path, '[solver]\nengine = "newton"')), "--json"]) == 0
+    (step,) = json.loads(capsys.readouterr().out)["steps"]
+    assert step["engine"] == "newton"
+    assert step["ipopt_status"] is step["ipopt_iterations"] is step["ipopt_multipliers"] is None
+
+
+# --- sweeps ----------------------------------------------------------------------------------------------------------
+
+GRID = "[workspace]\nlevels = 2\nto_bar = 0.5\n"
+
+
+def test_a_sweep_is_audited_and_ipopt_sweeps_alike(tmp_path: Path) -> None:
+    found = {}
+    for engine in ENGINES:
+        asked = load_scenario(written(tmp_path, f'[solver]\nengine = "{engine}"\n', "workspace", GRID))
+        summary = run_sweep(asked, tmp_path / engine)
+        assert summary.failed == 0
+        assert summary.audit.audited == (1 if engine == "auto" else 0)
+        assert summary.audit.largest <= 1e-6 * D25.length
+        assert summary.audit.disputed == ()
+        found[engine] = load_workspace(tmp_path / engine)
+    for engine in ENGINES[1:]:
+        np.testing.assert_allclose(found[engine].tip_position, found["newton"].tip_position, atol=1e-6 * D25.length)
+
+
+def test_poses_that_ipopt_does_not_confirm_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solve = auditing.Alone.solve
+
+    def elsewhere(self: Any, *given: Any) -> Any:
+        step, solved = solve(self, *given)
+        assert step.pose is not None
+        return replace(step, pose=replace(step.pose, tip_position=step.pose.tip_position + 1e-6)), solved
+
+    monkeypatch.setattr(auditing.Alone, "solve", elsewhere)
+    path = written(tmp_path, "", "workspace", GRID)
+    assert main(["sweep", str(path), "--out", str(tmp_path / "out"), "--workers", "1"]) == 3
+    told = capsys.readouterr().out
+    assert "warning: IPOPT does not confirm the audited poses" in told
+    assert "1 poses audited by IPOPT, whose tips are at most 0.0017 mm away" in told
+    assert Lane.BATCH == 0
+
+
+def test_the_log_is_shown_on_standard_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = written(tmp_path, "")
+    assert main(["run", str(path), "--json", "--ipopt-log"]) == 0
+    told = capsys.readouterr()
+    assert "This is Ipopt" in told.err or "Number of Iterations" in told.err
+    assert json.loads(told.out)["steps"][0]["status"] == "solved"
+    assert main(["run", str(written(tmp_path, '[solver]\nengine = "newton"')), "--ipopt-log"]) == 2
+    assert "--ipopt-log: IPOPT takes no part" in capsys.readouterr().err
