@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Any
 
+from app_stage import done
 from nicegui import ElementFilter
 from nicegui.testing import User
 from nicegui.testing.user_simulation import user_simulation
@@ -23,7 +24,7 @@ def use(build: Callable[[Session], None], person: Callable[[User, Session], Awai
             await person(user, session)
 
     try:
-        asyncio.run(run())
+        done(run())
     finally:
         session.close()
     return session

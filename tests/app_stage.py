@@ -88,7 +88,11 @@ def enter(user: User, marker: str, value: Any) -> None:
 
 
 def done(visit: Coroutine[Any, Any, None]) -> None:
-    """Run what a person does on a page; the server's own loops are not waited for, they have no end."""
+    """Run what a person does on a page, and leave the page's own loops where they are.
+
+    asyncio.run would cancel them and wait until they have ended. In Python 3.11 `wait_for` loses a cancellation that
+    comes as what it waits for is there, and the loop that sends a page's changes then goes on for ever.
+    """
     loop = asyncio.new_event_loop()
     try:
         loop.run_until_complete(visit)

@@ -178,3 +178,41 @@ def shown_like(text: str, value: float) -> bool:
     """Whether a number on the page is one of the command to the digits shown; a tie may be rounded either way."""
     decimals = len(text.partition(".")[2])
     return abs(float(text) - value) <= 0.5 * 10**-decimals + 2e-5
+
+
+def assert_same_as_the_command(tab: Watched, folder: Path) -> None:
+    """Compare every number shown with that of the last step of the saved scenario, run by the command."""
+    tab.settled()
+    step = run_json(tab.saved(folder))["steps"][-1]
+    for _ in range(20):  # a busy machine may still be drawing
+        differs = difference(tab.numbers(), step)
+        if not differs:
+            return
+        tab.page.wait_for_timeout(500)
+    raise AssertionError(differs)
+
+
+def difference(shown: dict[str, str], step: dict[str, Any]) -> str:
+    """Return what differs between numbers on the page and those of the command, "" for nothing."""
+    compared = 0
+    for key, text in shown.items():
+        name, _, index = key.partition(".")
+        if name in step:
+            value = step[name][int(index)] if index else step[name]
+            if text == "–" or value is None or not shown_like(text, value):
+                return f"{key}: {text} on the page, {value} of the command"
+            compared += 1
+    return "" if compared >= 9 else f"only {compared} numbers are shown"
+
+
+def keeps(tab: Watched, text: str) -> None:
+    """Wait until the browser keeps a text of what is on the screen."""
+    kept = "Object.values(sessionStorage).join()"
+    tab.page.wait_for_function(f"{kept}.includes({text!r})")
+
+
+def reload(tab: Watched) -> None:
+    """Load the page again, as a person does who is lost."""
+    tab.page.reload()
+    tab.page.wait_for_selector("[data-frame]", state="attached")
+    tab.settled()

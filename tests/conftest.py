@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,16 @@ MATERIALS = ("test_material_lines.py", "test_formula.py", "test_materials.py")
 TESTS_OF = dict.fromkeys(("formula", "laws", "material_reading", "materials"), MATERIALS)
 LONG = "test_units_only_change_the_numbers"
 
+# Files of a minute and more, then those of half a minute, each in the order of what they take.
+LONGEST = (
+    *("app_studies", "app_browser", "cli", "blocked_force", "workspace_lane", "sensitivity", "compare", "pages"),
+    *("design", "app_workspace", "inverse", "docs", "witness_blocked", "design_candidate", "shipped_blocked", "paper"),
+    *("identify", "forward", "blocked_problem", "compare_figures", "stability", "user_text", "solver", "closures"),
+    *("shipped_scenarios", "app_session", "sweep_processes", "app_blocked", "workspace_docs", "blocked_paths", "fuzz"),
+    *("view", "inverse_solver", "random_poses", "scenario", "branch", "problem", "workspace_document", "comparison"),
+    *("figures", "app_material", "tensile", "app_sequence", "app_inverse", "results", "app_identify", "processes"),
+)
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--pictures", type=Path, help="folder that keeps the screenshots of the app")
@@ -40,12 +51,41 @@ def pictures(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def opener() -> Iterator[Any]:
+    """Yield a function that opens an address in a tab of the file's one Chromium."""
+    from tests.browser import browser
+
+    with browser() as open_tab:
+        yield open_tab
+
+
+@pytest.fixture(scope="module")
+def new_tab(opener: Any) -> Iterator[Any]:
+    """Yield a function that opens a tab on the file's one server of the app."""
+    from benchmarks.app import served
+
+    with served() as (address, _):
+        yield lambda: opener(address)
+
+
+@pytest.fixture
+def tab(new_tab: Any) -> Iterator[Any]:
+    """Yield a tab that shows the app at rest, and hold that it asked for nothing outside and has no errors."""
+    opened = new_tab()
+    opened.settled()
+    yield opened
+    assert not opened.outside, "the page asked for something outside of this machine"
+    assert not opened.complaints, "the browser's console has errors"
+    opened.page.close()
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """Give each file to one worker, in the order of their names: what a file compiles or opens is made once."""
+    """Give each file to one worker, in the order of the collection: what a file compiles or opens is made once."""
     from xdist.scheduler import LoadFileScheduling
 
-    config.option.loadscopereorder = False  # the browser's tests take longest, and begin early so
+    config.option.loadscopereorder = False
     return LoadFileScheduling(config, log)
 
 
@@ -60,7 +100,12 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Run last what takes many examples, or long, where the first failure ends the run."""
+    """Begin with the files that take longest, so that no worker is left alone with one at the end.
+
+    Of mutants, run last what takes many examples, or long, where the first failure ends the run.
+    """
+    places = {name: k for k, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: places.get(item.path.stem.removeprefix("test_"), len(LONGEST)))
     if _is_mutated():
         items.sort(
             key=lambda item: (item.name.startswith(LONG), hasattr(getattr(item, "function", None), "hypothesis"))

@@ -31,6 +31,7 @@ async def tell_closed(name: str) -> None:
     assert (await closed(Request({"type": "http"}, receive))).status_code == 204
 
 
+@pytest.mark.thorough
 def test_closed_tabs_give_their_memory_back_and_an_open_one_stays() -> None:
     held: list[dict[str, weakref.ref[Any]]] = []
     folders: list[Path] = []

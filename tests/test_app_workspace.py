@@ -30,6 +30,7 @@ def swept(folder: Path, workspace: dict[str, object], progress: Progress | None 
     return cloud.sweep(asked, folder, 1, progress or Progress())
 
 
+@pytest.mark.thorough
 def test_manipulability_of_a_grid_is_that_of_the_tip_jacobian(tmp_path: Path) -> None:
     """Differences over the grid approach the exact derivative as its square."""
     errors = []
@@ -69,6 +70,7 @@ def stopped(folder: Path) -> cloud.Swept:
     return found[0]
 
 
+@pytest.mark.thorough
 def test_a_stopped_sweep_is_gone_on_with(tmp_path: Path) -> None:
     first = stopped(tmp_path)
     assert first.news.stopped

@@ -165,6 +165,7 @@ def test_weighted_goes_on_where_the_square_equations_are_singular_and_folds_wher
     assert float(lost.message.split(" is at ")[1].split(",")[0]) == pytest.approx(1.345, abs=0.005)
 
 
+@pytest.mark.thorough
 def test_loads_act_as_in_the_witness() -> None:
     F, M, cap = (0.02, 0.0, -0.05), (0.0, 1e-3, 0.0), 4e-3
     ours = one(0.9, ContactSettings(tip_cap=cap), loads=Loads(tip_force=F, tip_moment=M, gravity=DOWN))
@@ -277,6 +278,7 @@ def test_rigid_chambers_fold(name: str, bar: float) -> None:
     assert last == pytest.approx(bar, abs=0.01)
 
 
+@pytest.mark.thorough
 def test_a_wall_turned_with_the_pressures_changes_nothing() -> None:
     angle = 2 * np.pi / 3
     normal = (float(np.cos(angle)), float(np.sin(angle)), 0.0)
@@ -321,6 +323,7 @@ def test_a_wall_that_the_tip_starts_behind_is_refused(
             ask()
 
 
+@pytest.mark.thorough
 def test_a_wall_that_is_moved_may_start_in_front() -> None:
     wall = ContactSettings(wall_point=(5e-3, 0.0, 0.0), wall_normal=(1.0, 0.0, 0.0))
     steps = force_against_offset(D25L60, ECOFLEX, [0.5 * BAR, 0, 0], [-5e-3, 0.0], wall).steps
@@ -384,6 +387,7 @@ def test_planar_shapes_stay_planar_and_warn_where_they_may_slip() -> None:
     assert not told[1]
 
 
+@pytest.mark.thorough
 def test_a_preloading_wall_and_loads_at_rest_are_reached() -> None:
     pushed = one(0.5, ContactSettings(offset=5e-3))
     assert force(pushed) > force(one(0.5))
@@ -429,6 +433,7 @@ def test_constrained_chambers_resist_a_tip_load() -> None:
     np.testing.assert_allclose(free.pose.tip_position, bare.tip_position, atol=1e-7)
 
 
+@pytest.mark.thorough
 def test_weights_matter_as_they_are_said_to() -> None:
     contact = ContactSettings(closure="weighted", weights=ClosureWeights(1.0, 1.0, 5.0, None))
     step, found = weight_sensitivity(D25L60, ECOFLEX, [0.9 * BAR, 0, 0], contact)
@@ -489,6 +494,7 @@ def test_another_equilibrium_is_reported_and_not_returned(name: str, bar: float,
     assert force(checked) == pytest.approx(exact.force, rel=1e-5)
 
 
+@pytest.mark.thorough
 def test_other_starts_find_nothing_where_there_is_nothing_else() -> None:
     checked = one(0.5, branches=20)
     assert not checked.warnings

@@ -46,7 +46,7 @@ def test_newton_on_the_condensed_equations_and_ipopt_agree(closure: str) -> None
 @pytest.mark.parametrize(
     ("name", "closure"),
     [
-        ("D25L60", "compliant"),
+        pytest.param("D25L60", "compliant", marks=pytest.mark.thorough),
         ("D15L60", "free"),
         pytest.param("D25L60", "free", marks=pytest.mark.slow),
         pytest.param("D20L40", "compliant", marks=pytest.mark.slow),
@@ -102,6 +102,7 @@ def test_weighted_is_the_minimum_of_an_objective(weights: tuple[float, float, fl
     np.testing.assert_allclose(best.x[problem.free_size :], found.solution.x, atol=1e-6)
 
 
+@pytest.mark.thorough
 def test_weighted_by_collocation_is_the_same_minimum() -> None:
     # without a condensed step the errors left are found by a fixed-point iteration over square problems
     contact = ContactSettings(closure="weighted", weights=ClosureWeights(2.0, 100.0, 30.0, None))

@@ -39,6 +39,7 @@ def last_pressure(point: BranchPoint) -> np.ndarray:
     return 1e5 * np.array([float(word) for word in found.group(1).split(",")])
 
 
+@pytest.mark.thorough
 @given(
     seed=st.integers(0, 100_000),
     k_e=st.sampled_from([0.0, 0.41]),

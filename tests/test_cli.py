@@ -304,6 +304,7 @@ def test_results_that_cannot_be_written_are_shown(cli: Run) -> None:
 # --- what the output meets ---
 
 
+@pytest.mark.thorough
 def test_a_reader_that_leaves_loses_no_results() -> None:
     """As `| head -1` does, only sooner."""
     scenario()
@@ -396,6 +397,7 @@ def test_ctrl_c_before_the_first_step_writes_nothing(cli: Run, monkeypatch: pyte
     assert written() == {"quick.toml"}
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 def test_ctrl_c_in_the_middle_of_a_long_run_in_a_terminal() -> None:
     rows = "".join(f"{k},{k / 4000},0,0\n" for k in range(4000))
@@ -443,6 +445,7 @@ def test_branches_belong_to_a_blocked_force_at_each_pressure(cli: Run) -> None:
     assert written() == {"quick.toml", "curve.toml"}
 
 
+@pytest.mark.thorough
 def test_branches_of_a_blocked_force_leave_its_result(cli: Run) -> None:
     path = scenario("blocked.toml", pressure="ramp = { sets = [1], to_bar = 1.0, steps = 3 }")
     path.write_text(path.read_text().replace('"forward"', '"blocked-force"'))

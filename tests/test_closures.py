@@ -47,6 +47,7 @@ def forces(closure: Any, to: int = 2) -> list[float]:
     return [step.contact.force for step in run.steps if step.contact is not None]
 
 
+@pytest.mark.thorough
 def test_a_closure_written_outside_gives_what_the_built_in_one_does() -> None:
     own = Closure("springs", springs)
     np.testing.assert_allclose(forces(own), forces("compliant"), rtol=1e-9)

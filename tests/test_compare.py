@@ -71,6 +71,7 @@ def told(capsys: pytest.CaptureFixture[str], *words: Any, status: int = 0) -> di
 # --- what is published ---
 
 
+@pytest.mark.thorough
 def test_the_published_angles_are_as_far_as_documented(capsys: pytest.CaptureFixture[str]) -> None:
     document = told(capsys, ANGLES, DATA / "measured_angles.csv", *BOTH)
     reproduction, calibrated = (v["statistics"]["bending_angle_deg"] for v in document["variants"])
@@ -91,6 +92,7 @@ def test_the_published_angles_are_as_far_as_documented(capsys: pytest.CaptureFix
     assert document["variants"][0]["by_robot"]["D25L60"]["bending_angle_deg"]["mean"] == pytest.approx(16.15, abs=0.01)
 
 
+@pytest.mark.thorough
 def test_the_published_forces_are_as_far_as_documented(capsys: pytest.CaptureFixture[str]) -> None:
     words = [*BOTH, "--closure", "free", "--closure", "compliant"]
     document = told(capsys, FORCES, DATA / "measured_forces.csv", *words)
@@ -205,6 +207,7 @@ def test_free_poses_are_solved_once_for_all_closures() -> None:
 # --- comparisons made up ---
 
 
+@pytest.mark.thorough
 @given(st.integers(2, 9), st.integers(0, 2**32 - 1), st.integers(1, 2))
 @settings(max_examples=25, deadline=None)
 def test_the_order_of_rows_changes_nothing(rows: int, seed: int, robots: int) -> None:

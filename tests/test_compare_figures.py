@@ -220,6 +220,7 @@ def test_more_panels_than_fit_are_said() -> None:
 # --- the document ---
 
 
+@pytest.mark.thorough
 def test_the_document_s_commands_and_example_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -302,6 +302,7 @@ def test_the_figure_has_the_quartiles_of_each_group(space: Workspace, tmp_path: 
     figure.canvas.draw()
 
 
+@pytest.mark.thorough
 def test_the_command_prints_and_writes(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     P = grid(5)[10:30]
     file = measured_file(tmp_path / "m.csv", P, np.tile([0, 0, 1e-3], (20, 1)))

@@ -190,6 +190,7 @@ def test_the_largest_force_is_on_the_branch_and_cannot_be_beaten_nearby() -> Non
     assert "stretch" in names
 
 
+@pytest.mark.thorough
 def test_a_solver_takes_another_model_without_compiling() -> None:
     other = Model(robot("D25L60", chamber_diameter=4e-3, length=0.05), material("Dragon Skin 10"))
     P = np.array([0.8 * BAR, 0.0, 0.0])
@@ -302,6 +303,7 @@ def test_loads_are_part_of_the_program() -> None:
     assert loaded.choices["chamber_diameter"] == pytest.approx(unloaded.choices["chamber_diameter"], rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_processes_find_what_one_finds() -> None:
     silicones = [SOFT, material("Dragon Skin 10"), material("Ecoflex 00-30")]
     task = DesignTask({"material": silicones}, 1.0 * BAR, requirements={"stretch": at_most(1.2)},
@@ -382,6 +384,7 @@ def paper() -> Design:
     return run_design(load_scenario(FOLDER / "laparoscope_paper.toml"))
 
 
+@pytest.mark.thorough
 def test_the_papers_case_chooses_what_the_paper_chose() -> None:
     done = paper()
     assert done.best is not None

@@ -141,6 +141,7 @@ def test_a_blocked_shape_that_cannot_be_begun_has_the_reason_of_the_free_one() -
     assert found.step.contact is None
 
 
+@pytest.mark.thorough
 def test_a_free_shape_that_buckles_is_not_feasible() -> None:
     """A straight robot well beyond its Euler load pi^2 EI / (4 L^2)."""
     squeezed = Loads(tip_force=(0.0, 0.0, -3.0))
@@ -240,6 +241,7 @@ def ring(**changes: Any) -> Candidate:
     return the_only(bending(0.5 * BAR, **{"choices": {"chamber_circle_diameter": RING}, "requirements": {}} | changes))
 
 
+@pytest.mark.thorough
 def test_a_search_leaves_a_wall_on_both_sides() -> None:
     """The farther out the chambers the more it bends, and the nearer to the lumen the less."""
     far, near = ring(starts=1), ring(starts=1, maximise=None, minimise="bending_angle")

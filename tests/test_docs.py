@@ -87,7 +87,7 @@ PARSERS = (
 
 
 EXAMPLES = [
-    pytest.param(example, id=f"{path.name}:{example.line}")
+    pytest.param(example, id=f"{path.name}:{example.line}", marks=[pytest.mark.thorough] * (path == README))
     for path in (README, SCENARIO, MODEL)
     for example in Document.parse(str(path), *PARSERS).examples()
 ]

@@ -49,6 +49,7 @@ def test_other_readings_are_other_models_and_the_table_says_by_how_much() -> Non
     assert numbers(table, "as settled")[0] <= 0.1
 
 
+@pytest.mark.thorough
 def test_measured_angles_are_compared_with_poses_of_the_interface() -> None:
     angles, elongations = measured_angles.predictions()
     P = np.array([[1.5, 0, 0], [1.5, 1.5, 0], [1.5, 1.5, 1.5]]) * BAR

@@ -27,6 +27,7 @@ def test_the_cases_are_the_same_every_time() -> None:
     assert len(small_scenarios()) > 30
 
 
+@pytest.mark.thorough
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     """The changes that end in reading, and a few of the small ones that solve."""
     broken = [c for c in cases(SEED, 3 * QUICK) if _ends_in_reading(c)][:QUICK]

@@ -83,6 +83,7 @@ def test_the_forward_pose_at_the_answer_meets_the_target(loaded: bool) -> None:
     assert np.linalg.norm(again - positions[:2], axis=1).max() < 1e-6 * LENGTH
 
 
+@pytest.mark.thorough
 def test_the_nearest_point_is_that_of_a_dense_search() -> None:
     run = inverse(D25, SILICONE, positions=FAR, numerics=GRID)
     table = ArcMap(poses_of(GRID, D25))

@@ -170,6 +170,7 @@ def test_a_direction_out_of_reach_is_so_many_degrees_off() -> None:
     assert step.aimed.angle == pytest.approx(np.pi - step.pose.tilt, abs=1e-9)
 
 
+@pytest.mark.thorough
 def test_no_stable_pose_is_nearer_than_that_at_the_edge_of_stability() -> None:
     """A column that stands on its axis only unstably is bent just enough by one set to be stable."""
     grid = Numerics(intervals=2)

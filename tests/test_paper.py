@@ -131,6 +131,7 @@ def test_measurements_are_those_of_the_robots() -> None:
 # --- numbers of the pages -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 def test_the_published_laparoscope_angles_to_a_tenth_of_a_degree() -> None:
     runs = {}
     for name, known in laparoscope.names().items():
@@ -156,6 +157,7 @@ def few_bending(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
         return bending.page(folder), folder
 
 
+@pytest.mark.thorough
 def test_bending_angles_are_those_of_the_public_interface(few_bending: tuple[str, Path]) -> None:
     text, folder = few_bending
     one, two = (rows_of(text, f"### Bending angle, {sets} [deg]") for sets in ("one set", "two sets"))
@@ -174,6 +176,7 @@ def test_bending_angles_are_those_of_the_public_interface(few_bending: tuple[str
     )
 
 
+@pytest.mark.thorough
 def test_without_stiffening_robots_bend_further(few_bending: tuple[str, Path]) -> None:
     for sets in ("one set", "two sets"):
         for cells in list(rows_of(few_bending[0], f"### Bending angle, {sets} [deg]").values())[2:]:
@@ -182,6 +185,7 @@ def test_without_stiffening_robots_bend_further(few_bending: tuple[str, Path]) -
                 assert bare > 1.1 * stiff
 
 
+@pytest.mark.thorough
 def test_links_of_a_page_lead_somewhere(few_bending: tuple[str, Path]) -> None:
     text, folder = few_bending
     targets = re.findall(r"\]\(([^)]+)\)", text + dict(pages_index())["index.md"])
@@ -197,6 +201,7 @@ def pages_index() -> list[tuple[str, str]]:
     return [("index.md", docs.paper._index())]
 
 
+@pytest.mark.thorough
 def test_forces_of_the_tables_are_those_of_the_public_interface(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(blocked, "NAMES", FEW)
     monkeypatch.setattr(blocked, "HYPERELASTIC", (LAW,))
@@ -237,6 +242,7 @@ def rough() -> BlockedSolver:
     return constraint._solver(replace(scenario, numerics=replace(scenario.numerics, accuracy=weights.ROUGH)))
 
 
+@pytest.mark.thorough
 def test_the_weight_found_gives_the_published_force(rough: BlockedSolver) -> None:
     known, scenario = published()["simulated_blocked_force"], cases.case("constraint_weighted")
     length = weights.length_weight_for(rough, scenario.pressures[-1], known["with_constraint_N"])
@@ -265,6 +271,7 @@ def test_a_weight_is_found_before_the_fold_or_not_at_all(
     assert np.isnan(weights.length_weight_for(rough, pressed(1), 0.6))
 
 
+@pytest.mark.thorough
 def test_the_tips_of_the_workspace_are_those_of_the_public_interface() -> None:
     scenario = cases.case(workspace.NAME)
     some = [40, 130, 200]

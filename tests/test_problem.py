@@ -242,6 +242,7 @@ def test_a_problem_with_an_inequality_is_not_square() -> None:
     assert not pose(MODEL, constraints=enough).problem.is_square
 
 
+@pytest.mark.thorough
 def test_an_inequality_is_held_and_certified() -> None:
     # the lowest pressure in set 1 that bends the robot to at least 60 degrees
     def enough(cases, given) -> list[Constraint]:

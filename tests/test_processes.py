@@ -57,6 +57,7 @@ def test_a_script_without_a_guard_runs_once(way: str, tmp_path: Path) -> None:
     assert (done.stdout, done.stderr) == ("top level\n[1, 2]\n", "")
 
 
+@pytest.mark.thorough
 def test_a_sweep_and_a_design_run_from_a_script_whose_law_is_its_own(tmp_path: Path) -> None:
     """The law is a lambda of the script, which no other process can import; the design is asked for in a thread."""
     done = subprocess.run(

@@ -124,6 +124,7 @@ def test_collocation_gives_the_same_as_multiple_shooting() -> None:
     assert fine[0] == pytest.approx(fine[1], rel=1e-4, abs=1e-4 * np.abs(fine[0]).max(axis=0).min())
 
 
+@pytest.mark.thorough
 def test_derivatives_hold_for_robots_built_anew() -> None:
     """The whole way from a robot's dimension to the tip, not only the compiled problem."""
     found = sensitivities(
@@ -387,6 +388,7 @@ def test_two_sets_span_a_flat_ellipsoid() -> None:
     assert moved.translation.semi_axes[1] > 0
 
 
+@pytest.mark.thorough
 def test_error_bars_are_those_of_monte_carlo() -> None:
     tolerances = {
         "robot.chamber_diameter": 0.02 * MILLIMETRE,
@@ -574,6 +576,7 @@ def _documents() -> Iterator[tuple[str, Document]]:
         yield name, Document.parse(str(ROOT / "docs" / f"{name}.md"), PythonCodeBlockParser())
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["inverse", "sensitivity"])
 def test_the_examples_of_the_documents_run(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     """In order: the later ones use names of the first."""

@@ -77,6 +77,7 @@ def test_the_documented_comparison_is_that_of_the_benchmark() -> None:
     assert f"{1e3 * left:.0f} N mm" in text
 
 
+@pytest.mark.thorough
 def test_a_tip_cap_lowers_the_force() -> None:
     bare, capped = (blocked_steps(name)[-1]["blocked_force_N"] for name in ("D25L60", "D25L60_tip_cap"))
     assert bare == pytest.approx(1.22, rel=0.02)
@@ -91,6 +92,7 @@ def test_a_wall_further_away_is_met_later() -> None:
         assert step["wall_normal"] == pytest.approx([np.cos(np.radians(10)), 0, np.sin(np.radians(10))], abs=1e-8)
 
 
+@pytest.mark.thorough
 def test_the_characteristic_curve_falls_to_nothing() -> None:
     steps = blocked_steps("D25L60_curve")
     forces = [step["blocked_force_N"] for step in steps]
@@ -107,6 +109,7 @@ def test_the_pressure_found_gives_the_force() -> None:
     assert 0.3 < step["pressure_bar"][0] < 0.6
 
 
+@pytest.mark.thorough
 def test_weighted_says_what_it_left() -> None:
     step = blocked_steps("D25L60_weighted")[-1]
     assert step["closure"] == "weighted"
@@ -120,6 +123,7 @@ def test_weighted_says_what_it_left() -> None:
     assert 1e3 * left["e_L"][0] == pytest.approx(abs(step["length_error_mm"]))
 
 
+@pytest.mark.thorough
 def test_constrained_chambers_resist_the_load() -> None:
     step = blocked_steps("D25L60_constrained")[-1]
     free, held = step["free_tip_position_mm"], step["tip_position_mm"]

@@ -89,6 +89,7 @@ def test_under_a_dead_tip_moment_stability_is_undefined(pressure: object, moment
         ]
 
 
+@pytest.mark.thorough
 def test_a_column_buckles_under_its_weight_at_greenhill_s_density() -> None:
     robot = replace(TALL, length=0.15)
     sec = at_rest(robot, FIRM)

@@ -33,6 +33,7 @@ def written(folder: Path, tables: str) -> Path:
     return path
 
 
+@pytest.mark.thorough
 def test_a_sweep_that_is_killed_loses_nothing(tmp_path: Path) -> None:
     """As soon as something more is confirmed, twice; `python -m benchmarks.sweep_kill` does it at random moments."""
     whole = sweep_kill.plan(4)
@@ -104,6 +105,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.thorough
 def test_a_dask_cluster_gives_the_same_bits_and_one_that_is_not_there_is_named(tmp_path: Path) -> None:
     """In a process of its own: Dask leaves threads behind, with which nothing should be forked."""
     pytest.importorskip("distributed")

@@ -168,6 +168,7 @@ def test_what_is_no_tensile_test_is_refused(stretch: Any, stress: Any, said: str
 # --- scenarios --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["tensile", "tensile_own_law"])
 def test_a_shipped_tensile_test_runs(name: str, tmp_path: Path) -> None:
     out = tmp_path / "out"

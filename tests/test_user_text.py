@@ -182,6 +182,7 @@ def kept_in(words: tuple[str, ...]) -> str:
     return f"; the results are in {words[1] if words[0] == 'workspace' else words[words.index('--out') + 1]}"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("words", "numbers", "figures", "names"), COMMANDS, ids=[" ".join(words[:2]) for words, *_ in COMMANDS]
 )
@@ -215,6 +216,7 @@ def test_a_blocked_force_shows_names_as_they_are() -> None:
     assert ROBOT in shown[1]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("command", "count"), [("run run.toml", 4), ("design design.toml", 3), ("compare run.toml", 3), ("sweep", 4)]
 )

@@ -242,6 +242,7 @@ def expected_vertices(shown: Frame) -> np.ndarray:
     return display_mesh(shown.robot).vertices(Body(1e-3 * shown.body.position, rotation, radii))
 
 
+@pytest.mark.thorough
 def test_a_browser_draws_it_in_place_and_asks_nobody_else(server: str, tmp_path: Path) -> None:
     """One page is used throughout, since a browser takes seconds to start."""
     import view_page

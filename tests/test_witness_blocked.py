@@ -73,6 +73,7 @@ def test_mean_errors_over_the_eight_robots() -> None:
     assert calibrated.mean() == pytest.approx(0.09, abs=0.005)
 
 
+@pytest.mark.thorough
 def test_free_closure_underestimates_every_robot() -> None:
     ratios = [
         follow(BODIES[name], ECOFLEX_50, [1.5e5, 0, 0], [1.0], Wall("free"), first_step=0.34, tolerance=1e-5)[0].force
@@ -84,6 +85,7 @@ def test_free_closure_underestimates_every_robot() -> None:
     assert min(ratios) == pytest.approx(0.39, abs=0.01)
 
 
+@pytest.mark.thorough
 def test_rigid_closure_overestimates_and_folds() -> None:
     assert one(1.5, Wall("rigid"), "D25L40").force / MEASURED["D25L40"] == pytest.approx(3.1, abs=0.05)
     with pytest.raises(Fold) as fold:
@@ -91,6 +93,7 @@ def test_rigid_closure_overestimates_and_folds() -> None:
     assert fold.value.reached * 1.5 == pytest.approx(1.303, abs=0.006)
 
 
+@pytest.mark.thorough
 def test_compliant_lies_between_free_and_rigid() -> None:
     bar = 0.6
     free, rigid = one(bar, Wall("free")), one(bar, Wall("rigid"))

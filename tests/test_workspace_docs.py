@@ -33,7 +33,7 @@ CODE = set(re.findall(r"`([^`\n]+)`", DOCUMENT))
         ("D25L60_sequence", 260, 1.2),
         ("D25L60_samples", 4096, 1.2),
         ("D25L60_lengths", 500, 1.2),
-        ("D25L60_blocked", 80, 1.5),
+        pytest.param("D25L60_blocked", 80, 1.5, marks=pytest.mark.thorough),
     ],
 )
 def test_a_shipped_sweep_solves(name: str, poses: int, highest: float, tmp_path: Path) -> None:

@@ -72,7 +72,10 @@ def random_pressures(count: int, highest: float, seed: int = 1) -> np.ndarray:
     ("name", "silicone", "law", "highest", "loads"),
     [
         ("D25L60", "Ecoflex 00-50", "mooney-rivlin", 1.2, LOADED),
-        ("laparoscope-9", "Ecoflex 00-30", "yeoh", 0.6, Loads(tip_force=(0.0, 0.02, 0.0))),
+        pytest.param(
+            *("laparoscope-9", "Ecoflex 00-30", "yeoh", 0.6, Loads(tip_force=(0.0, 0.02, 0.0))),
+            marks=pytest.mark.thorough,
+        ),
         pytest.param(
             *("D15L60", "Dragon Skin 10", "ogden", 0.8, Loads(gravity=(3.0, -4.0, 8.0))), marks=pytest.mark.slow
         ),
@@ -224,7 +227,10 @@ def blocked_rows(closure: str, pressures: np.ndarray, loads: Loads, offset: floa
     ("closure", "loads", "offset"),
     [
         ("free", Loads(), 0.0),
-        ("compliant", Loads(gravity=(0.0, 0.0, -9.80665), tip_force=(0.0, 0.0, -0.02)), 0.0),
+        pytest.param(
+            *("compliant", Loads(gravity=(0.0, 0.0, -9.80665), tip_force=(0.0, 0.0, -0.02)), 0.0),
+            marks=pytest.mark.thorough,
+        ),
         pytest.param("compliant", Loads(), -0.008, marks=pytest.mark.slow),
         pytest.param("rigid", Loads(), 0.0, marks=pytest.mark.slow),
     ],
@@ -287,6 +293,7 @@ def test_a_blocked_pose_out_of_the_walls_plane_is_solved_in_space() -> None:
     assert abs(rows["tip_position"][0][1]) > 1e-4
 
 
+@pytest.mark.thorough
 def test_a_branch_that_turns_is_named() -> None:
     pressures = np.array([[1.5, 0.0, 0.0]]) * BAR
     contact = ContactSettings(closure="rigid")
