@@ -37,7 +37,7 @@ class Audit:
 
     @property
     def attributes(self) -> dict[str, float | int]:
-        """What the result file says of it, the distance in [mm]; nothing where nothing was audited."""
+        """What the result file says of it by name, numbers [1] and [mm]; nothing where nothing was audited."""
         return {"audited": self.audited, "audit_largest_mm": self.largest / MILLIMETRE} if self.audited else {}
 
 
