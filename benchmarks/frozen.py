@@ -38,7 +38,7 @@ POSES = 200  # of a sweep, that are kept
 CLOSE = 1e-9
 LEFT_OUT = {
     *("solve_time_s", "seconds", "iterations", "evaluations", "intervals", "residual", "certificate"),
-    *("discretisation_error", "engine", "ipopt_status", "ipopt_iterations", "softnlp", "versions"),
+    *("discretisation_error", "engine", "ipopt_status", "ipopt_iterations", "ipopt_multipliers", "softnlp", "versions"),
     *("residual_by_equation", "time_s", "optimality", "kkt", "left_by_weights"),
 }
 
@@ -78,8 +78,8 @@ def leaves(value: Any, key: str = "", path: str = "") -> Iterator[tuple[str, str
         yield path, key, re.sub(r"[-+]?\d[\d.e+-]*", "#", value) if isinstance(value, str) else value
 
 
-def differences(old: Any, new: Any) -> list[str]:
-    """Return what differs between two documents of one scenario, a line each."""
+def differences(old: Any, new: Any, close: float) -> list[str]:
+    """Return what differs between two documents of one scenario, a line each. close : of numbers that agree."""
     study = old.get("document", {}).get("study") if isinstance(old.get("document"), dict) else None
     if study == "design":
         return _of_designs(old["document"], new["document"])
@@ -93,7 +93,7 @@ def differences(old: Any, new: Any) -> list[str]:
     for path, (key, a) in before.items():
         b = after.get(path, (key, a))[1]
         if isinstance(a, int | float) and isinstance(b, int | float) and not isinstance(a, bool):
-            allowed = max(CLOSE * max(abs(a), largest.get(key, 0.0)), errors.get(path, 0.0))
+            allowed = max(close * max(abs(a), largest.get(key, 0.0)), errors.get(path, 0.0))
             if not (abs(a - b) <= allowed or (math.isnan(a) and math.isnan(b))):
                 found.append(f"{path}: {a!r} -> {b!r}")
         elif a != b:
@@ -126,6 +126,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("file", type=Path, help="of the numbers, .json.gz")
     parser.add_argument("--write", action="store_true", help="write it instead of comparing with it")
+    parser.add_argument("--close", type=float, default=CLOSE, help="of numbers that agree, where the grid decides")
     parser.add_argument("--only", default="", help="scenarios whose path contains this")
     asked = parser.parse_args()
     kept = {} if asked.write else json.loads(gzip.decompress(asked.file.read_bytes()))
@@ -136,7 +137,7 @@ def main() -> int:
             continue
         began = time.process_time()
         found[name] = json.loads(json.dumps(numbers(path)))
-        lines = differences(kept[name], found[name]) if name in kept else []
+        lines = differences(kept[name], found[name], asked.close) if name in kept else []
         bad += bool(lines)
         print(f"{name}: {time.process_time() - began:.1f} s, {len(lines)} differences", flush=True)
         for line in lines[:5]:
