@@ -1,4 +1,4 @@
-"""Rules of manufacture for many robots at once; `softnlp.robot.check` words what the first of them breaks."""
+"""Rules of manufacture for many robots at once; `softnlp.model.robot.check` words what the first of them breaks."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def check_many(robot: Robot, varied: Mapping[str, Array], *, allow: Collection[s
     Parameters
     ----------
     varied : by `Robot` field, (robots,) SI; the other dimensions are those of `robot`.
-    allow, minimum_wall : as in `softnlp.robot.check`.
+    allow, minimum_wall : as in `softnlp.model.robot.check`.
 
     Raises
     ------
