@@ -157,7 +157,7 @@ def test_dimensions_constants_and_loads_may_vary_too() -> None:
 @pytest.mark.parametrize(
     ("silicone", "law"), [("Ecoflex 00-10", "yeoh"), ("Ecoflex 00-50", "ogden"), ("Dragon Skin 10", "mooney-rivlin")]
 )
-@pytest.mark.parametrize("shared", [True, False])
+@pytest.mark.parametrize("shared", [pytest.param(True, marks=pytest.mark.thorough), False])
 def test_stretches_are_those_of_the_branch(silicone: str, law: str, shared: bool) -> None:
     """Where the batch is certain it is right, and it is certain almost everywhere."""
     model = Model(robot("D25L60"), material(silicone, law))
@@ -226,7 +226,7 @@ def blocked_rows(closure: str, pressures: np.ndarray, loads: Loads, offset: floa
 @pytest.mark.parametrize(
     ("closure", "loads", "offset"),
     [
-        ("free", Loads(), 0.0),
+        pytest.param("free", Loads(), 0.0, marks=pytest.mark.thorough),
         pytest.param(
             *("compliant", Loads(gravity=(0.0, 0.0, -9.80665), tip_force=(0.0, 0.0, -0.02)), 0.0),
             marks=pytest.mark.thorough,
