@@ -18,6 +18,7 @@ from softnlp.model.quantities import Model, with_symbols
 from softnlp.model.rod import Loads
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.kept import blocked_solver, pose_solver
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step, stable_flag
@@ -85,9 +86,9 @@ class ChunkSolver:
         model, pressure, loads = self._pose(column)
         plan = self.plan
         if plan.contact is None:
-            self._problem = self._problem or PoseSolver(plan.model, plan.numerics)
+            self._problem = self._problem or pose_solver(plan.model, plan.numerics)
             return self._problem.with_model(model).solve(pressure, loads, near)
-        self._blocked_problem = self._blocked_problem or BlockedSolver(plan.model, plan.numerics, plan.contact)
+        self._blocked_problem = self._blocked_problem or blocked_solver(plan.model, plan.numerics, plan.contact)
         # from zero pressure: the neighbours in a chunk are not on the way to each other
         return self._blocked_problem.with_model(model).solve(pressure, loads, self._wall)
 
