@@ -58,7 +58,8 @@ def follow(
     `same_branch(t, solution)` may refuse a solution that the distance does not tell from the branch.
     """
     tolerance = 10 * engine.tolerance
-    current = engine.solve(path(0.0), start)
+    left = {} if most_iterations is None else {"most_steps": max(most_iterations, 1)}
+    current = engine.solve(path(0.0), start, **left)
     iterations = current.iterations
     if not current.holds(tolerance):
         return Followed(current, 0.0, iterations)
@@ -67,6 +68,8 @@ def follow(
     for _ in range(most_solves):
         if most_iterations is not None and iterations >= most_iterations:
             break
+        if most_iterations is not None:
+            left["most_steps"] = most_iterations - iterations
         target = min(1.0, done + step)
         guess = current.x
         predicted = predict is not None or previous is not None
@@ -74,7 +77,7 @@ def follow(
             guess = predict(current.x, path(target))
         elif previous is not None:
             guess = guess + (guess - previous[1]) * ((target - done) / (done - previous[0]))
-        trial = engine.solve(path(target), guess)
+        trial = engine.solve(path(target), guess, **left)
         iterations += max(trial.iterations, 1)
         found = trial.holds(tolerance) and distance(trial.x - guess) <= largest_jump
         if found and predicted and same_way is not None:

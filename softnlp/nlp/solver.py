@@ -199,12 +199,15 @@ class Engine:
             options["hess_lag"] = ca.Function("zero_hessian", symbols, [ca.MX(n, n)])
         return ca.nlpsol("solver", "ipopt", dict(nlp), options)
 
-    def solve(self, p: Array, x_start: Array) -> Solution:
-        """Solve at fixed values p from a first guess; judge the result by the residual, evaluated again."""
+    def solve(self, p: Array, x_start: Array, most_steps: int = _NEWTON_STEPS) -> Solution:
+        """Solve at fixed values p from a first guess; judge the result by the residual, evaluated again.
+
+        most_steps : of Newton's method, where it is used; never more than are worth following.
+        """
         x_start = np.asarray(x_start, dtype=float)
         spent = 0
         if self.linear is not None and not self.ipopt_only:
-            quick = self._newton(self.linear, p, x_start)
+            quick = self._newton(self.linear, p, x_start, min(most_steps, _NEWTON_STEPS))
             if self.newton_only or quick.holds(self.tolerance * _SLACK):
                 return quick
             if x_start.size > _LARGEST_FALLBACK:
@@ -223,7 +226,7 @@ class Engine:
         found = self._ipopt(solution.p, solution.x)
         return replace(found, iterations=solution.iterations, kkt=found.kkt or solution.kkt)
 
-    def _newton(self, linear: LinearSolver, p: Array, x_start: Array) -> Solution:
+    def _newton(self, linear: LinearSolver, p: Array, x_start: Array, most: int) -> Solution:
         """Take full Newton steps while they help."""
         problem = self.problem
         x, best, worst_allowed = x_start, np.inf, _DIVERGED
@@ -232,7 +235,7 @@ class Engine:
             size = _size(g)
             if not size < _DIVERGED:
                 return Solution(x, p, size, 0, "the first guess is out of all proportion")
-            for k in range(_NEWTON_STEPS):
+            for k in range(most):
                 if size <= self.tolerance:
                     return Solution(x, p, size, k, "Newton converged")
                 try:
@@ -246,7 +249,7 @@ class Engine:
                 if new_size >= best and best < self.tolerance * _SLACK:
                     return Solution(x, p, size, k, "Newton converged to round-off")
                 x, size, best = trial, new_size, min(best, new_size)
-        return Solution(x, p, size, _NEWTON_STEPS, "Newton reached its iteration limit")
+        return Solution(x, p, size, most, "Newton reached its iteration limit")
 
     def _log(self) -> AbstractContextManager[Any]:
         """Send IPOPT's log, where it is asked for, to standard error: standard output is for results."""

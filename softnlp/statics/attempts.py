@@ -24,14 +24,16 @@ Values = Mapping[str, Any]
 LOADS = ("tip_force", "tip_moment", "gravity")
 _PRESSURE_PARTS = (0.0, 0.5, 0.25, 0.75)
 _ROUNDING = 1e-12  # of the length or of a load
+_MOST_STEPS = 12  # of one try of Newton's method
 _REFERENCE = 150  # what a try of IPOPT costs, in iterations of Newton's method
 
 
 class Work:
     """What the attempts at one pose may still cost, over all its grids; in intervals of one iteration (see `Grid`)."""
 
-    def __init__(self, most: float) -> None:
+    def __init__(self, most: float, kept_to_show: float = 0.0) -> None:
         self.left = most
+        self._kept_to_show = kept_to_show
 
     @property
     def used_up(self) -> bool:
@@ -42,9 +44,13 @@ class Work:
         """Return how many iterations on a grid that is."""
         return max(int(self.left / grid.iteration_cost), 0)
 
+    def newton_steps(self, grid: Grid) -> int:
+        """Return how many steps one try of Newton's method may take, at least one."""
+        return int(min(max((self.left + self._kept_to_show) / grid.iteration_cost, 1), _MOST_STEPS))
+
     def spend(self, grid: Grid, iterations: int) -> None:
-        """Take off iterations on a grid; every attempt costs at least one."""
-        self.left -= max(iterations, 1) * grid.iteration_cost
+        """Take off iterations on a grid, and one more for the step or the residual that told that an attempt ended."""
+        self.left -= (iterations + 1) * grid.iteration_cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +113,9 @@ def from_near(goal: Goal, work: Work) -> Iterator[Attempt]:
     if near is None:
         return
     p = grid.problem.pack(goal.values)
-    yield Attempt(grid.engine.solve(p, near.moved))
+    yield Attempt(grid.engine.solve(p, near.moved, work.newton_steps(grid)))
     if goal.is_loaded and np.any(near.p != p):
-        yield Attempt(grid.engine.solve(p, near.x))
+        yield Attempt(grid.engine.solve(p, near.x, work.newton_steps(grid)))
 
 
 def attempts(goal: Goal, work: Work) -> Iterator[Attempt]:
@@ -120,7 +126,7 @@ def attempts(goal: Goal, work: Work) -> Iterator[Attempt]:
     if near is not None and goal.is_loaded and np.any(near.p != p):
         yield _along_from_near(grid, near, p, work)
     arc = goal.arc(values)
-    yield Attempt(grid.engine.solve(p, arc))
+    yield Attempt(grid.engine.solve(p, arc, work.newton_steps(grid)))
     if not goal.is_loaded:
         return  # the arc is the answer; a grid that does not show it is too coarse
     no_loads = {name: np.zeros(3) for name in LOADS}

@@ -36,6 +36,7 @@ Array = NDArray[np.float64]
 TOUCHING = 1e-9  # of the length: a free contact point nearer to the wall than this touches it
 _NEAR_FOLD = 0.2  # of the largest in-plane determinant on the way: below it a branch that ends has turned
 _LARGEST_JUMP = 0.3
+_FINEST_FIRST = 55  # intervals of a first grid, however far the free shape curls: the wall keeps the rod from that
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +149,8 @@ class BlockedSolver:
         """Follow the branch to a situation and refine the grid until its accuracy is met."""
         plane = self.plane(situation)
         pressed = np.array([float(situation.pressure[k] > 0) for k in self.model.robot.set_of_chamber])
-        first = self.numerics.intervals or self.poses.first_intervals(free.column, free.stretch)
+        first = self.poses.first_intervals(free.column, free.stretch)
+        first = self.numerics.intervals or (min(first, _FINEST_FIRST) if situation.wall is not None else first)
         intervals = near.grid.intervals if near else first
         spent = 0
         found: Blocked | _Ended | None = None
@@ -295,8 +297,7 @@ class BlockedSolver:
         if near is not None:
             x = self._transferred(near, grid)
         else:
-            first = begin.towards(end, t_0)
-            x = self._free_guess(grid, first, shapes)
+            x = self._free_guess(grid, begin.towards(end, t_0), shapes)
         trace: list[tuple[float, tuple[float, float]]] = []
 
         def same_branch(u: float, solution: Solution) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from copy import copy
@@ -143,7 +144,7 @@ class PoseSolver:
         loaded = any(np.any(values[name]) for name in LOADS)
         given = self.numerics.intervals
         first = given or self.first_intervals(column, branch.stretch, None if loaded else target)
-        work = Work(_MOST_WORK)
+        work = Work(_MOST_WORK, _KEPT_TO_SHOW if given is None else math.inf)
         found, iterations, how_far = self._searched(values, branch, warm, work, first, loaded)
         most = self.most_intervals
         while found is not None:
