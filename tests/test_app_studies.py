@@ -22,13 +22,24 @@ SCENARIOS = Path(__file__).parents[1] / "scenarios"
 
 def run(tab: Watched, marker: str) -> str:
     """Press a study's button, wait until it has ended, and return what it says."""
+    # On a busy machine the run begins long after it was asked for: what the last one said is not what this one says.
+    tab.page.evaluate(
+        """name => {
+          window.began = false;
+          const watch = new MutationObserver(() => { window.began = true; });
+          for (const part of ['message', 'stop'])
+            watch.observe(document.querySelector(`[data-testid='${name}.${part}']`),
+                          {subtree: true, childList: true, characterData: true, attributes: true});
+        }""",
+        marker,
+    )
     tab.press(f"{marker}.run")
+    tab.page.wait_for_function("window.began", timeout=600_000)
     return ended(tab, marker)
 
 
 def ended(tab: Watched, marker: str) -> str:
     """Wait until a study has ended, and return what it says."""
-    tab.page.wait_for_timeout(600)
     tab.page.wait_for_function(
         f"""() => {{
           const part = name => document.querySelector(`[data-testid='{marker}.${{name}}']`);
