@@ -57,17 +57,15 @@ _NAMES = {
     "workspace.run": {"run_sweep": "scenario.run_workspace"},
 }
 
+_NEW = {f"{before}.{m}".lstrip("."): f"{now}.{m}" for before, now, modules in _MOVED for m in modules.split()}
+_NEW |= _RENAMED | _FOLDERS
+
 
 def new_name(old: str) -> str | None:
     """Return the module of today for one of version 0.1, both without the package's own name; None for any other."""
-    if old in _RENAMED:
-        return _RENAMED[old]
+    if old in _NEW:
+        return _NEW[old]
     package, _, module = old.rpartition(".")
-    for before, now, modules in _MOVED:
-        if package == before and module in modules.split():
-            return f"{now}.{module}"
-    if old in _FOLDERS:
-        return _FOLDERS[old]
     return f"{_FOLDERS[package]}.{module}" if package in _FOLDERS else None
 
 

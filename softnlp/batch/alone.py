@@ -42,10 +42,6 @@ class Alone:
         # from zero pressure: the neighbours in a chunk are not on the way to each other
         return self._blocked.with_model(model).solve(pressure, loads, self.wall)
 
-    def length(self, column: Array) -> float:
-        """Return the length L_0 of a pose's robot [m]."""
-        return float(self._pose(column)[0].robot.length)
-
     def _pose(self, column: Array) -> tuple[Model, Array, Loads]:
         """Return the model, the pressures and the loads of one pose from every quantity."""
         values: dict[str, Any] = {}

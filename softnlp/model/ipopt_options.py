@@ -37,6 +37,10 @@ class Option:
             return False
         return self.least <= value <= self.most and isfinite(value)
 
+    def refusal(self, value: Any) -> str:
+        """Say what it takes in place of a value."""
+        return f"expected {self.expected}, got {shown(value)}"
+
 
 _YES_NO = ("yes", "no")
 IPOPT_OPTIONS: Mapping[str, Option] = {
@@ -86,5 +90,5 @@ def checked_options(given: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
             near = did_you_mean(name, IPOPT_OPTIONS)
             raise InputError(f"this option of IPOPT cannot be set here: {why}{near}", key=name)
         if not IPOPT_OPTIONS[name].takes(value):
-            raise InputError(f"expected {IPOPT_OPTIONS[name].expected}, got {shown(value)}", key=name)
+            raise InputError(IPOPT_OPTIONS[name].refusal(value), key=name)
     return tuple(sorted(given.items()))

@@ -9,6 +9,7 @@ from typing import Any, Literal
 from softnlp.base.errors import InputError
 from softnlp.model.ipopt_options import checked_options
 
+EngineName = Literal["auto", "ipopt", "newton"]
 Transcribing = Literal["multiple-shooting", "collocation"]
 
 
@@ -37,7 +38,7 @@ class Numerics:
     intervals: int | None = None
     accuracy: float = 1e-6
     tolerance: float = 1e-8
-    engine: Literal["auto", "ipopt", "newton"] = "auto"
+    engine: EngineName = "auto"
     ipopt: Mapping[str, Any] | tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self) -> None:

@@ -81,9 +81,8 @@ def _step(run: Run, step: Step) -> dict[str, Any]:
         if table["closure"] == "weighted":
             table["weighted_residual"] = _lines(left_by_weights(step))
     table["engine"] = step.engine
-    table["ipopt_status"] = None if step.ipopt is None else step.ipopt.status
-    table["ipopt_iterations"] = None if step.ipopt is None else step.ipopt.iterations
-    table["ipopt_multipliers"] = None if step.ipopt is None else _plain(step.ipopt.multipliers)
+    for name in ("status", "iterations", "multipliers"):
+        table[f"ipopt_{name}"] = None if step.ipopt is None else _plain(getattr(step.ipopt, name))
     table["residual"] = _plain(step.residual)
     table["certificate"] = _lines(step.certificate)
     table["warnings"] = list(step.warnings)

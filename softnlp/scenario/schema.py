@@ -19,7 +19,7 @@ from softnlp.base.reading import BACKSLASH_HINT, as_typed, choices, shown
 from softnlp.base.units import MILLIMETRE
 from softnlp.model.gravity import DIRECTIONS, unknown_direction
 from softnlp.model.ipopt_options import IPOPT_OPTIONS
-from softnlp.model.numerics import Numerics
+from softnlp.model.numerics import EngineName, Numerics, Transcribing
 from softnlp.model.robot import MINIMUM_WALL
 
 MOST_INTERVALS = 2000
@@ -213,7 +213,7 @@ class ContactTable(Table):
 def _ipopt_option(name: str, value: Any) -> Any:
     """Return the value of an option of IPOPT that takes it."""
     if not IPOPT_OPTIONS[name].takes(value):
-        raise wrong(f"expected {IPOPT_OPTIONS[name].expected}, got {shown(value)}")
+        raise wrong(IPOPT_OPTIONS[name].refusal(value))
     return value
 
 
@@ -226,11 +226,11 @@ IpoptTable = create_model("IpoptTable", __base__=Table, __doc__="[solver.ipopt].
 class SolverTable(Table):
     """[solver]."""
 
-    engine: Literal["auto", "ipopt", "newton"] = Numerics.engine
+    engine: EngineName = Numerics.engine
     ipopt: IpoptTable = IpoptTable()  # type: ignore[valid-type]
     intervals: Annotated[int | None, PlainValidator(_intervals)] = Numerics.intervals
     accuracy: Positive = Numerics.accuracy
-    transcription: Literal["multiple-shooting", "collocation"] = Numerics.transcription
+    transcription: Transcribing = Numerics.transcription
     tolerance: Positive = Numerics.tolerance
 
 

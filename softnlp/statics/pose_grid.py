@@ -42,6 +42,7 @@ class Grid:
     engine: Engine
     stepper: Engine
     reference: Engine
+    transcription: str
     order: int
     iteration_cost: float
 
@@ -87,6 +88,7 @@ def compiled_grid(equations: RodEquations, numerics: Numerics, intervals: int) -
         engine=Engine(problem, **chosen),
         stepper=Engine(problem, **chosen, tolerance=1e-7),
         reference=Engine(problem, options=numerics.ipopt),
+        transcription=numerics.transcription,
         order=method.order,
         iteration_cost=iteration_cost(intervals, numerics.transcription),
     )

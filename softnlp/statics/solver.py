@@ -148,7 +148,7 @@ class PoseSolver:
         found, iterations, how_far = self._searched(values, branch, warm, work, first, loaded)
         most = self.most_intervals
         while found is not None:
-            own = self.grid(found.intervals) is found.grid
+            own = found.grid.transcription == self.numerics.transcription
             chosen = own and found.intervals >= (given or 0)
             wanted = self.next_intervals(found.refinement_error, found.intervals, target) if chosen else first
             hopeless = given is not None and not found.refinement_error <= _HOPELESS

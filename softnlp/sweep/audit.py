@@ -10,6 +10,7 @@ from softnlp.base.status import Status
 from softnlp.base.units import MILLIMETRE
 from softnlp.batch.alone import Alone
 from softnlp.batch.plan import Plan
+from softnlp.batch.pose_lane import entries
 from softnlp.batch.poses import STATUSES, Lane
 from softnlp.sweep.journal import Journal
 
@@ -50,15 +51,14 @@ def audit(plan: Plan, journal: Journal) -> Audit:
     audited, largest, disputed = 0, 0.0, []
     for block in journal.blocks():
         rows = block.rows[(block.rows["lane"] == Lane.BATCH) & (block.rows["status"] == solved)]
-        count = -(-len(rows) // EVERY)
-        for row in rows[:: EVERY if count else 1][:count]:
+        for row in rows[::EVERY]:
             solver = solver or Alone(plan, plan.numerics)
             number = int(row["pose"])
             column = plan.full_values(np.array([number]))[:, 0]
             step, _ = solver.solve(column)
             audited += 1
             away = np.inf if step.pose is None else float(np.linalg.norm(step.pose.tip_position - row["tip_position"]))
-            if not away <= plan.numerics.accuracy * solver.length(column):
+            if not away <= plan.numerics.accuracy * float(column[entries(plan, "robot.length")][0]):
                 disputed.append(number + 1)
             largest = max(largest, away)
     return Audit(audited, largest, tuple(disputed))
