@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import subprocess
 import sys
+from types import ModuleType
 
 import pytest
 
@@ -29,7 +30,8 @@ def test_an_old_name_is_today_s_module(old: str) -> None:
     with pytest.warns(DeprecationWarning, match=f"softnlp.{old} is now softnlp.{now}; the old name goes with"):
         found = importlib.import_module(f"softnlp.{old}")
     today = importlib.import_module(f"softnlp.{now}")
-    assert found is today or {name for name in vars(today) if not name.startswith("__")} <= set(vars(found))
+    public = {name for name, value in vars(today).items() if not (name[:2] == "__" or isinstance(value, ModuleType))}
+    assert found is today or public <= set(vars(found))
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
@@ -44,6 +46,19 @@ def test_names_that_left_their_module_are_found_where_they_were() -> None:
     assert quantity("x", "1", 2.0).nominal == 2.0
     assert (Model.__module__, Quantity.__module__) == ("softnlp.model.quantities", "softnlp.base.quantity")
     assert load_scenario is softnlp.load_scenario
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_an_old_module_takes_the_place_of_no_module_of_today() -> None:
+    import softnlp.sweep.run
+
+    today = softnlp.sweep.run
+    for old in ("workspace", "workspace.run", "workspace.read"):
+        sys.modules.pop(f"softnlp.{old}", None)
+    from softnlp.workspace import run
+
+    assert hasattr(run, "run_sweep")
+    assert softnlp.sweep.run is sys.modules["softnlp.sweep.run"] is today
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")

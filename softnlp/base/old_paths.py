@@ -77,7 +77,7 @@ class _OldPaths(MetaPathFinder, Loader):
         package, _, old = fullname.partition(".")
         if package != _PACKAGE or new_name(old) is None:
             return None
-        return ModuleSpec(fullname, self)
+        return ModuleSpec(fullname, self, is_package=old in _FOLDERS)
 
     def exec_module(self, module: ModuleType) -> None:
         """Put today's module, or what offers its names and those that left it, in the place of an old one."""
@@ -87,9 +87,11 @@ class _OldPaths(MetaPathFinder, Loader):
             f"{module.__name__} is now {now}; the old name goes with version 0.3", DeprecationWarning, stacklevel=2
         )
         found = import_module(now)
-        if old in _NAMES:
-            module.__dict__.update({key: value for key, value in vars(found).items() if not key.startswith("__")})
-            for name, home in _NAMES[old].items():
+        if old in _FOLDERS or old in _NAMES:
+            # A module of its own: importing a module sets it as an attribute of the package that it is found in.
+            offered = {key: value for key, value in vars(found).items() if not isinstance(value, ModuleType)}
+            module.__dict__.update({key: value for key, value in offered.items() if not key.startswith("__")})
+            for name, home in _NAMES.get(old, {}).items():
                 setattr(module, name, getattr(import_module(f"{_PACKAGE}.{home}"), name))
         else:
             sys.modules[module.__name__] = found
