@@ -27,7 +27,8 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.nlp.continuation import Path, follow, straight_path
-from softnlp.nlp.solver import Engine, Solution, SparseSolver, violation
+from softnlp.nlp.linear import SparseSolver
+from softnlp.nlp.solver import Engine, Solution, violation
 from softnlp.nlp.transcription import RK4, rk_step
 from softnlp.statics.attempts import LOADS
 from softnlp.statics.branch import stretch_on_branch

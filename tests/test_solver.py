@@ -26,7 +26,8 @@ from softnlp.model.robot import ROBOTS, Robot
 from softnlp.model.rod import Loads
 from softnlp.nlp import solver
 from softnlp.nlp.continuation import follow, straight_path
-from softnlp.nlp.solver import Engine, Solution, SparseSolver, certificate, discretisation_correction, violation
+from softnlp.nlp.linear import SparseSolver
+from softnlp.nlp.solver import Engine, Solution, certificate, discretisation_correction, violation
 from softnlp.nlp.transcription import Collocation, MultipleShooting, Transcription
 from softnlp.statics import compiled
 from softnlp.statics import solver as statics

@@ -26,6 +26,7 @@ class Case(Protocol):
 
     symbols : its unknowns. residuals : as many equations. fine_residuals : the same at half the step. equations : names
     of the rows. outputs : by name, SI. constants : what the equations take of the quantities, for warm starts.
+    column : the values that the case takes of a problem, in its own order, SI.
     length_unit, force_unit : of the scaled unknowns [m, N].
     """
 
@@ -43,6 +44,8 @@ class Case(Protocol):
     def outputs(self) -> Mapping[str, ca.MX]: ...  # noqa: D102
     @property
     def constants(self) -> ca.MX: ...  # noqa: D102
+    @property
+    def column(self) -> ca.MX: ...  # noqa: D102
     @property
     def length_unit(self) -> ca.MX: ...  # noqa: D102
     @property

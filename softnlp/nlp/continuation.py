@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.nlp.linear import LinearSolver
 from softnlp.nlp.problem import CompiledProblem
-from softnlp.nlp.solver import Engine, LinearSolver, Solution
+from softnlp.nlp.solver import Engine, Solution
 
 Array = NDArray[np.float64]
 Path = Callable[[float], Array]

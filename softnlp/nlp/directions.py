@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.nlp.linear import LinearSolver, ManySidedSolver, SparseSolver
 from softnlp.nlp.problem import CompiledProblem
-from softnlp.nlp.solver import LinearSolver, ManySidedSolver, SparseSolver
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from softnlp.base.errors import IllPosedError, nearest
 from softnlp.base.quantity import Quantity
+from softnlp.nlp.linear import LinearSolver, ManySidedSolver, SparseSolver
 from softnlp.nlp.problem import CompiledProblem
-from softnlp.nlp.solver import LinearSolver, ManySidedSolver, SparseSolver
 
 Array = NDArray[np.float64]
 

@@ -87,6 +87,7 @@ class CompiledProblem:
     si_scales: ca.Function
     outputs: ca.Function
     case_constants: ca.Function
+    case_columns: ca.Function
     units: ca.Function
     lower_x: Array
     upper_x: Array
@@ -242,6 +243,7 @@ def compile_problem(
         si_scales=function("si_scales", [ca.vertcat(*(e.si_scale for e in equations))]),
         outputs=_outputs(function, cases),
         case_constants=function("constants", [ca.vertcat(*(case.constants for case in cases))]),
+        case_columns=function("columns", [case.column for case in cases]),
         units=function("units", [ca.vertcat(*(ca.vertcat(case.length_unit, case.force_unit) for case in cases))]),
         lower_x=np.concatenate([*(np.full(q.size, q.lower / q.scale) for q in freed), np.full(states, -np.inf)]),
         upper_x=np.concatenate([*(np.full(q.size, q.upper / q.scale) for q in freed), np.full(states, np.inf)]),

@@ -8,12 +8,13 @@ from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.nlp.linear import LinearSolver
 from softnlp.nlp.optimality import OPTIMAL, kkt_error
 from softnlp.nlp.problem import CompiledProblem
 
@@ -93,49 +94,6 @@ class Solution:
     def optimal(self) -> bool:
         """Whether the point is feasible and the first-order conditions hold, both within `OPTIMAL`."""
         return self.holds(OPTIMAL) and self.kkt <= OPTIMAL
-
-
-class LinearSolver(Protocol):
-    """Solves J(x, p) dx = -g where a problem's structure allows better than a sparse factorisation."""
-
-    def solve(self, x: Array, p: Array, g: Array) -> Array:
-        """Return dx; raises `numpy.linalg.LinAlgError` where J is singular."""
-        ...
-
-
-@runtime_checkable
-class ManySidedSolver(Protocol):
-    """A linear solver that takes many right sides for the cost of one factorisation or sweep."""
-
-    def solve_many(self, x: Array, p: Array, G: Array) -> Array:
-        """Return the columns dx for as many right sides G (n, r). Raises as `LinearSolver.solve`."""
-        ...
-
-
-class SparseSolver:
-    """Solves J dx = -g of any square problem by sparse LU factorisation."""
-
-    def __init__(self, problem: CompiledProblem) -> None:
-        self._problem = problem
-
-    def solve(self, x: Array, p: Array, g: Array) -> Array:
-        """Return dx. Raises `numpy.linalg.LinAlgError` where J is singular or not finite."""
-        return self.solve_many(x, p, g)
-
-    def solve_many(self, x: Array, p: Array, G: Array) -> Array:
-        """Return the columns dx for as many right sides G (n, r), of one factorisation. Raises as `solve`."""
-        from scipy.sparse import csc_matrix
-        from scipy.sparse.linalg import splu
-
-        J = self._problem.jacobian(x, p)
-        entries = np.asarray(J.nonzeros())
-        if not np.all(np.isfinite(entries)):
-            raise np.linalg.LinAlgError("the Jacobian is not finite")
-        try:
-            factors = splu(csc_matrix((entries, J.row(), J.colind()), shape=J.shape))
-        except RuntimeError as error:
-            raise np.linalg.LinAlgError(str(error)) from error
-        return np.asarray(factors.solve(-np.asarray(G, dtype=float)))
 
 
 class Engine:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from softnlp.model.contact_settings import ClosureWeights
 from softnlp.model.numerics import Numerics
+from softnlp.nlp.linear import LinearSolver, SparseSolver
 from softnlp.nlp.problem import CompiledProblem, compile_problem
-from softnlp.nlp.solver import Engine, LinearSolver, Solution, SparseSolver, discretisation_correction
+from softnlp.nlp.solver import Engine, Solution, discretisation_correction
 from softnlp.nlp.transcription import MultipleShooting, method_named
 from softnlp.statics.compiled import RodEquations
 from softnlp.statics.condensed import CondensedSolver, plane_directions

@@ -21,8 +21,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.nlp.linear import BorderedSolver, LinearSolver, ManySidedSolver, SparseSolver
+from softnlp.nlp.problem import CompiledProblem
 from softnlp.nlp.transcription import MultipleShooting, Tableau, rk_step
-from softnlp.statics.loadcase import RodFunctions
+from softnlp.statics.loadcase import LoadCase, RodFunctions
 
 Array = NDArray[np.float64]
 
@@ -131,6 +133,33 @@ def plane_directions(normal: Array, size: int) -> tuple[Array, Array]:
     inside[6:, 3:] = np.eye(size - 6)
     outside[:3, 0], outside[3:6, 1], outside[3:6, 2] = normal, along, up
     return inside, outside
+
+
+def linear_solver(problem: CompiledProblem) -> LinearSolver:
+    """Return what solves J dx = -g of a square problem: its cases condensed where all are by multiple shooting."""
+    solvers: list[ManySidedSolver] = []
+    for case in problem.cases:
+        if not isinstance(case, LoadCase) or not (case.method is None or isinstance(case.method, MultipleShooting)):
+            return SparseSolver(problem)
+        shooting = case.method
+        solvers.append(CondensedSolver(case.functions, shooting) if shooting else StretchSolver(case.functions))
+    return BorderedSolver(problem, solvers)
+
+
+class StretchSolver:
+    """Solves the stretch balance of a shape without loads, whose stretch is all that is unknown."""
+
+    def __init__(self, functions: RodFunctions) -> None:
+        column, stretch = ca.SX.sym("p", functions.section.size1_in(0)), ca.SX.sym("stretch")
+        _, balance, _ = functions.section(column, stretch)
+        self._slope = ca.Function("slope", [stretch, column], [ca.jacobian(balance, stretch)])
+
+    def solve_many(self, x: Array, p: Array, G: Array) -> Array:
+        """Return the columns dx (1, r). Raises `numpy.linalg.LinAlgError` at the end of the branch."""
+        slope = float(self._slope(x, p))
+        if not (np.isfinite(slope) and slope):
+            raise np.linalg.LinAlgError("the slope of the stretch balance is zero or not finite")
+        return -np.asarray(G) / slope
 
 
 @lru_cache(maxsize=16)

@@ -39,10 +39,12 @@ def unloaded_case(name: str, functions: RodFunctions, given: Mapping[str, Quanti
     none = ca.MX(0, 1)
     return LoadCase(
         name=name,
+        method=None,
         transcribed=Transcribed(none, np.zeros(0), np.zeros(0, np.intp), STATE_SIZE, none, (), none, integral),
         functions=functions,
         symbols=(stretch,),
         constants=constants,
+        column=column,
         residuals=balance,
         fine_residuals=balance,
         equations=(Equation("stretch balance", np.array([0]), "N", F_0),),

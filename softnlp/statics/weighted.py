@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from softnlp.model.contact_settings import ClosureWeights
 from softnlp.model.rod import STATE_SIZE
+from softnlp.nlp.linear import LinearSolver
 from softnlp.nlp.problem import CompiledProblem
-from softnlp.nlp.solver import Engine, LinearSolver, Solution
+from softnlp.nlp.solver import Engine, Solution
 from softnlp.statics.condensed import CondensedSolver, plane_directions
 from softnlp.statics.loadcase import LoadCase, RodFunctions
 

@@ -20,10 +20,11 @@ from softnlp.model.quantities import Model
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
 from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
-from softnlp.nlp.solver import Engine, SparseSolver
+from softnlp.nlp.solver import Engine
 from softnlp.nlp.transcription import method_named
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.condensed import linear_solver
 from softnlp.statics.kept import blocked_solver
 from softnlp.statics.loadcase import LoadCase, load_case
 from softnlp.statics.step import Step
@@ -192,7 +193,7 @@ def joint_engine(solver: BlockedSolver, intervals: int, *, free_pressure: bool) 
     def made() -> Engine:
         problem = joint_problem(solver, intervals, free_pressure=free_pressure)
         by_ipopt = numerics.engine == "ipopt"
-        linear = None if by_ipopt else SparseSolver(problem)
+        linear = None if by_ipopt else linear_solver(problem)
         return Engine(problem, linear=linear, newton_only=numerics.engine == "newton", options=numerics.ipopt)
 
     return solver.equations.kept(key, made)
