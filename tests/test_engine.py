@@ -21,6 +21,7 @@ from softnlp import (
     blocked_force,
     constrained_pose,
     forward,
+    inverse,
     load_scenario,
     material,
     pressure_for_force,
@@ -31,6 +32,7 @@ from softnlp import (
 from softnlp.batch.poses import Lane
 from softnlp.cli import main
 from softnlp.model.ipopt_options import IPOPT_OPTIONS
+from softnlp.nlp import bounded
 from softnlp.nlp.solver import Engine
 from softnlp.sweep import audit as auditing
 from softnlp.sweep.read import load_workspace
@@ -90,6 +92,43 @@ def test_a_pressure_for_a_force_is_the_same(engine: Any) -> None:
 
 
 EXPECTED: dict[str, float] = {}
+
+
+INVERSE: dict[str, dict[str, Any]] = {
+    "position": {"positions": [(0.012, -0.004, 0.072)], "loads": LOADED},
+    "position at a bound": {"positions": [(0.0, 0.018, 0.068)], "bounds": (0.0, BAR)},
+    "direction": {"directions": [(0.3, 0.1, 0.9)]},
+    "out of reach": {"positions": [(0.06, 0.03, 0.09)], "bounds": (0.0, 0.5 * BAR)},
+    "both": {"positions": [(0.012, -0.004, 0.072)], "directions": [(0.3, 0.1, 0.9)]},
+}
+
+
+@pytest.mark.parametrize("target", INVERSE)
+def test_ipopt_closes_the_program_of_a_target_and_searches_with_it(target: str) -> None:
+    steps = [inverse(D25, ECOFLEX, **INVERSE[target], numerics=Numerics(engine=e)).steps[0] for e in ENGINES]
+    for engine, step in zip(ENGINES, steps, strict=True):
+        assert step.status is steps[0].status
+        assert step.engine == engine
+        assert step.pose is not None
+        assert steps[0].pose is not None
+        np.testing.assert_allclose(step.pose.tip_position, steps[0].pose.tip_position, atol=1e-7 * D25.length)
+        np.testing.assert_allclose(step.pressure, steps[0].pressure, atol=1e-6 * BAR)
+        assert (step.ipopt is None) == (engine == "newton")
+    assert steps[1].ipopt is not None
+    assert steps[1].ipopt.status == "Solve_Succeeded"
+    assert steps[1].ipopt.iterations <= 5
+
+
+def test_an_answer_that_ipopt_can_better_is_disputed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A search that stops too early leaves a point that is no minimum of the program."""
+    monkeypatch.setattr(bounded, "_STEPS", 1)
+    far = {"positions": [(0.06, 0.03, 0.09)], "bounds": (0.0, 1.5 * BAR)}
+    found = [inverse(D25, ECOFLEX, **far, numerics=Numerics(engine=e)).steps[0] for e in ENGINES[:2]]  # type: ignore[arg-type]
+    assert found[0].aimed is not None
+    assert found[0].aimed.optimal is False
+    assert found[1].status is Status.DISPUTED
+    assert found[1].pose is None
+    assert "mm by IPOPT (Solve_Succeeded)" in found[1].message
 
 
 @pytest.mark.parametrize("moved", [True, False])

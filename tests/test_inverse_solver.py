@@ -34,6 +34,7 @@ D25, SILICONE = robot("D25L60"), material("Ecoflex 00-50", "mooney-rivlin")
 FOUR = Robot("four", 25e-3, 9e-3, 17e-3, 4.5e-3, 0.5e-3, 60e-3, 4, 1, 0.0)
 LENGTH, HIGHEST = D25.length, 1.5 * BAR
 GRID = Numerics(intervals=2)
+SEARCH = GRID.without_ipopt()  # what is looked at here are the proposals
 LOADED = Loads((0.05, 0.02, 0.0), (0.0, 0.0, 1e-3), (0.0, 0.0, -9.8))
 TALL, SOFT = robot("D10L60"), material("Ecoflex 00-10", "mooney-rivlin")
 STANDING = Loads(gravity=(0.0, 0.0, -9.8))
@@ -46,7 +47,7 @@ def poses_of(body: Robot) -> PoseSolver:
 
 def solver_of(method: str = "newton", loads: Loads | None = None, highest: Any = HIGHEST) -> InverseSolver:
     task = InverseTask((), np.zeros(3), np.broadcast_to(highest, 3).astype(float), float(LENGTH))
-    return InverseSolver(Model(D25, SILICONE), GRID, loads or Loads(), task, method)  # type: ignore[arg-type]
+    return InverseSolver(Model(D25, SILICONE), SEARCH, loads or Loads(), task, method)  # type: ignore[arg-type]
 
 
 @cache

@@ -31,10 +31,15 @@ def closed(engine: Engine, proposed: Solution, numerics: Numerics, tip: slice) -
     """
     if numerics.engine != "auto":
         return proposed
-    found = engine.closed(proposed)
+    found = confirmed(engine, proposed, engine.closed(proposed), numerics, tip)
+    return replace(found, engine_status=proposed.engine_status)
+
+
+def confirmed(engine: Engine, proposed: Solution, found: Solution, numerics: Numerics, tip: slice) -> Solution:
+    """Return what IPOPT found where it confirms a proposed solution. Raises as `closed`."""
     away = float(np.linalg.norm(found.x[tip] - proposed.x[tip]))
     if found.holds(numerics.tolerance) and away <= numerics.accuracy:
-        return replace(found, engine_status=proposed.engine_status)
+        return found
     length = float(np.asarray(engine.problem.units(proposed.x, proposed.p)).ravel()[0]) / MILLIMETRE
     here, there = (", ".join(f"{length * v:.6g}" for v in solution.x[tip]) for solution in (proposed, found))
     said = "" if found.ipopt is None else f" ({found.ipopt.status})"

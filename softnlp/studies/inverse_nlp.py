@@ -1,10 +1,11 @@
 """Inverse kinematics as one nonlinear program: the pressures freed in the rod's own problem, with bounds.
 
-The reference for `softnlp.studies.inverse`: IPOPT with exact second derivatives.
+IPOPT with exact second derivatives closes what `softnlp.studies.inverse_solver` proposes, or searches itself.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,17 +14,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.quantity import quantity
+from softnlp.base.status import Status
 from softnlp.base.units import BAR
+from softnlp.model.numerics import Numerics
 from softnlp.model.rod import Loads
 from softnlp.nlp.bounded import Limits
 from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
 from softnlp.nlp.solver import Engine, Solution
 from softnlp.nlp.transcription import method_named
+from softnlp.statics.closing import DisputedError, confirmed
 from softnlp.statics.loadcase import load_case
+from softnlp.statics.pose_grid import TIP, Solved
 from softnlp.statics.solver import PoseSolver
+from softnlp.statics.step import Step
 from softnlp.studies.aiming import Aim
+from softnlp.studies.tip_map import TipPoint
 
 Array = NDArray[np.float64]
+
+# From a solution: it may lie on a bound, from which IPOPT would move it.
+_FROM_SOLUTION = {"mu_init": 1e-9, "bound_push": 1e-9, "bound_frac": 1e-9}
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,11 +62,21 @@ class InverseProblem:
         return self.engine.solve(self.problem.pack(values), start)
 
 
-def inverse_problem(poses: PoseSolver, intervals: int, aim: Aim, limits: Limits, *, meets: bool) -> InverseProblem:
+def inverse_problem(
+    poses: PoseSolver,
+    intervals: int,
+    aim: Aim,
+    limits: Limits,
+    *,
+    meets: bool,
+    closing: bool = False,
+    options: Sequence[tuple[str, Any]] = (),
+) -> InverseProblem:
     """Compile the problem for targets of the kind of `aim`.
 
-    meets : the target is met, with the smallest sum of squares of the pressures, which takes more sets than the target
-    has conditions. Otherwise the weighed misfit is made smallest.
+    meets : the target is met, which takes as many sets that may move as it has conditions, with the smallest sum of
+    squares of the pressures where there are more. Otherwise the weighed misfit is made smallest. closing : for a start
+    that is a solution. options : of IPOPT.
 
     Raises
     ------
@@ -99,13 +119,71 @@ def inverse_problem(poses: PoseSolver, intervals: int, aim: Aim, limits: Limits,
         constraints.append(
             Constraint("last pressure with an equilibrium", ca.sum1(z), -np.inf, limits.largest_sum, "bar")
         )
-    objective = ca.sumsqr(z) / 2 if meets else ca.sumsqr(ca.vertcat(*misfit)) / 2
+    objective: ca.MX | None = ca.sumsqr(z) / 2 if meets else ca.sumsqr(ca.vertcat(*misfit)) / 2
+    if meets and aim.conditions == moving_sets(limits):
+        objective = None
     problem = compile_problem(
         [*declared.values(), *extra], [case], free=["pressure"], constraints=constraints, objective=objective
     )
-    return InverseProblem(Engine(problem), meets)
+    chosen = {**(_FROM_SOLUTION if closing else {}), **dict(options)}
+    return InverseProblem(Engine(problem, options=chosen), meets)
+
+
+def moving_sets(limits: Limits) -> int:
+    """Return how many sets the bounds let move."""
+    return int(np.sum(limits.upper > limits.lower))
 
 
 def pressure_of(problem: InverseProblem, solution: Solution, limits: Limits) -> Array:
     """Return the pressures (sets,) [Pa] of a solution, within the limits to the last bit: IPOPT relaxes its bounds."""
     return limits.clip(problem.problem.free_values(solution.x)["pressure"] / BAR) * BAR
+
+
+class Programs:
+    """The programs of one task's targets, compiled at first use: IPOPT searches with them, or closes a search.
+
+    numerics : those of the task, whose options IPOPT takes.
+    """
+
+    def __init__(self, poses: PoseSolver, loads: Loads, limits: Limits, numerics: Numerics) -> None:
+        self._poses, self._loads, self._limits, self._numerics = poses, loads, limits, numerics
+        self._kept: dict[tuple[int, bool, bool, bool, bool], InverseProblem] = {}
+
+    def of(self, aim: Aim, intervals: int, *, meets: bool, closing: bool = False) -> InverseProblem:
+        """Return the program of targets of a kind on a grid, see `inverse_problem`."""
+        kind = (intervals, aim.target.position is not None, aim.target.direction is not None, meets, closing)
+        if kind not in self._kept:
+            options = tuple(dict(self._numerics.ipopt).items())
+            made = inverse_problem(
+                self._poses, intervals, aim, self._limits, meets=meets, closing=closing, options=options
+            )
+            self._kept[kind] = made
+        return self._kept[kind]
+
+    def searched(self, aim: Aim, intervals: int, point: TipPoint, *, meets: bool) -> Array | None:
+        """Return the pressures (sets,) [Pa] that IPOPT finds from a tip, None where it finds none."""
+        program = self.of(aim, intervals, meets=meets)
+        solution = program.solve(self._poses, self._loads, aim, point.pressure, point.x)
+        if not solution.holds(self._numerics.tolerance):
+            return None
+        return pressure_of(program, solution, self._limits)
+
+    def closed(self, aim: Aim, solved: Solved, step: Step, *, only_pose: bool, meets: bool) -> Step:
+        """Return the step of an answer with IPOPT's word on the program that searches, or `disputed`.
+
+        only_pose : its pose at its pressures is closed, where the answer is the nearest of those that a body can take:
+        stability and self-intersection are no rows of the program. So is a target that fewer sets meet than it has
+        conditions: its misfit is flat where it is zero.
+        """
+        engine, proposed, moving = solved.grid.reference, solved.solution, moving_sets(self._limits)
+        if only_pose or moving == 0 or (meets and moving < aim.conditions):
+            found = engine.closed(proposed)
+        else:
+            program = self.of(aim, solved.intervals, meets=meets, closing=True)
+            found = program.solve(self._poses, self._loads, aim, step.pressure, proposed.x)
+            found = replace(found, x=found.x[program.problem.free_size :])
+        try:
+            found = confirmed(engine, proposed, found, self._numerics, TIP)
+        except DisputedError as error:
+            return Step(step.pressure, Status.DISPUTED, str(error), iterations=step.iterations, aimed=aim.aimed(None))
+        return replace(step, engine=self._numerics.engine, ipopt=found.ipopt)

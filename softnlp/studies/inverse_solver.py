@@ -30,7 +30,7 @@ from softnlp.statics.pose_grid import Solved
 from softnlp.statics.step import Aimed, Step
 from softnlp.studies.aiming import Aim, Table, aim_of, spread, tabulated
 from softnlp.studies.derivatives import PoseDerivatives
-from softnlp.studies.inverse_nlp import InverseProblem, inverse_problem, pressure_of
+from softnlp.studies.inverse_nlp import Programs, moving_sets
 from softnlp.studies.inverse_task import InverseTask, Target
 from softnlp.studies.tip_map import ArcMap, GridMap, TipMap, TipPoint
 
@@ -79,14 +79,15 @@ class InverseSolver:
     def __init__(
         self, model: Model, numerics: Numerics, loads: Loads, task: InverseTask, method: Literal["newton", "nlp"]
     ) -> None:
-        self.poses = pose_solver(model, numerics)
+        self._numerics = numerics
+        self.poses = pose_solver(model, numerics.without_ipopt() if numerics.engine == "auto" else numerics)
         self.loads = loads
         self.task = task
         self.limits, self.ends = self._limits()
         self._derivatives = PoseDerivatives(self.poses)
-        self._method = method
+        self._method = "nlp" if numerics.engine == "ipopt" else method
         self._maps: dict[int, GridMap] = {}
-        self._nlps: dict[tuple[int, bool, bool, bool], InverseProblem] = {}
+        self._programs = Programs(self.poses, loads, self.limits, numerics)
         self._table: Table | None = None
         self._arcs: Table | None = None
         self._intervals: int | None = None
@@ -128,7 +129,12 @@ class InverseSolver:
             aimed = replace(best.aimed, optimal=left <= OPTIMAL)
             if left > OPTIMAL:
                 warnings.append(not_optimal(left, "the search of pressures"))
-        step = replace(best.step, aimed=aimed, warnings=tuple(warnings), solve_time=time.perf_counter() - began)
+        step = replace(best.step, aimed=aimed, warnings=tuple(warnings))
+        if self._numerics.engine == "auto":
+            step = self._programs.closed(aim, best.solved, step, only_pose=rejected is not None, meets=met)
+        step = replace(step, solve_time=time.perf_counter() - began)
+        if not step.status.has_solution:
+            return step, None
         if not met:
             step = replace(step, status=Status.OUT_OF_REACH, message=self._out_of_reach(aim, best, rejected))
         return step, best
@@ -203,7 +209,7 @@ class InverseSolver:
 
     def _redundant(self, aim: Aim) -> bool:
         """Whether there are more pressures to choose than the target has conditions."""
-        return int(np.sum(self.limits.upper > self.limits.lower)) > aim.conditions
+        return moving_sets(self.limits) > aim.conditions
 
     def _measure(self, aim: Aim, tips: TipMap, *, met: bool = False) -> Map:
         """Return the misfit by pressure on a map."""
@@ -259,23 +265,13 @@ class InverseSolver:
             return None
         met = found.met and self._redundant(aim)
         if self._method == "nlp":
-            return self._by_nlp(aim, tips.intervals, point, meets=met)
+            return self._programs.searched(aim, tips.intervals, point, meets=met)
         start = aim.conditioned(point) if met else aim.measured(point)
         search = least_norm if met else nearest
         end, _, _ = search(
             self._measure(aim, tips, met=met), start, self.limits, found.second, measured_curvature=False
         )
         return end.z * BAR
-
-    def _by_nlp(self, aim: Aim, intervals: int, point: TipPoint, *, meets: bool) -> Array | None:
-        """Return the pressure that IPOPT finds from a tip."""
-        kind = (intervals, aim.target.position is not None, aim.target.direction is not None, meets)
-        if kind not in self._nlps:
-            self._nlps[kind] = inverse_problem(self.poses, intervals, aim, self.limits, meets=meets)
-        solution = self._nlps[kind].solve(self.poses, self.loads, aim, point.pressure, point.x)
-        if not solution.holds(self.poses.numerics.tolerance):
-            return None
-        return pressure_of(self._nlps[kind], solution, self.limits)
 
     def _judged(self, aim: Aim, pressure: Array, step: Step, solved: Solved | None) -> Reached | Step:
         """Return a stable pose that a body can take as an answer, else the step that says why there is none."""
