@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
@@ -240,7 +241,7 @@ def material(
     MaterialError
         With the nearest known name.
     """
-    entries = load_materials(file)
+    entries = _shipped(_shipped_file()) if file is None else load_materials(file)
     where = "" if file is None else f" in {file_label(file)}"
     if not isinstance(name, str) or name not in entries:
         raise MaterialError(f"unknown silicone {shown(name)}{where}{nearest(str(name), entries)}", key="name")
@@ -287,6 +288,12 @@ def _shipped_file() -> Path:
     package = Path(__file__).parents[1]
     installed = package / "materials.toml"
     return installed if installed.is_file() else package.parent / "materials.toml"
+
+
+@cache
+def _shipped(file: Path) -> Mapping[str, MaterialEntry]:
+    """Return the silicones of the library's file, read once: checking all its laws takes 20 ms."""
+    return load_materials(file)
 
 
 def _entry(name: str, table: Mapping[str, Any]) -> MaterialEntry:
