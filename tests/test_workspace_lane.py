@@ -155,9 +155,16 @@ def test_dimensions_constants_and_loads_may_vary_too() -> None:
 
 
 @pytest.mark.parametrize(
-    ("silicone", "law"), [("Ecoflex 00-10", "yeoh"), ("Ecoflex 00-50", "ogden"), ("Dragon Skin 10", "mooney-rivlin")]
+    ("silicone", "law", "shared"),
+    [
+        ("Ecoflex 00-10", "yeoh", False),
+        ("Ecoflex 00-50", "ogden", False),
+        ("Dragon Skin 10", "mooney-rivlin", False),
+        pytest.param("Ecoflex 00-10", "yeoh", True, marks=pytest.mark.slow),
+        pytest.param("Ecoflex 00-50", "ogden", True, marks=pytest.mark.slow),
+        pytest.param("Dragon Skin 10", "mooney-rivlin", True, marks=pytest.mark.thorough),
+    ],
 )
-@pytest.mark.parametrize("shared", [pytest.param(True, marks=pytest.mark.thorough), False])
 def test_stretches_are_those_of_the_branch(silicone: str, law: str, shared: bool) -> None:
     """Where the batch is certain it is right, and it is certain almost everywhere."""
     model = Model(robot("D25L60"), material(silicone, law))
