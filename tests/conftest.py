@@ -28,14 +28,16 @@ MATERIALS = ("test_material_lines.py", "test_formula.py", "test_materials.py")
 TESTS_OF = dict.fromkeys(("formula", "laws", "material_reading", "materials"), MATERIALS)
 LONG = "test_units_only_change_the_numbers"
 
-# Files of a minute and more, then those of half a minute, each in the order of what they take.
+# Files of five seconds and more, tests that take long among them, in the order of what they take.
 LONGEST = (
-    *("app_studies", "app_browser", "cli", "blocked_force", "workspace_lane", "sensitivity", "compare", "pages"),
-    *("design", "app_workspace", "inverse", "docs", "witness_blocked", "design_candidate", "shipped_blocked", "paper"),
-    *("identify", "forward", "blocked_problem", "compare_figures", "stability", "user_text", "solver", "closures"),
-    *("shipped_scenarios", "app_session", "sweep_processes", "app_blocked", "workspace_docs", "blocked_paths", "fuzz"),
-    *("view", "inverse_solver", "random_poses", "scenario", "branch", "problem", "workspace_document", "comparison"),
-    *("figures", "app_material", "tensile", "app_sequence", "app_inverse", "results", "app_identify", "processes"),
+    *("app_studies", "app_browser", "workspace_lane", "sweep", "identify", "solver", "forward"),
+    *("pages", "cli", "witness_blocked", "docs", "results", "blocked_force", "design"),
+    *("inverse", "problem", "view", "plots", "sweep_processes", "shipped_scenarios", "app_material"),
+    *("paper", "app_session", "app_workspace", "blocked_problem", "app_robot", "sensitivity", "inverse_solver"),
+    *("app_blocked", "tensile", "workspace_docs", "compare", "shipped_blocked", "scenario", "blocked_paths"),
+    *("engine", "user_text", "netcdf", "stability", "compare_figures", "workspace_document", "app_inverse"),
+    *("fuzz", "processes", "app_sequence", "app_identify", "paper_method", "witness", "figures"),
+    *("branch",),
 )
 
 
