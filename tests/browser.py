@@ -17,6 +17,14 @@ from softnlp.cli import main
 
 SMALL, WINDOW = ({"width": w, "height": h} for w, h in ((1000, 700), (1280, 800)))  # the small one is drawn sooner
 WAIT_MS = 400_000
+# Nothing glides: without a graphics card each picture of a movement is drawn by a processor.
+STILL = """
+addEventListener('DOMContentLoaded', () => {
+  const still = document.createElement('style');
+  still.textContent = '*, ::before, ::after {animation: none !important; transition: none !important}';
+  document.head.append(still);
+});
+"""
 
 
 @dataclass
@@ -146,6 +154,7 @@ def browser() -> Iterator[Any]:
             profile, executable_path=chromium(), args=list(FLAGS), viewport=SMALL
         )
         context.set_default_timeout(WAIT_MS)
+        context.add_init_script(STILL)
 
         def tab(address: str) -> Watched:
             watched = Watched(context.new_page())

@@ -56,6 +56,7 @@ def download(tab: Watched, testid: str) -> bytes:
     return Path(waiting.value.path()).read_bytes()
 
 
+@pytest.mark.slow
 def test_the_robot_and_its_silicone_are_designed(tab: Watched, tmp_path: Path) -> None:
     tab.choose("robot-name", "D15L60")
     tab.type("robot-length_mm", "50")
@@ -148,6 +149,7 @@ def test_a_sequence_is_run_and_shown(tab: Watched, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_blocked_force_and_its_curve(tab: Watched, tmp_path: Path) -> None:
     tab.press("tab-blocked")
     assert_same_as_the_command(tab, tmp_path)
@@ -219,6 +221,7 @@ def test_a_workspace_is_swept_stopped_and_shown(tab: Watched, pictures: Path) ->
     assert "kept" in ended(tab, "workspace")
 
 
+@pytest.mark.slow
 def test_a_target_is_reached(tab: Watched) -> None:
     tab.press("tab-inverse")
     tab.page.wait_for_selector("[data-testid='target.add']")
@@ -242,6 +245,7 @@ def test_a_target_is_reached(tab: Watched) -> None:
     tab.settled()
 
 
+@pytest.mark.slow
 def test_constants_are_identified_from_a_dropped_file(tab: Watched) -> None:
     tab.press("tab-identify")
     tab.page.wait_for_selector("[data-testid='measurements.drop'] input", state="attached")

@@ -236,7 +236,7 @@ def blocked_rows(closure: str, pressures: np.ndarray, loads: Loads, offset: floa
         pytest.param("free", Loads(), 0.0, marks=pytest.mark.thorough),
         pytest.param(
             *("compliant", Loads(gravity=(0.0, 0.0, -9.80665), tip_force=(0.0, 0.0, -0.02)), 0.0),
-            marks=pytest.mark.thorough,
+            marks=pytest.mark.slow,
         ),
         pytest.param("compliant", Loads(), -0.008, marks=pytest.mark.slow),
         pytest.param("rigid", Loads(), 0.0, marks=pytest.mark.slow),
