@@ -65,7 +65,7 @@ def compare(title: str, scenario: Scenario, task: DesignTask) -> None:
     ours = time.process_time() - began
     assert found is not None
     scale = task.objective.scale
-    print(f"\n{title}: {task.objective.file_key}\n")
+    print(f"\n{title}: {task.objective.key}\n")
     print(f"  {'softnlp.design':20s} {found.objective / scale:9.3f}  {ours:8.2f} s  {found.iterations:5d} iterations")
     for name, solve in (("Nelder-Mead, kept", kept(scenario, task)), ("Nelder-Mead, as run", as_run(scenario, task))):
         began = time.process_time()
@@ -176,7 +176,7 @@ def compare_random(scenario: Scenario, task: DesignTask) -> None:
     scale = task.objective.scale
     best = task.sign * max(objectives)
     print(f"\n{RANDOM} random feasible designs ({drawn} drawn, {made} solved, {time.process_time() - began:.0f} s)\n")
-    print(f"  best of them {best / scale:.3f}, the optimum {found.objective / scale:.3f} ({task.objective.file_key})")
+    print(f"  best of them {best / scale:.3f}, the optimum {found.objective / scale:.3f} ({task.objective.key})")
     if not task.sign * found.objective >= max(objectives) * (1 - 1e-9):
         raise SystemExit("a random design beats the optimum")
 

@@ -599,9 +599,9 @@ def test_every_output_and_quantity_is_documented() -> None:
 
 
 def test_every_key_of_a_target_is_documented() -> None:
-    from softnlp.results.targets import TARGET_FIELDS
+    from softnlp.base.columns import outputs
     from softnlp.scenario.schema_inverse import BoundsTable, TargetTable
 
     text = (ROOT / "docs" / "inverse.md").read_text()
-    for key in (*TargetTable.model_fields, *BoundsTable.model_fields, *(field.name for field in TARGET_FIELDS)):
+    for key in (*TargetTable.model_fields, *BoundsTable.model_fields, *(output.key for output in outputs("target"))):
         assert f"`{key}`" in text

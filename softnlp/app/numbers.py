@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from softnlp.base.units import MILLIMETRE
+from softnlp.base.columns import OUTPUTS, TABLES, written
 from softnlp.results import to_json
 from softnlp.statics.step import Run
 
@@ -43,33 +43,36 @@ def step_lines(run: Run) -> Lines:
 
 
 def _numbers(run: Run, step: dict[str, Any]) -> list[Line]:
-    length = run.robot.length / MILLIMETRE
-    lines = [Line(f"tip_position_mm.{k}", f"Tip {axis}", _fixed(_entry(step, "tip_position_mm", k), 3), "mm")
-             for k, axis in enumerate("xyz")]  # fmt: skip
-    lines.append(Line("bending_angle_deg", "Bending angle", _fixed(step["bending_angle_deg"], 3), "°"))
-    lines.append(Line("tilt_deg", "Tip tilt", _fixed(step["tilt_deg"], 3), "°"))
-    backbone = step["backbone_length_mm"]
-    lines.append(Line("backbone_length_mm", "Backbone length", _fixed(backbone, 3), "mm"))
-    longer = None if backbone is None else backbone - length
-    relative = None if longer is None else 100 * longer / length
-    lines.append(Line("elongation_mm", "Elongation", _fixed(longer, 3), "mm"))
-    lines.append(Line("elongation_percent", "Elongation", _fixed(relative, 2), "% of L₀"))
-    lines.append(Line("stretch", "Stretch from pressure", _fixed(step["stretch"], 5), ""))
+    names = [*TABLES["page"]]
     if any(run.loads.tip_force) or any(run.loads.tip_moment) or any(run.loads.gravity):
-        lines += [Line(f"tip_displacement_mm.{k}", f"Moved by loads, {axis}",
-                       _fixed(_entry(step, "tip_displacement_mm", k), 3), "mm")
-                  for k, axis in enumerate("xyz")]  # fmt: skip
-    return [*lines, *_contact(step)]
+        names += TABLES["page, loads"]
+    longer = OUTPUTS["elongation"]
+    backbone, length = step[OUTPUTS["backbone_length"].key], longer.shown(run.robot.length)
+    elongation = None if backbone is None else backbone - length
+    lines = _lines({**step, longer.key: elongation}, [*names, *TABLES["page, wall"]], run)
+    relative = written(None if elongation is None else 100 * elongation / length, ".2f", NOTHING)
+    at = 1 + next(k for k, line in enumerate(lines) if line.key == longer.key)
+    return [*lines[:at], Line(f"{longer.name}_percent", lines[at - 1].label, relative, "% of L₀"), *lines[at:]]
 
 
 def _chambers(run: Run, step: dict[str, Any]) -> list[Line]:
     """Return the length of each chamber, and of a blocked force the reaction of each."""
-    lines = [Line(f"chamber_length_mm.{n}", f"Chamber {n + 1}", _fixed(_entry(step, "chamber_length_mm", n), 3), "mm")
-             for n in range(run.robot.chambers)]  # fmt: skip
-    if "chamber_reaction_N" in step:
-        lines += [Line(f"chamber_reaction_N.{n}", f"Reaction {n + 1}",
-                       _fixed(_entry(step, "chamber_reaction_N", n), 4), "N")
-                  for n in range(run.robot.chambers)]  # fmt: skip
+    return _lines(step, TABLES["page, chambers"], run)
+
+
+def _lines(step: dict[str, Any], names: Sequence[str], run: Run) -> list[Line]:
+    """Return the lines of the outputs that the document of a step has."""
+    lines = []
+    for output in (OUTPUTS[name] for name in names if OUTPUTS[name].key in step):
+        found, title = step[output.key], output.title or output.label.capitalize()
+        if not output.dims:
+            lines.append(Line(output.key, title, written(found, output.page, NOTHING), output.unit.sign))
+            continue
+        indices = list("xyz") if output.dims == ("axis",) else [str(n + 1) for n in range(run.robot.chambers)]
+        for k, index in enumerate(indices):
+            entry = None if found is None or k >= len(found) else found[k]
+            text = written(entry, output.page, NOTHING)
+            lines.append(Line(f"{output.key}.{k}", title.format(index), text, output.unit.sign))
     return lines
 
 
@@ -82,25 +85,3 @@ def certificate_words(run: Run) -> str:
     error = "" if step.discretisation_error is None else f", tip within {step.discretisation_error:.0e} L₀"
     lead = "Solved" if step.status.value == "solved" else "No contact: the robot does not reach the wall"
     return f"{lead}, residual {step.residual:.0e}{error}, {step.intervals} intervals.{stable}"
-
-
-def _contact(step: dict[str, Any]) -> Iterator[Line]:
-    if "blocked_force_N" not in step:
-        return
-    yield Line("blocked_force_N", "Blocked force", _fixed(step["blocked_force_N"], 4), "N")
-    yield Line("gap_mm", "Gap of the free shape", _fixed(step["gap_mm"], 3), "mm")
-    yield Line("free_bending_angle_deg", "Bending angle, free", _fixed(step["free_bending_angle_deg"], 3), "°")
-    yield Line("length_error_mm", "Length error e_L", _fixed(step["length_error_mm"], 4), "mm")
-
-
-def _entry(step: dict[str, Any], key: str, index: int) -> float | None:
-    values = step[key]
-    return None if values is None or index >= len(values) else values[index]
-
-
-def _fixed(value: float | None, decimals: int) -> str:
-    """Return a number with a true minus sign left to the browser's font, and no negative zero."""
-    if value is None:
-        return NOTHING
-    text = f"{value:.{decimals}f}"
-    return text.removeprefix("-") if float(text) == 0 else text

@@ -18,6 +18,11 @@ def said(unit: str, meaning: str, **more: Any) -> dict[str, Any]:
     return {"units": unit, "long_name": meaning, **more}
 
 
+def flag_attributes(names: Mapping[str, int]) -> dict[str, Any]:
+    """Return the attributes that name the values of a variable of flags."""
+    return {"flag_values": np.array(list(names.values()), np.int8), "flag_meanings": " ".join(names)}
+
+
 def dataset_bytes(dataset: xr.Dataset) -> bytes:
     """Return the netCDF file of a dataset, made in memory."""
     import h5netcdf

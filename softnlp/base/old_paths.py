@@ -32,6 +32,7 @@ _MOVED = (
 )
 _RENAMED = {
     "columns": "base.csv_columns",
+    "results.targets": "studies.fields",
     "runner": "scenario.run",
     "runner_blocked": "scenario.run_blocked",
     "runner_compare": "scenario.compare",

@@ -107,7 +107,7 @@ def _say(task: CompareTask, found: Comparison) -> None:
         say(line)
     for name in found.observables:
         what = OBSERVABLES[name]
-        say(f"\n{what.words} [{what.unit}]: {found.measured(name)} measured")
+        say(f"\n{what.axis}: {found.measured(name)} measured")
         header = ["variant", "count", "rmse", "mape_%", "mean", "median", "max", "bias"]
         say_rows(header, [_cells(found, v, name) for v in range(len(found.variants))])
         if len(found.observed) > 1:

@@ -177,7 +177,7 @@ _GUESS = 40
 
 def _say_robots(asked: Scenario, found: Identified) -> None:
     """Print constants and misfits."""
-    from softnlp.results.identify_document import UNITS
+    from softnlp.base.columns import OUTPUTS
     from softnlp.studies.free_constants import file_name
 
     say(f"{asked.title}: {', '.join(d.label for d in found.data)}; {asked.material.name} ({asked.material.law.name})")
@@ -198,9 +198,9 @@ def _say_robots(asked: Scenario, found: Identified) -> None:
         ["observable", "numbers", "rmse_before", "rmse_after", "mape_before_percent", "mape_after_percent", "sigma"],
         [
             [
-                UNITS[key][0],
+                OUTPUTS[key].key,
                 str(after[key].count),
-                *(f"{m[key].rmse / UNITS[key][1]:.4g}" for m in (before, after)),
+                *(f"{m[key].rmse / OUTPUTS[key].scale:.4g}" for m in (before, after)),
                 *(f"{m[key].mape:.3g}" for m in (before, after)),
                 _sigma_text(found, key),
             ]
@@ -215,10 +215,11 @@ def _sigma_text(found: Identified, key: str) -> str:
     """Return the range of standard deviations that the residuals of an observable were divided by."""
     import numpy as np
 
-    from softnlp.results.identify_document import UNITS
+    from softnlp.base.columns import OUTPUTS
     from softnlp.studies.measurements import column_slice
 
-    used = np.concatenate([d.sigma[:, column_slice(key)][np.isfinite(d.of(key))] for d in found.data]) / UNITS[key][1]
+    parts = [d.sigma[:, column_slice(key)][np.isfinite(d.of(key))] for d in found.data]
+    used = OUTPUTS[key].shown(np.concatenate(parts))
     low, high = float(np.min(used)), float(np.max(used))
     return f"{low:.3g}" if high <= low * 1.0001 else f"{low:.3g} to {high:.3g}"
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
-from softnlp.base.units import BAR, DEGREE, MILLIMETRE
+from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, progress, say
 from softnlp.cli.figures import draw
 from softnlp.model.gravity import gravity_lines
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from softnlp.sweep.read import Workspace
     from softnlp.sweep.summary import Summary
 
+BENDING, TILT = OUTPUTS["bending_angle"], OUTPUTS["tilt"]
 CM = 1e-2
 _FIGURES = (".png", ".pdf", ".svg")
 
@@ -32,7 +34,7 @@ def workspace(
     results: Path,
     /,
     *,
-    colour: str = "bending_angle_deg",
+    colour: str = BENDING.key,
     against: Path | None = None,
     within_bar: float = 1e-5,
     voxel_mm: float | None = None,
@@ -165,7 +167,7 @@ def _aligned(rows: Iterator[tuple[str, str]]) -> list[str]:
 
 def _summary_rows(found: Workspace, s: Summary) -> Iterator[tuple[str, str]]:
     """Yield what a sweep comes to, as name and value."""
-    mm, deg = MILLIMETRE, DEGREE
+    mm = MILLIMETRE
     yield "workspace", f"{found.title}: {found.robot.name}, {found.material}"
     yield from (("gravity", line) for line in gravity_lines(found.gravity))
     yield "poses", f"{s.poses:,}"
@@ -187,15 +189,11 @@ def _summary_rows(found: Workspace, s: Summary) -> Iterator[tuple[str, str]]:
     yield "boundary", _body(s.boundary)
     d = s.dexterity
     tilts = [
-        d.lowest_tilt.min() / deg,
-        d.highest_tilt.max() / deg,
-        np.median(d.tilt_range) / deg,
-        d.tilt_range.max() / deg,
+        TILT.shown(size)
+        for size in (d.lowest_tilt.min(), d.highest_tilt.max(), np.median(d.tilt_range), d.tilt_range.max())
     ]
-    yield (
-        "tilts",
-        f"{tilts[0]:.1f} to {tilts[1]:.1f} deg; within a voxel {tilts[2]:.1f} (median), {tilts[3]:.1f} (most)",
-    )
+    most = f"within a voxel {tilts[2]:.1f} (median), {tilts[3]:.1f} (most)"
+    yield "tilts", f"{tilts[0]:.1f} to {tilts[1]:.1f} {TILT.unit}; {most}"
     yield (
         "dexterity",
         f"{100 * d.overall:.1f} % of directions anywhere; in a voxel {100 * float(np.mean(d.coverage)):.2f} % (mean), "
@@ -204,7 +202,7 @@ def _summary_rows(found: Workspace, s: Summary) -> Iterator[tuple[str, str]]:
     yield (
         "voxels",
         f"{len(d.voxel):,} of {d.size / mm:.3g} mm, {float(np.median(d.poses)):.0f} poses (median); "
-        f"{d.directions} directions of {d.resolution / deg:.1f} deg",
+        f"{d.directions} directions of {TILT.shown(d.resolution):.1f} {TILT.unit}",
     )
     yield "worst residual", f"{s.worst_residual:.1e}"
 
@@ -240,8 +238,10 @@ def _comparison_lines(compared: Comparison) -> list[str]:
         cells = [row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))]
         lines.append("  ".join(cells))
     if compared.angle is not None:
-        s = statistics(compared.angle / DEGREE)
-        lines.append(f"bending angle: mean difference {s.mean:.3f} deg, RMSE {s.rmse:.3f}, max {s.largest:.3f}")
+        s = statistics(BENDING.shown(compared.angle))
+        lines.append(
+            f"{BENDING.label}: mean difference {s.mean:.3f} {BENDING.unit}, RMSE {s.rmse:.3f}, max {s.largest:.3f}"
+        )
     counts = (
         (int(compared.solved_again.sum()), "pairs whose pose was solved for this"),
         (compared.skipped, "rows with blanks skipped"),

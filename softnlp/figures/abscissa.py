@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.units import BAR
 from softnlp.figures.style import listed
 from softnlp.results import RunView
@@ -41,5 +42,5 @@ def abscissa(view: RunView) -> Abscissa:
         label = f"pressure of set{'s' if len(used) > 1 else ''} {names} [bar]"
         return Abscissa(P[:, used[0]] / BAR, label, False, BAR)
     if view.time is not None:
-        return Abscissa(view.time, "time [s]", True)
+        return Abscissa(view.time, OUTPUTS["t"].axis, True)
     return Abscissa(np.arange(1, len(P) + 1, dtype=float), STEP, True)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.base.units import DEGREE, MILLIMETRE
+from softnlp.base.columns import OUTPUTS
+from softnlp.base.units import MILLIMETRE
 from softnlp.figures.abscissa import Abscissa, abscissa
 from softnlp.figures.body import (
     Camera,
@@ -42,6 +43,9 @@ _ARROW = 0.32  # of L_0
 _ALONG_X = 1e-9  # a normal this near to x
 
 
+BENDING = OUTPUTS["bending_angle"]
+
+
 @in_own_style
 def blocked_figure(view: RunView, contact: ContactView, measured: Sequence[tuple[float, float]] = ()) -> Figure:
     """Draw a blocked force; `measured` is (pressure [Pa] or offset [m], force [N]), whichever was varied.
@@ -57,7 +61,7 @@ def blocked_figure(view: RunView, contact: ContactView, measured: Sequence[tuple
 
     x = _abscissa(view, contact)
     panels = new_panels(figure, 3 if x.with_pressures else 2)
-    series(panels[0], view, x, contact.force, "blocked force [N]", least_span=0.01)
+    series(panels[0], view, x, contact.force, OUTPUTS["blocked_force"].axis, least_span=0.01)
     _draw_measured(panels[0], x, measured)
     _bending(panels[1], view, contact, x)
     finish_panels(figure, panels, view, x)
@@ -104,10 +108,10 @@ def _draw_measured(axes: Axes, x: Abscissa, measured: Sequence[tuple[float, floa
 
 def _bending(axes: Axes, view: RunView, contact: ContactView, x: Abscissa) -> None:
     """Draw the bending angle of the free shape as a dashed line, that of the blocked one as the steps."""
-    series(axes, view, x, view.bending_angle / DEGREE, "bending [deg]")
-    free = contact.free_bending_angle / DEGREE
+    series(axes, view, x, BENDING.shown(view.bending_angle), BENDING.heading)
+    free = BENDING.shown(contact.free_bending_angle)
     axes.plot(x.values, free, color=FREE, linewidth=1.4, linestyle=(0, (4, 2)), zorder=2, label="free shape")
-    both = np.concatenate([free, view.bending_angle / DEGREE])
+    both = np.concatenate([free, BENDING.shown(view.bending_angle)])
     if np.isfinite(both).any() and np.nanmax(both) - np.nanmin(both) >= 1:
         axes.autoscale()
         axes.relim()

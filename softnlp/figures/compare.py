@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.statistics import USED, groups
 from softnlp.base.units import BAR
 from softnlp.figures.compare_parts import (
@@ -106,7 +107,7 @@ def observable_figure(found: Comparison, name: str, title: str, times: list[Arra
     best = found.best_of(name)
     if best is not None and len(found.variants) > 1:
         subtitle.append(f"least RMSE: {found.labels[best]}")
-    figure = new_figure(_WIDTH, height, f"{title}: {what.words}", "  ·  ".join(subtitle))
+    figure = new_figure(_WIDTH, height, f"{title}: {what.label}", "  ·  ".join(subtitle))
     made = looks(found)
     top, bottom = 1 - 0.86 / height, (foot + 0.5) / height
     if curved:
@@ -160,7 +161,7 @@ def _panels(found: Comparison, name: str, robot: int, time: Array | None) -> lis
     some = used[~rest]
     if np.any(np.nanmax(some, axis=1, initial=0.0) - np.nanmin(some, axis=1, initial=np.inf) > USED):
         if time is not None and np.isfinite(time[kept]).all():
-            return [_Panel(robot, name_of_robot, kept, time[kept], "time [s]")]
+            return [_Panel(robot, name_of_robot, kept, time[kept], OUTPUTS["t"].axis)]
         return [_Panel(robot, name_of_robot, kept, np.arange(1.0, len(kept) + 1), "row")]
     combinations = [(words, mask) for words, mask in groups(P) if not rest[mask].all()] or [("no set", rest)]
     made = []
@@ -197,7 +198,7 @@ def _curves(
         last = j + columns >= len(panels)
         pressures = all(p.label.startswith("pressure") for p in panels)
         label = panel.label if same or not pressures else "pressure [bar]"
-        plain(axes, label if last else "", f"{what.words} [{what.unit}]" if column == 0 else "")
+        plain(axes, label if last else "", f"{what.axis}" if column == 0 else "")
         if len(panels) > 1:
             axes.set_title(panel.title, size=TEXT, color=INK, weight="bold", loc="left", pad=3)
         _curve_panel(axes, found, name, panel, made)
@@ -243,7 +244,7 @@ def _curve_panel(axes: Axes, found: Comparison, name: str, panel: _Panel, made: 
 def _measurements(axes: Axes, found: Comparison, name: str, lanes: list[tuple[_Panel, int]], made: list[Look]) -> None:
     """Draw a lane a measurement: what was measured as a bar across it, each variant as a dot, a cross where lost."""
     what, column = OBSERVABLES[name], NUMBERS.index(name)
-    plain(axes, f"{what.words} [{what.unit}]", "")
+    plain(axes, f"{what.axis}", "")
     names: list[str] = []
     step = 0.62 / max(len(made), 2)
     for y, (panel, row) in enumerate(lanes):

@@ -14,6 +14,7 @@ from softnlp.figures.compare_parts import LEGEND_ROW, MEASURED, Look, legend, le
 from softnlp.figures.space import around, space_axes
 from softnlp.figures.style import GREY, INK, SMALL, TEXT, WRONG, in_own_style, new_figure, plain
 from softnlp.studies.comparison import AXES, Comparison
+from softnlp.studies.observed import OBSERVABLES
 from softnlp.sweep.boundary import thinned
 
 if TYPE_CHECKING:
@@ -118,7 +119,7 @@ def _histogram(axes: Axes, found: Comparison, made: list[Look]) -> None:
     distances = [found.errors(v, "tip_position")[0] / MILLIMETRE for v in range(len(made))]
     highest = max((float(d.max()) for d in distances if d.size), default=0.0) or 1.0
     edges = np.linspace(0.0, highest, _BINS + 1)
-    plain(axes, "distance of the tips [mm]", "tips")
+    plain(axes, OBSERVABLES["tip_position"].axis, "tips")
     for d, look, label in zip(distances, made, found.labels, strict=True):
         counts, _ = np.histogram(d, edges)
         axes.stairs(counts, edges, color=look.colour, linestyle=look.line, linewidth=1.6, label=label)

@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.statistics import groups, statistics
-from softnlp.base.units import DEGREE, MILLIMETRE
+from softnlp.base.units import MILLIMETRE
 from softnlp.figures.boxes import draw_boxes
 from softnlp.figures.cloud import mark_size
 from softnlp.figures.space import around, space_axes
 from softnlp.figures.style import GREY, INK, SMALL, TEXT, colour, in_own_style, new_figure, plain
 from softnlp.model.gravity import gravity_lines, is_hanging
+from softnlp.studies.observed import OBSERVABLES
 from softnlp.sweep.boundary import thinned
 from softnlp.sweep.comparison import Comparison
 from softnlp.sweep.read import Workspace
@@ -29,6 +31,9 @@ _MAP = "cividis_r"
 _MOST_LINES, _MOST_POINTS = 2_000, 20_000
 _WIDTH, _HEIGHT = 11.0, 7.2
 _ALL = "all"
+
+
+BENDING, DISTANCE = OUTPUTS["bending_angle"], OBSERVABLES["tip_position"]
 
 
 @in_own_style
@@ -58,11 +63,11 @@ def comparison_figure(workspace: Workspace, comparison: Comparison) -> Figure:
         _errors(figure.add_axes(place), comparison, norm, first, second, half)
     with_angle = comparison.angle is not None
     boxes = figure.add_axes((0.6, 0.085, 0.17 if with_angle else 0.39, 0.34))
-    _boxes(boxes, comparison, comparison.distance / MILLIMETRE, "distance of the tips [mm]")
+    _boxes(boxes, comparison, comparison.distance / MILLIMETRE, DISTANCE.axis)
     boxes.set_xlim(left=0)
     if comparison.angle is not None:
         other = figure.add_axes((0.82, 0.085, 0.17, 0.34))
-        _boxes(other, comparison, comparison.angle / DEGREE, "bending difference [deg]")
+        _boxes(other, comparison, BENDING.shown(comparison.angle), f"bending difference [{BENDING.unit}]")
         other.tick_params(labelleft=False)
     else:
         percent = boxes.secondary_xaxis("top", functions=(partial(np.multiply, part), partial(np.multiply, 1 / part)))
@@ -108,7 +113,7 @@ def _tips(figure: Figure, comparison: Comparison, norm: Any, *, hanging: bool) -
     )
     bar.outline.set_visible(False)
     bar.ax.tick_params(labelsize=SMALL, colors=INK, color=GREY)
-    bar.set_label("distance of the tips [mm]", size=TEXT, color=INK)
+    bar.set_label(DISTANCE.axis, size=TEXT, color=INK)
     return len(k)
 
 

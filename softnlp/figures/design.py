@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softnlp.base.columns import ONE, Output
 from softnlp.figures.section import draw_section, stretched_radii
 from softnlp.figures.style import COLOURS, GREY, INK, PALE, SMALL, TEXT, in_own_style, new_figure, plain, user_text
 from softnlp.results.design import held_back, label, pressure_words
 from softnlp.studies.design import Design
 from softnlp.studies.design_candidate import Candidate
-from softnlp.studies.design_task import OUTPUTS, Output
+from softnlp.studies.design_task import OUTPUTS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,7 +40,7 @@ def design_figure(done: Design) -> Figure:
     way = "largest" if task.maximise else "smallest"
     sets = f"set{'s' * (len(task.sets) > 1)} {', '.join(str(k + 1) for k in task.sets)}"
     subtitle = (
-        f"{way} {_words(task.objective)}  ·  {sets} at "
+        f"{way} {task.objective.label}  ·  {sets} at "
         f"{pressure_words(task.pressure)}  ·  {len(done.feasible)} of {len(done.candidates)} feasible"
     )
     figure = new_figure(_WIDTH, height, done.title or "Design", subtitle)
@@ -54,12 +55,8 @@ def design_figure(done: Design) -> Figure:
     return figure
 
 
-def _words(output: Output) -> str:
-    return output.name.replace("_", " ")
-
-
 def _axis(output: Output) -> str:
-    return f"{_words(output)} [{output.unit}]" if output.unit != "1" else _words(output)
+    return output.label if output.unit is ONE else f"{output.label} [{output.unit}]"
 
 
 def _colour(done: Design, candidate: Candidate) -> str:
@@ -105,7 +102,7 @@ def _against(done: Design) -> Output:
     """Return what to draw the objective against: the first requirement on what a robot does, else the pressure."""
     task = done.task
     for name in task.requirements:
-        if name != task.objective.name and OUTPUTS[name].kind != "robot":
+        if name != task.objective.name and OUTPUTS[name].group != "robot":
             return OUTPUTS[name]
     return OUTPUTS["bending_angle"] if task.objective.name == "pressure" else OUTPUTS["pressure"]
 

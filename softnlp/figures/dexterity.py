@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.units import DEGREE, MILLIMETRE
 from softnlp.figures.cloud import VIEWS
 from softnlp.figures.style import GREY, INK, SMALL, TEXT, in_own_style, new_figure, plain
@@ -19,6 +20,9 @@ Array = NDArray[np.float64]
 
 _WIDTH, _HEIGHT, _ROW = 11.0, 11.8, 2.65
 _LEFT, _RIGHT, _GAP = 0.17, 0.985, 0.05
+
+
+TILT = OUTPUTS["tilt"]
 
 
 @in_own_style
@@ -36,14 +40,11 @@ def dexterity_figure(found: Dexterity, title: str, robot: str) -> Figure:
         f"{100 * found.overall:.3g} % taken anywhere",
     ]
     figure = new_figure(_WIDTH, _HEIGHT, f"{title}: dexterity", "  ·  ".join(parts))
+    highest, spread = TILT.shown(found.highest_tilt), TILT.shown(found.tilt_range)
     rows: tuple[tuple[str, Array, Any], ...] = (
         ("poses in a voxel", found.poses.astype(float), LogNorm(1, max(2, int(found.poses.max())))),
-        (
-            "highest tilt [deg]",
-            found.highest_tilt / DEGREE,
-            Normalize(0, float(found.highest_tilt.max()) / DEGREE or 1),
-        ),
-        ("range of tilts [deg]", found.tilt_range / DEGREE, Normalize(0, float(found.tilt_range.max()) / DEGREE or 1)),
+        (f"highest tilt [{TILT.unit}]", highest, Normalize(0, float(highest.max()) or 1)),
+        (f"range of tilts [{TILT.unit}]", spread, Normalize(0, float(spread.max()) or 1)),
         ("directions taken [%]", 100 * found.coverage, Normalize(0, 100 * float(found.coverage.max()))),
     )
     spans = (found.voxel.max(axis=0) + 1) * found.size

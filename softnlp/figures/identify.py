@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.units import KILOPASCAL
 from softnlp.figures.style import GREY, INK, PALE, SMALL, TEXT, colour, in_own_style, new_figure, plain, user_text
-from softnlp.results.identify_document import UNITS
-from softnlp.studies.measurements import column_slice
+from softnlp.studies.measurements import OBSERVABLES, column_slice
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -18,12 +18,6 @@ if TYPE_CHECKING:
     from softnlp.studies.identified import Identified
     from softnlp.studies.tensile import TensileFit
 
-_LABELS = {
-    "tip_position": "tip position [mm]",
-    "bending_angle": "bending angle [deg]",
-    "elongation": "elongation [mm]",
-    "blocked_force": "blocked force [N]",
-}
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")  # one more than colours, so that pairs repeat late
 
 
@@ -77,7 +71,7 @@ def _unsure(notes: Mapping[str, str]) -> list[str]:
 @in_own_style
 def identified_figure(found: Identified, title: str) -> Figure:
     """Draw the model before and after against what was measured, a panel an observable and a marker a robot."""
-    shown = [key for key in UNITS if key in found.errors()]
+    shown = [key for key in OBSERVABLES if key in found.errors()]
     width = 0.9 + 4.1 * len(shown)
     pairs = zip(found.free.names, found.constants, strict=True)
     constants = ", ".join(f"{n} = {v:.4g}" + (found.notes[n] and f" ({found.notes[n]})") for n, v in pairs)
@@ -87,8 +81,8 @@ def identified_figure(found: Identified, title: str) -> Figure:
     named = int(np.argmax(robots))
     for k, key in enumerate(shown):
         axes = figure.add_axes((step * k + 0.16 * step, 0.12, 0.78 * step, 0.71))
-        unit = UNITS[key][1]
-        plain(axes, f"measured {_LABELS[key]}", f"model {_LABELS[key]}")
+        unit = OUTPUTS[key].scale
+        plain(axes, f"measured {OUTPUTS[key].axis}", f"model {OUTPUTS[key].axis}")
         ends = []
         for j, data in enumerate(found.data):
             measured = data.of(key) / unit

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.base.units import DEGREE, MILLIMETRE
+from softnlp.base.columns import OUTPUTS
+from softnlp.base.units import MILLIMETRE
 from softnlp.figures.abscissa import STEP, Abscissa
 from softnlp.figures.body import body_panel, frame
 from softnlp.figures.series import finish_panels, new_panels, series
@@ -22,6 +23,9 @@ Array = NDArray[np.float64]
 
 _LEAST_LEFT = 1e-9  # [mm] or [deg]: below it what is left is drawn at the foot of its axis
 _ARROW = 0.22  # of L_0
+
+
+BENDING, DISTANCE, ANGLE = (OUTPUTS[name] for name in ("bending_angle", "distance", "direction_error"))
 
 
 @in_own_style
@@ -40,7 +44,7 @@ def inverse_figure(view: RunView, targets: TargetView) -> Figure:
     x = Abscissa(np.arange(1, total + 1, dtype=float), STEP, True)
     panels = new_panels(figure, 3)
     _left(panels[0], x, targets)
-    series(panels[1], view, x, view.bending_angle / DEGREE, "bending [deg]")
+    series(panels[1], view, x, BENDING.shown(view.bending_angle), BENDING.heading)
     finish_panels(figure, panels, view, x)
     panels[-1].set_xlabel("target")
     _legend(figure, view, targets)
@@ -77,18 +81,19 @@ def _draw_targets(axes: Any, view: RunView, targets: TargetView) -> None:
 
 def _left(axes: Axes, x: Abscissa, targets: TargetView) -> None:
     """Draw distance and angle left."""
+    distance, angle = DISTANCE.shown(targets.distance), ANGLE.shown(targets.angle)
     names = []
     for values, unit, name, mark, ink in (
-        (targets.distance / MILLIMETRE, "mm", "distance", "o", INK),
-        (targets.angle / DEGREE, "deg", "direction", "^", colour(1)),
+        (distance, DISTANCE.unit, "distance", "o", INK),
+        (angle, ANGLE.unit, "direction", "^", colour(1)),
     ):
         if np.isfinite(values).any():
             names.append(f"{name} [{unit}]")
             shown = np.maximum(values, _LEAST_LEFT)
             axes.plot(x.values, shown, mark, color=ink, markersize=3.5, label=f"{name} left")
-    plain(axes, x.label, f"left: {', '.join(names)}" if len(names) == 1 else "left [mm], [deg]")
+    plain(axes, x.label, f"left: {', '.join(names)}" if len(names) == 1 else f"left [{DISTANCE.unit}], [{ANGLE.unit}]")
     axes.set_yscale("log")
-    everything = np.concatenate([targets.distance / MILLIMETRE, targets.angle / DEGREE, [_LEAST_LEFT]])
+    everything = np.concatenate([distance, angle, [_LEAST_LEFT]])
     axes.set_ylim(_LEAST_LEFT / 3, max(1e-3, 5 * float(np.nanmax(everything))))
     if len(names) > 1:
         axes.legend(fontsize=SMALL, frameon=False, labelcolor=INK)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softnlp.base.units import DEGREE, MILLIMETRE
+from softnlp.base.columns import OUTPUTS
 from softnlp.figures.abscissa import abscissa
 from softnlp.figures.blocked import blocked_figure
 from softnlp.figures.body import body_panel
@@ -19,6 +19,9 @@ from softnlp.statics.step import STABLE_FLAGS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+BENDING, ELONGATION = OUTPUTS["bending_angle"], OUTPUTS["elongation"]
 
 
 @in_own_style
@@ -42,8 +45,9 @@ def run_figure(view: RunView, measured: Sequence[tuple[float, float]] = ()) -> F
 
     x = abscissa(view)
     panels = new_panels(figure, 3 if x.with_pressures else 2)
-    series(panels[0], view, x, view.bending_angle / DEGREE, "bending [deg]")
-    series(panels[1], view, x, (view.backbone_length - view.robot.length) / MILLIMETRE, "elongation [mm]")
+    series(panels[0], view, x, BENDING.shown(view.bending_angle), BENDING.heading)
+    longer = ELONGATION.shown(view.backbone_length - view.robot.length)
+    series(panels[1], view, x, longer, ELONGATION.axis)
     finish_panels(figure, panels, view, x)
     return figure
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import DEG, ONE, OUTPUTS
 from softnlp.base.units import MILLIMETRE
 from softnlp.figures.body import disc
 from softnlp.figures.cloud import VIEWS, Outline, mark_size, outline, seen, shown
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-COLOUR = "bending_angle_deg"
+COLOUR = OUTPUTS["bending_angle"].key
 _MAP = "viridis"
 _LOGARITHMIC = ("residual", "discretisation_error")
 _ROUND_OFF = 1e-20
@@ -36,7 +37,7 @@ def workspace_figure(workspace: Workspace, colour: str = COLOUR) -> Figure:
     """Draw where the tip goes: all poses in 3-D and seen along each axis.
 
     colour : a number of the poses by its name in the file (`softnlp.sweep.read.column_names`), with its unit:
-    "bending_angle_deg", "stretch", "p1_bar", "tip_position_z_mm".
+    "stretch", "p1_bar", "tip_position_z_mm".
 
     Every panel has the same scale. Of many poses one in each small cell is drawn, which the figure says. Outlines are
     the concave boundary (dark) and the convex hull (dashed) of each projection; in 3-D they are on the walls.
@@ -230,7 +231,7 @@ def _colour_bar(figure: Figure, column: Column, scale: Any) -> None:
 
 def column_label(column: Column) -> str:
     """Return the words and the unit of a number for an axis."""
-    unit = {"degree": "deg", "1": "-"}.get(column.unit, column.unit)
+    unit = {DEG.attribute: DEG.label, ONE.attribute: "-"}.get(column.unit, column.unit)
     pressure = column.name[1:-4]
     if column.name.startswith("p") and column.name.endswith("_bar") and pressure.isdigit():
         return f"pressure of set {pressure} [bar]"

@@ -25,7 +25,7 @@ _VARIANT = ("law", "coefficients", "conventions", "closure")
 def comparison_document(task: CompareTask, found: Comparison) -> dict[str, Any]:
     """Return the JSON document of a comparison."""
     scenario = task.scenario
-    measured = {OBSERVABLES[name].key: found.measured(name) for name in found.observables}
+    measured = {OBSERVABLES[name].measured: found.measured(name) for name in found.observables}
     return {
         "softnlp": package_version(),
         "title": scenario.title,
@@ -60,7 +60,7 @@ def _best(found: Comparison) -> dict[str, Any] | None:
     each = {}
     for name in found.main_observables:
         if (v := found.best_of(name)) is not None:
-            each[OBSERVABLES[name].key] = {"variant": v + 1, **_named(found, v)}
+            each[OBSERVABLES[name].measured] = {"variant": v + 1, **_named(found, v)}
     return {"variant": found.best + 1, **_named(found, found.best), "by_observable": each}
 
 
@@ -82,7 +82,7 @@ def _statistics(found: Comparison, v: int, robot: int | None) -> dict[str, Any]:
     for name in found.observables:
         if found.measured(name, robot):
             values = statistics_cells(found.statistics(v, name, robot), name)
-            told[OBSERVABLES[name].key] = dict(zip(STATISTICS, values, strict=True))
+            told[OBSERVABLES[name].measured] = dict(zip(STATISTICS, values, strict=True))
     return told
 
 
@@ -90,7 +90,7 @@ def statistics_cells(s: Statistics, name: str) -> list[Any]:
     """Return statistics in the unit of files, in the order of `STATISTICS`; None where there is no number."""
     scale = OBSERVABLES[name].scale
     rmse, mean, median, largest, bias = (number(x / scale) for x in (s.rmse, s.mean, s.median, s.largest, s.bias))
-    return [s.count, rmse, number(s.mape), mean, median, largest, bias, s.left_out, OBSERVABLES[name].unit]
+    return [s.count, rmse, number(s.mape), mean, median, largest, bias, s.left_out, OBSERVABLES[name].unit.label]
 
 
 def _places(task: CompareTask) -> Iterator[tuple[int, int | None, int]]:
@@ -116,7 +116,7 @@ def _row(task: CompareTask, found: Comparison, v: int, row: int, robot: int | No
     told["self_intersecting"] = k in solved.self_intersecting if known else None
     parts: dict[str, dict[str, Any]] = {"measured": {}, "simulated": {}, "error": {}}
     for name, measured, simulated, error in _numbers(found, v, robot, k):
-        key = OBSERVABLES[name].key
+        key = OBSERVABLES[name].measured
         if measured is not None:
             parts["measured"][key], parts["simulated"][key] = measured, simulated
         parts["error"][key] = error
@@ -151,7 +151,7 @@ def summary_text(found: Comparison) -> str:
             for name in found.observables:
                 if found.measured(name, robot):
                     cells = statistics_cells(found.statistics(v, name, robot), name)
-                    rows.append([*_named(found, v).values(), label, OBSERVABLES[name].key, *cells])
+                    rows.append([*_named(found, v).values(), label, OBSERVABLES[name].measured, *cells])
     return _csv([*_VARIANT, "robot", "observable", *STATISTICS], rows)
 
 
@@ -167,8 +167,8 @@ def require_free_names(task: CompareTask) -> None:
 
 def _added(observables: Sequence[str]) -> list[str]:
     """Return the columns that the table of rows has beside those of the file."""
-    numbers = [OBSERVABLES[name].key for name in observables if name in NUMBERS]
-    keys = [OBSERVABLES[name].key for name in observables]
+    numbers = [OBSERVABLES[name].measured for name in observables if name in NUMBERS]
+    keys = [OBSERVABLES[name].measured for name in observables]
     return [
         *(f"variant_{name}" for name in _VARIANT),
         *("simulated_status", "simulated_message"),

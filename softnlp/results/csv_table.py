@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from softnlp.base.columns import Output
 from softnlp.base.files import write_whole
 from softnlp.model.inputs import pressure_bar, tidy
-from softnlp.model.robot import Robot
-from softnlp.results.targets import INVERSE, TARGET_FIELDS, TargetField, target_values
 from softnlp.statics.step import Run, Step
-from softnlp.studies.fields import BLOCKED_FORCE, Field, closure_of, document_fields, left_by_weights, solved_pose
+from softnlp.studies.fields import BLOCKED_FORCE, closure_of, document_outputs, left_by_weights, value
 
 
 def write_table(run: Run, path: str | PathLike[str]) -> Path:
@@ -36,9 +35,8 @@ def table_text(run: Run) -> str:
     weighted = {line.equation: line.unit for step in run.steps for line in left_by_weights(step)}
     header = ["step"] + ["t_s"] * timed
     header += [f"p{k + 1}_bar" for k in range(run.robot.chamber_sets)]
-    targets = TARGET_FIELDS if run.study == INVERSE else ()
-    header += ["status", *(name for t in targets for name in _columns(t, run.robot))]
-    header += [*(name for f in document_fields(run) for name in _columns(f, run.robot))]
+    columns = {output: output.keys({"chamber": run.robot.chambers}, "") for output in document_outputs(run)}
+    header += ["status", *(key for keys in columns.values() for key in keys)]
     header += ["closure"] * (run.study == BLOCKED_FORCE)
     header += ["_".join(["weighted_residual", *name.split(), unit.replace(" ", "")]) for name, unit in weighted.items()]
     header += ["residual", "message", "warnings"]
@@ -46,40 +44,21 @@ def table_text(run: Run) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)
     for number, step in enumerate(run.steps, start=1):
-        writer.writerow(list(_row(number, step, run, timed, list(weighted))))
+        writer.writerow(list(_row(number, step, run, timed, columns, list(weighted))))
     return text.getvalue()
 
 
-def _columns(field: Field | TargetField, robot: Robot) -> list[str]:
-    """Return the column names of a field: the index goes before the unit suffix, tip_x_mm for instance."""
-    if not field.dims:
-        return [field.name]
-    stem, unit = field.name, ""
-    if field.unit != "1":
-        stem, _, unit = field.name.rpartition("_")
-        unit = f"_{unit}"
-    if field.dims == ("axis",):
-        return [f"{stem}_{axis}{unit}" for axis in "xyz"]
-    if field.dims == ("chamber",):
-        return [f"{stem}_{n + 1}{unit}" for n in range(robot.chambers)]
-    return [f"{field.name}_{row}{col}" for row in "xyz" for col in "xyz"]
-
-
-def _row(number: int, step: Step, run: Run, timed: bool, weighted: list[str]) -> Iterator[Any]:
-    pose = solved_pose(step)
+def _row(
+    number: int, step: Step, run: Run, timed: bool, columns: Mapping[Output, Sequence[str]], weighted: list[str]
+) -> Iterator[Any]:
     yield number
     if timed:
         yield "" if step.time is None else tidy(step.time)
     yield from pressure_bar(step.pressure)
     yield step.status.value
-    for target, value in zip(TARGET_FIELDS, target_values(run, step).values(), strict=False):
-        yield from ([""] * len(_columns(target, run.robot)) if value is None else map(_cell, np.ravel(value).tolist()))
-    for field in document_fields(run):
-        value = None if pose is None else field.of(step, pose)
-        if value is None:
-            yield from [""] * len(_columns(field, run.robot))
-        else:
-            yield from (_cell(v) for v in np.ravel(value).tolist())
+    for output, keys in columns.items():
+        found = value(output, step)
+        yield from ([""] * len(keys) if found is None else map(_cell, np.ravel(found).tolist()))
     if run.study == BLOCKED_FORCE:
         yield closure_of(run, step) or ""
     left = {line.equation: line.value for line in left_by_weights(step)}
@@ -89,10 +68,10 @@ def _row(number: int, step: Step, run: Run, timed: bool, weighted: list[str]) ->
     yield "; ".join(step.warnings)
 
 
-def _cell(value: Any) -> Any:
+def _cell(found: Any) -> Any:
     """Return a number as CSV has it: true and false, empty where there is none."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if value is None or value != value:  # NaN
+    if isinstance(found, bool):
+        return "true" if found else "false"
+    if found is None or found != found:  # NaN
         return ""
-    return value
+    return found

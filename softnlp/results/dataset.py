@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.base.netcdf import dataset_bytes, said
+from softnlp.base.columns import OUTPUTS, Output
+from softnlp.base.netcdf import dataset_bytes, flag_attributes, said
 from softnlp.model.inputs import (
     coefficients_table,
     contact_table,
@@ -22,16 +23,14 @@ from softnlp.model.inputs import (
     versions,
 )
 from softnlp.nlp.solver import EquationResidual
-from softnlp.results.targets import INVERSE, TARGET_FIELDS, target_values
-from softnlp.statics.step import SELF_INTERSECTING_FLAGS, STABLE_FLAGS, Run, Step, stable_flag
+from softnlp.statics.step import Run, Step
 from softnlp.studies.fields import (
     BLOCKED_FORCE,
-    SELF_INTERSECTING,
-    STABLE,
-    Field,
+    FLAGS,
     closure_of,
-    dataset_fields,
+    dataset_outputs,
     left_by_weights,
+    series,
     solved_pose,
 )
 
@@ -42,7 +41,6 @@ Array = NDArray[np.float64]
 Variable = tuple[tuple[str, ...], Any, dict[str, Any]]
 
 AXES = ("x", "y", "z")
-FLAGS = {STABLE: STABLE_FLAGS, SELF_INTERSECTING: SELF_INTERSECTING_FLAGS}
 
 
 def to_dataset(run: Run) -> xr.Dataset:
@@ -65,7 +63,7 @@ def to_dataset(run: Run) -> xr.Dataset:
     """
     import xarray as xr
 
-    steps = run.steps
+    steps, pressure = run.steps, OUTPUTS["pressure"]
     sizes = {
         "axis": 3,
         "row": 3,
@@ -74,29 +72,21 @@ def to_dataset(run: Run) -> xr.Dataset:
         "s": max((_points(step) for step in steps), default=0),
     }
     variables: dict[str, Variable] = {
-        "pressure_bar": (
-            ("step", "set"),
+        pressure.key: (
+            ("step", *pressure.dims),
             [pressure_bar(step.pressure) for step in steps],
-            said("bar", "gauge pressure of each chamber set"),
+            said(pressure.unit.attribute, pressure.meaning),
         ),
         "status": (("step",), _text([s.status.value for s in steps]), said("1", "how the step ended")),
         "message": (("step",), _text([s.message for s in steps]), said("1", "the same in words")),
-        "residual": (
-            ("step",),
-            [_number(s.residual) for s in steps],
-            said("1", "largest equation error: force by EI/L^2, moment by EI/L, length by L"),
-        ),
         "warnings": (
             ("step",),
             _text(["; ".join(s.warnings) for s in steps]),
             said("1", "warnings of the step"),
         ),
     }
-    for field in dataset_fields(run):
-        variables[field.name] = _variable(field, steps, sizes)
+    variables |= {output.key: _variable(output, steps, sizes) for output in dataset_outputs(run)}
     variables |= _certificate(steps)
-    if run.study == INVERSE:
-        variables |= _targets(run)
     if run.study == BLOCKED_FORCE:
         closures = _text([closure_of(run, step) or "" for step in steps])
         variables["closure"] = (("step",), closures, said("1", "which equations close the blocked shape"))
@@ -120,33 +110,12 @@ def _text(values: Sequence[str]) -> NDArray[np.object_]:
     return np.array(values, dtype=object)
 
 
-def _variable(field: Field, steps: Sequence[Step], sizes: dict[str, int]) -> Variable:
-    """Return a field over the steps; a shape with fewer points than another is filled up with NaN at the tip."""
-    dims = ("step", *field.dims)
-    if (known := FLAGS.get(field.name)) is not None:
-        flags = [stable_flag(None if (p := solved_pose(s)) is None else field.of(s, p)) for s in steps]
-        values = np.array(flags, dtype=np.int8)
-        meanings = {"flag_values": np.array(list(known.values()), np.int8), "flag_meanings": " ".join(known)}
-        return dims, values, said(field.unit, field.meaning, **meanings)
-    array = np.full((len(steps), *(sizes[d] for d in field.dims)), np.nan)
-    for k, step in enumerate(steps):
-        pose = solved_pose(step)
-        value = None if pose is None else field.of(step, pose)
-        if value is not None:
-            value = np.asarray(value, dtype=float)
-            array[k, ...][tuple(slice(n) for n in value.shape)] = value
-    return dims, array, said(field.unit, field.meaning)
-
-
-def _targets(run: Run) -> dict[str, Variable]:
-    """Return the target of each step and how near it is; NaN where the target has none of a kind."""
-    values = [target_values(run, step) for step in run.steps]
-    made: dict[str, Variable] = {}
-    for field in TARGET_FIELDS:
-        nothing = np.full((3,) * len(field.dims), np.nan)
-        rows = [nothing if row[field.name] is None else row[field.name] for row in values]
-        made[field.name] = (("step", *field.dims), np.array(rows, float), said(field.unit, field.meaning))
-    return made
+def _variable(output: Output, steps: Sequence[Step], sizes: Mapping[str, int]) -> Variable:
+    """Return an output over the steps; a shape with fewer points than another is filled up with NaN at the tip."""
+    flags = FLAGS.get(output.name)
+    more = {} if flags is None else flag_attributes(flags)
+    about = said(output.unit.attribute, output.meaning, **more)
+    return ("step", *output.dims), series(output, steps, sizes), about
 
 
 def _points(step: Step) -> int:
@@ -225,10 +194,10 @@ def _coordinates(run: Run, arc: Array) -> dict[str, Variable]:
     }
     if any(step.time is not None for step in run.steps):
         times = [_number(step.time) for step in run.steps]
-        coordinates["t_s"] = (("step",), times, said("s", "time of the step"))
+        coordinates["t_s"] = (("step",), times, said("s", OUTPUTS["t"].meaning))
     solved = arc[~np.isnan(arc[:, :1]).all(axis=1)]
     if len(solved) and (solved == solved[0]).all():
-        coordinates["s"] = (("s",), solved[0], said("1", "position along the rod s/L, from base to tip"))
+        coordinates["s"] = (("s",), solved[0], said("1", OUTPUTS["arc"].meaning))
     return coordinates
 
 

@@ -9,7 +9,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
-from softnlp.base.units import BAR, DEGREE, MILLIMETRE
+from softnlp.base import columns
+from softnlp.base.columns import DEG, MM, ONE, Output
+from softnlp.base.units import BAR
 from softnlp.model.gravity import gravity_lines
 from softnlp.model.inputs import (
     coefficients_table,
@@ -26,7 +28,7 @@ from softnlp.results.document import compact_json
 from softnlp.studies.design import Design
 from softnlp.studies.design_candidate import Candidate
 from softnlp.studies.design_optimise import Active
-from softnlp.studies.design_task import OUTPUTS, Output, PressureSteps, Range
+from softnlp.studies.design_task import FORCE, OUTPUTS, PressureSteps, Range
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -38,7 +40,7 @@ def design_document(done: Design) -> dict[str, Any]:
     """Return a design as plain dicts, lists, strings, numbers and None; no NaN or infinity."""
     setting, task, best = done.setting, done.task, done.best
     limits = {
-        OUTPUTS[name].file_key: {
+        OUTPUTS[name].key: {
             key: tidy(value, OUTPUTS[name].scale)
             for key, value in (("at_least", limit.lower), ("at_most", limit.upper))
             if isfinite(value)
@@ -47,7 +49,7 @@ def design_document(done: Design) -> dict[str, Any]:
     }
     found = None if best is None else candidate_table(done, best)
     if found is not None and done.free_closure_force is not None:
-        found["blocked_force_free_closure_N"] = done.free_closure_force
+        found[f"{FORCE}_free_closure_{OUTPUTS[FORCE].unit}"] = done.free_closure_force
     return {
         "softnlp": package_version(),
         "title": done.title,
@@ -58,7 +60,7 @@ def design_document(done: Design) -> dict[str, Any]:
         "coefficients": coefficients_table(setting.coefficients),
         "loads": loads_table(setting.loads),
         **({"contact": contact_table(setting.contact)} if task.needs_force else {}),
-        "objective": {"maximise" if task.maximise else "minimise": task.objective.file_key},
+        "objective": {"maximise" if task.maximise else "minimise": task.objective.key},
         "requirements": limits,
         "sets": [k + 1 for k in task.sets],
         "best": found,
@@ -73,7 +75,7 @@ def design_json(done: Design) -> str:
 
 def candidate_table(done: Design, candidate: Candidate) -> dict[str, Any]:
     """Return a candidate in the units of files."""
-    outputs = {o.file_key: _plain(candidate.outputs.get(o.name), o.scale) for o in known_outputs(done)}
+    outputs = {o.key: _plain(candidate.outputs.get(o.name), o.scale) for o in known_outputs(done)}
     return {
         "number": candidate.number,
         "choices": choices_table(candidate.choices),
@@ -89,13 +91,13 @@ def candidate_table(done: Design, candidate: Candidate) -> dict[str, Any]:
         "intervals": candidate.intervals,
         "residual": _plain(candidate.step.residual if candidate.step else None),
         "warnings": list(candidate.warnings),
-        "solve_time_s": candidate.solve_time,
+        columns.OUTPUTS["solve_time"].key: candidate.solve_time,
     }
 
 
 def known_outputs(done: Design) -> list[Output]:
     """Return the outputs that candidates of a study have."""
-    return [o for o in OUTPUTS.values() if o.kind != "force" or done.task.needs_force]
+    return [o for o in OUTPUTS.values() if o.name != FORCE or done.task.needs_force]
 
 
 def choices_table(choices: Mapping[str, Any]) -> dict[str, Any]:
@@ -107,7 +109,7 @@ def choices_table(choices: Mapping[str, Any]) -> dict[str, Any]:
         elif isinstance(value, Robot):
             table["robot.name"] = value.name
         elif name == "pressure":
-            table["pressure_bar"] = tidy(value, BAR)
+            table[OUTPUTS[name].key] = tidy(value, BAR)
         else:
             key, scale = _FILE[name]
             table[key] = int(value) if scale is None else tidy(value, scale)
@@ -119,26 +121,27 @@ def active_table(done: Design, active: Active) -> dict[str, Any]:
     scale, unit = _unit_of(active.name)
     objective = done.task.objective
     return {
-        "limit": OUTPUTS[active.name].file_key if active.name in OUTPUTS else active.name,
+        "limit": OUTPUTS[active.name].key if active.name in OUTPUTS else active.name,
         "side": active.side,
         "value": _plain(active.limit, scale),
         "unit": unit,
         "gain_per_unit": None if not isfinite(active.limit) else _plain(active.rate * scale, objective.scale),
-        "gain_unit": objective.unit,
+        "gain_unit": objective.unit.label,
     }
 
 
 def _unit_of(name: str) -> tuple[float, str]:
     """Return the scale and the unit in which a limit is written."""
     if name in OUTPUTS:
-        return OUTPUTS[name].scale, OUTPUTS[name].unit
-    return (DEGREE, "deg") if name == "chamber_angle" else (MILLIMETRE, "mm")
+        return OUTPUTS[name].scale, OUTPUTS[name].unit.label
+    unit = DEG if name == "chamber_angle" else MM
+    return unit.scale, unit.label
 
 
 def design_csv(done: Design) -> str:
     """Return the candidates as CSV, a row each; cells of what is not known are empty."""
     keys = list(dict.fromkeys(key for c in done.candidates for key in choices_table(c.choices)))
-    outputs = [o.file_key for o in known_outputs(done)]
+    outputs = [o.key for o in known_outputs(done)]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(
@@ -188,8 +191,7 @@ def design_lines(done: Design) -> Group:
     table.add_column("status", no_wrap=True)
     columns = shown_outputs(done)
     for output in columns:
-        stem = output.file_key.removesuffix(f"_{output.unit}").replace("_", " ")
-        table.add_column(Text(f"{stem}\n[{output.unit}]"), justify="right", no_wrap=True)
+        table.add_column(Text(f"{output.label}\n[{output.unit}]"), justify="right", no_wrap=True)
     for c in done.candidates:
         cells = [_digits(c.outputs.get(o.name), o.scale) for o in columns]
         style = "bold green" if c is done.best else "" if c.is_feasible else "bright_black"
@@ -202,7 +204,7 @@ def shown_outputs(done: Design) -> list[Output]:
     """Return the outputs worth a column: the objective, pressure, angle, and what is required of a robot's doing."""
     task = done.task
     wanted = dict.fromkeys([task.objective.name, "pressure", "bending_angle", "stretch", *task.requirements])
-    return [OUTPUTS[name] for name in wanted if OUTPUTS[name].kind != "robot" or name == task.objective.name]
+    return [OUTPUTS[name] for name in wanted if OUTPUTS[name].group != "robot" or name == task.objective.name]
 
 
 def _notes(done: Design) -> Iterator[tuple[str, str]]:
@@ -217,8 +219,8 @@ def _notes(done: Design) -> Iterator[tuple[str, str]]:
         return
     objective = done.task.objective
     value = _digits(best.objective, objective.scale)
-    unit = "" if objective.unit == "1" else f" {objective.unit}"
-    yield f"best: {best.number} {label(done, best)}, {objective.file_key} {value}{unit}", "bold green"
+    unit = "" if objective.unit is ONE else f" {objective.unit}"
+    yield f"best: {best.number} {label(done, best)}, {objective.key} {value}{unit}", "bold green"
     chosen = {key: value for key, value in choices_table(best.choices).items() if not isinstance(value, str)}
     if chosen:
         yield "  " + ", ".join(f"{key} {value:.6g}" for key, value in chosen.items()), ""

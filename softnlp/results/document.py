@@ -20,9 +20,8 @@ from softnlp.model.inputs import (
     tidy,
 )
 from softnlp.nlp.solver import EquationResidual
-from softnlp.results.targets import target_values
 from softnlp.statics.step import Run, Step
-from softnlp.studies.fields import BLOCKED_FORCE, closure_of, document_fields, left_by_weights, solved_pose
+from softnlp.studies.fields import BLOCKED_FORCE, closure_of, document_outputs, left_by_weights, value
 
 
 def to_json(run: Run) -> dict[str, Any]:
@@ -67,15 +66,12 @@ def compact_json(text: str) -> str:
 
 
 def _step(run: Run, step: Step) -> dict[str, Any]:
-    pose = solved_pose(step)
     table: dict[str, Any] = {"pressure_bar": pressure_bar(step.pressure)}
     if step.time is not None:
         table["t_s"] = tidy(step.time)
     table["status"] = step.status.value
     table["message"] = step.message
-    table |= {name: _plain(value) for name, value in target_values(run, step).items()}
-    for field in document_fields(run):
-        table[field.name] = None if pose is None else _plain(field.of(step, pose))
+    table |= {output.key: _plain(value(output, step)) for output in document_outputs(run)}
     if run.study == BLOCKED_FORCE:
         table["closure"] = closure_of(run, step)
         if table["closure"] == "weighted":
@@ -97,12 +93,12 @@ def _lines(residuals: tuple[EquationResidual, ...]) -> list[dict[str, Any]]:
     ]
 
 
-def _plain(value: Any) -> Any:
+def _plain(found: Any) -> Any:
     """Return numbers and arrays as JSON has them: Python's own types, None for what is not finite."""
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and not isfinite(value):
+    if isinstance(found, np.ndarray | np.generic):
+        found = found.tolist()
+    if isinstance(found, list):
+        return [_plain(item) for item in found]
+    if isinstance(found, float) and not isfinite(found):
         return None
-    return value
+    return found

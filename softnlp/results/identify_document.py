@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.statistics import Statistics
-from softnlp.base.units import BAR, DEGREE, MEGAPASCAL, MILLIMETRE
+from softnlp.base.units import BAR, MEGAPASCAL
 from softnlp.model.inputs import loads_table, package_version, tidy
 from softnlp.model.materials import Material
 from softnlp.studies.free_constants import COEFFICIENTS, file_name
@@ -24,14 +25,6 @@ if TYPE_CHECKING:
     from softnlp.studies.identify_task import RobotTask, TensileTask
     from softnlp.studies.plausibility import Check
     from softnlp.studies.tensile import LawFit, TensileFit
-
-UNITS: Mapping[str, tuple[str, float]] = {
-    "tip_position": ("tip_position_mm", MILLIMETRE),
-    "bending_angle": ("bending_angle_deg", DEGREE),
-    "elongation": ("elongation_mm", MILLIMETRE),
-    "blocked_force": ("blocked_force_N", 1.0),
-}
-"""Key of each observable in files, and its unit there."""
 
 _TABLE_OF = {"stiffening": ("k_e", "k_b"), "corrections": ("k_a", "k_i", "phi"), "contact": ("k_c",)}
 
@@ -197,7 +190,7 @@ def robot_document(asked: Scenario, task: RobotTask, found: Identified) -> dict[
         "condition": number(found.uncertainty.condition),
         "weighted_rms": {"before": number(found.weighted_rms(False)), "after": number(found.weighted_rms())},
         "errors": {
-            when: {UNITS[key][0]: _misfit(m, UNITS[key][1]) for key, m in found.errors(after).items()}
+            when: {OUTPUTS[key].key: _misfit(m, OUTPUTS[key].scale) for key, m in found.errors(after).items()}
             for when, after in (("before", False), ("after", True))
         },
         "sigma": {d.label: _sigma(d) for d in found.data},
@@ -211,10 +204,10 @@ def robot_document(asked: Scenario, task: RobotTask, found: Identified) -> dict[
 def _sigma(data: Any) -> dict[str, float]:
     """Return the root mean square of the standard deviations that the residuals were divided by."""
     found = {}
-    for key, (file_key, unit) in UNITS.items():
+    for key in OBSERVABLES:
         used = data.sigma[:, column_slice(key)][np.isfinite(data.of(key))]
         if used.size:
-            found[file_key] = float(np.sqrt(np.mean(used**2)) / unit)
+            found[OUTPUTS[key].key] = float(OUTPUTS[key].shown(np.sqrt(np.mean(used**2))))
     return found
 
 
@@ -226,7 +219,7 @@ def _rows(found: Identified, k: int) -> list[dict[str, Any]]:
         row: dict[str, Any] = {"robot": data.label, "pressure_bar": [tidy(p, BAR) for p in P]}
         for when, values in (("measured", data.values), ("before", found.before[k]), ("after", found.after[k])):
             row[when] = {
-                UNITS[key][0]: _value(values[j, column_slice(key)] / UNITS[key][1])
+                OUTPUTS[key].key: _value(OUTPUTS[key].shown(values[j, column_slice(key)]))
                 for key in OBSERVABLES
                 if np.any(np.isfinite(data.values[j, column_slice(key)]))
             }
@@ -292,8 +285,8 @@ def identified_text(asked: Scenario, found: Identified) -> str:
 def robot_table_text(task: RobotTask, found: Identified) -> str:
     """Return the rows of the files with what the model says before and after, as CSV."""
     names, picks = [], []
-    for key, (file_key, unit) in UNITS.items():
-        parts = [file_key] if key != "tip_position" else ["x_mm", "y_mm", "z_mm"]
+    for key, entries in OBSERVABLES.items():
+        parts, unit = [OUTPUTS[entry].measured for entry in entries], OUTPUTS[key].scale
         where = range(column_slice(key).start, column_slice(key).stop)
         for part, column in zip(parts, where, strict=True):
             if any(np.any(d.measured[:, column]) for d in found.data):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.base.units import BAR, DEGREE, MILLIMETRE, NEWTON_MILLIMETRE
+from softnlp.base.columns import BAR_, DEG, MM, NMM, N
 from softnlp.model.inputs import loads_table, package_version, pressure_bar
 from softnlp.studies.derivatives import entries_of
 from softnlp.studies.ellipsoids import Ellipsoid
@@ -19,12 +19,7 @@ from softnlp.studies.report import SensitivityReport
 
 Array = NDArray[np.float64]
 
-SHOWN: Mapping[str, tuple[str, float]] = {
-    "m": ("mm", MILLIMETRE),
-    "rad": ("deg", DEGREE),
-    "Pa": ("bar", BAR),
-    "N m": ("Nmm", NEWTON_MILLIMETRE),
-}
+SHOWN: Mapping[str, tuple[str, float]] = {unit.si: (unit.suffix, unit.scale) for unit in (MM, DEG, BAR_, NMM)}
 """The unit in which a unit of SI is shown, and its size."""
 
 Rows = tuple[str, Sequence[str], list[list[str]]]
@@ -113,10 +108,10 @@ def table_rows(report: SensitivityReport) -> Iterator[Rows]:
         rows,
     )
     ellipsoids = [
-        ("moved by pressure", report.manipulability.translation, "mm/bar", MILLIMETRE / BAR),
-        ("turned by pressure", report.manipulability.rotation, "deg/bar", DEGREE / BAR),
-        ("compliance", report.compliance, "mm/N", MILLIMETRE),
-        ("stiffness", report.stiffness, "N/mm", 1 / MILLIMETRE),
+        ("moved by pressure", report.manipulability.translation, f"{MM}/{BAR_}", MM.scale / BAR_.scale),
+        ("turned by pressure", report.manipulability.rotation, f"{DEG}/{BAR_}", DEG.scale / BAR_.scale),
+        ("compliance", report.compliance, f"{MM}/{N}", MM.scale),
+        ("stiffness", report.stiffness, f"{N}/{MM}", 1 / MM.scale),
     ]
     rows = [
         [name, unit, f"{size / scale:.4g}", *(f"{x + 0.0:.3f}" for x in np.round(e.axes[:, k], 9))]

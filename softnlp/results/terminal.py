@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from softnlp.base.units import BAR, DEGREE, MILLIMETRE
+import numpy as np
+
+from softnlp.base.columns import OUTPUTS, TABLES, Output, written
+from softnlp.base.units import BAR
 from softnlp.model.gravity import gravity_lines
-from softnlp.results.targets import INVERSE
 from softnlp.statics.step import Run, Step
-from softnlp.studies.fields import BLOCKED_FORCE, solved_pose
+from softnlp.studies.fields import BLOCKED_FORCE, solved_pose, value
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -40,10 +42,9 @@ def table_lines(run: Run) -> Group:
     table.add_column("status", overflow="fold", min_width=6)
     blocked = run.study == BLOCKED_FORCE
     moving = blocked and _wall_moves(run)
-    numbers, names = _KINDS.get(run.study, (_numbers, _HEADERS))
-    titles = list(names)
+    titles = [heading for output in _shown(run.study) for heading in output.headings]
     if moving:  # the offset tells what the gap does
-        titles[:2] = ["offset\n[mm]", titles[0]]
+        titles[:2] = [titles[1].replace("gap", "offset"), titles[0]]
     for header in titles:
         table.add_column(Text(header), justify="right", no_wrap=True)
 
@@ -55,7 +56,7 @@ def table_lines(run: Run) -> Group:
             cells.append(NONE if step.time is None else format(step.time, times))
         cells += [format(p / BAR, pressures) for p in step.pressure]
         style = "" if step.status.has_solution else "red"
-        found = numbers(step)
+        found = _numbers(run.study, step)
         if moving:
             found[:2] = [_offset(run, step), found[0]]
         table.add_row(*cells, Text(step.status.value, style), *found)
@@ -65,60 +66,30 @@ def table_lines(run: Run) -> Group:
 
 
 _STABLE = {True: "yes", False: "no", None: "undef."}
-_TIP = ("bending\n[deg]", "tip x\n[mm]", "y\n[mm]", "z\n[mm]")
-_HEADERS: tuple[str, ...] = (*_TIP, "stretch", "stable", "resid.", "error", "time\n[s]")
-_BLOCKED_HEADERS = ("force\n[N]", "gap\n[mm]", *_TIP, "resid.")
 
 
-def _numbers(step: Step) -> list[str]:
-    """Return what follows the status; residual and time are known of failed steps as well."""
-    pose = solved_pose(step)
-    residual = _short(step.residual)
-    if pose is None:
-        return [*[NONE] * 6, residual, NONE, f"{step.solve_time:.3g}"]
-    return [
-        f"{pose.bending_angle / DEGREE:.2f}",
-        *(_millimetres(v) for v in pose.tip_position),
-        f"{pose.stretch:.3f}",
-        _STABLE[pose.stable],
-        residual,
-        _short(step.discretisation_error),
-        f"{step.solve_time:.3f}",
-    ]
+def _numbers(study: str, step: Step) -> list[str]:
+    """Return what follows the status: dashes where there is no solution, except for what is known of failed steps.
 
-
-def _blocked_numbers(step: Step) -> list[str]:
-    """Return what follows the status of a blocked force; dashes where there is no wall.
-
-    What is not stable is a warning below the table, so that the table fits 80 columns.
+    What is not stable in a blocked force is a warning below the table, so that the table fits 80 columns.
     """
-    plain = _numbers(step)
-    wall = [NONE, NONE]
-    if step.contact is not None and step.status.has_solution:
-        gap = _millimetres(step.contact.gap) if step.contact.normal.any() else NONE
-        wall = [f"{step.contact.force:.4f}", gap]
-    return [*wall, *plain[:4], plain[6]]
+    cells: list[str] = []
+    for output in _shown(study):
+        if output.name == "solve_time" and solved_pose(step) is None:
+            cells.append(f"{step.solve_time:.3g}")
+        elif output.name == "stable":
+            pose = solved_pose(step)
+            cells.append(NONE if pose is None else _STABLE[pose.stable])
+        else:
+            found = value(output, step)
+            entries = [found] * len(output.headings) if found is None else np.ravel(found).tolist()
+            cells += [written(entry, output.form) for entry in entries]
+    return cells
 
 
-_INVERSE_HEADERS = ("left\n[mm]", "off\n[deg]", *_TIP, "stable", "resid.", "time\n[s]")
-
-
-def _inverse_numbers(step: Step) -> list[str]:
-    """Return what follows the status of a target; what is left of it and the nearest tip are known out of reach too."""
-    plain, aimed = _numbers(step), step.aimed
-    left, off = NONE, NONE
-    if aimed is not None:
-        left = NONE if aimed.distance is None else f"{aimed.distance / MILLIMETRE:.4f}"
-        off = NONE if aimed.angle is None else f"{aimed.angle / DEGREE:.4f}"
-        if aimed.tip_position is not None:
-            plain[1:4] = [_millimetres(v) for v in aimed.tip_position]
-    return [left, off, *plain[:4], plain[5], plain[6], plain[8]]
-
-
-_KINDS: Mapping[str, tuple[Callable[[Step], list[str]], tuple[str, ...]]] = {
-    BLOCKED_FORCE: (_blocked_numbers, _BLOCKED_HEADERS),
-    INVERSE: (_inverse_numbers, _INVERSE_HEADERS),
-}
+def _shown(study: str) -> list[Output]:
+    """Return the outputs that the table of a study shows."""
+    return [OUTPUTS[name] for name in TABLES.get(study, TABLES["forward"])]
 
 
 def _wall_moves(run: Run) -> bool:
@@ -131,20 +102,23 @@ def _offset(run: Run, step: Step) -> str:
     """Return where the wall stands along x, or for one given by a point how far it was moved the way it pushes."""
     if step.contact is None:
         return NONE
+    gap = OUTPUTS["gap"]
     given = run.contact.wall_point if run.contact is not None else None
     if given is None:
-        return _millimetres(float(step.contact.wall_point[0]))
-    return _millimetres(float(step.contact.normal @ (step.contact.wall_point - given)))
+        moved = float(step.contact.wall_point[0])
+    else:
+        moved = float(step.contact.normal @ (step.contact.wall_point - given))
+    return written(gap.shown(moved), gap.form)
 
 
 def _notes(run: Run) -> Iterator[tuple[str, str]]:
     """Yield (line, style) of gravity, failures and warnings, neighbouring steps with the same words on one line."""
     yield from ((line, "") for line in gravity_lines(run.loads.gravity))
     failed = [(k, f"{s.status.value}: {s.message}") for k, s in enumerate(run.steps, start=1) if s in run.failed]
-    warned = [(k, f"warning: {text}") for k, s in enumerate(run.steps, start=1) for text in s.warnings]
+    warned = [(k, f"warning: {words}") for k, s in enumerate(run.steps, start=1) for words in s.warnings]
     yield from ((line, "red") for line in _grouped(failed))
-    yield from ((f"step {k} {text}", "") for k, text in _sensitivities(run))
-    yield from ((f"warning: {text}", "yellow") for text in run.warnings)
+    yield from ((f"step {k} {words}", "") for k, words in _sensitivities(run))
+    yield from ((f"warning: {words}", "yellow") for words in run.warnings)
     yield from ((line, "yellow") for line in _grouped(warned))
 
 
@@ -172,15 +146,6 @@ def _grouped(notes: Sequence[tuple[int, str]]) -> Iterator[str]:
             yield f"step {first} {text}"
         else:
             yield f"steps {first}-{last} {text}" + (f" (numbers of step {first})" if last_text != text else "")
-
-
-def _millimetres(value: float) -> str:
-    text = f"{value / MILLIMETRE:.2f}"
-    return text.removeprefix("-") if float(text) == 0 else text
-
-
-def _short(value: float | None) -> str:
-    return NONE if value is None or value != value else f"{value:.0e}"
 
 
 def _alike(values: Sequence[float], most: int) -> str:

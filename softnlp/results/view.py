@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.status import Status
-from softnlp.base.units import BAR, DEGREE, MILLIMETRE
 from softnlp.model.inputs import loads_of_table, robot_of_table
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
-from softnlp.results.targets import INVERSE
-from softnlp.statics.step import Contact, Run, SectionRadii, stable_flag
-from softnlp.studies.fields import BLOCKED_FORCE, solved_pose
+from softnlp.statics.step import Run, SectionRadii
+from softnlp.studies.fields import BLOCKED_FORCE, INVERSE, closure_of, series, si_value, solved_pose
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -110,13 +109,19 @@ class RunView:
 
 def view_of_run(run: Run) -> RunView:
     """Return the view of a run."""
-    poses = [solved_pose(step) for step in run.steps]
+    sizes = {"axis": 3}
     times = [float("nan") if step.time is None else step.time for step in run.steps]
 
-    def series(name: str) -> Array:
-        return np.array([float("nan") if pose is None else getattr(pose, name) for pose in poses], dtype=float)
+    def body(k: int, prefix: str) -> Body | None:
+        pose, contact = solved_pose(run.steps[k]), run.steps[k].contact
+        if prefix and pose is not None:
+            pose = None if contact is None else contact.free
+        return None if pose is None else Body(pose.shape.position, pose.shape.rotation, pose.radii)
 
-    return RunView(
+    return _view(
+        lambda name: series(OUTPUTS[name], run.steps, sizes, si_value),
+        body,
+        [closure_of(run, step) for step in run.steps],
         title=run.title,
         study=run.study,
         material=_material_label(run.material.name, run.material.law.name),
@@ -126,55 +131,6 @@ def view_of_run(run: Run) -> RunView:
         status=tuple(step.status for step in run.steps),
         pressure=np.array([step.pressure for step in run.steps], dtype=float),
         time=None if np.all(np.isnan(times)) else np.array(times),
-        stable=np.array([stable_flag(None if pose is None else pose.stable) for pose in poses], np.int8),
-        stretch=series("stretch"),
-        bending_angle=series("bending_angle"),
-        backbone_length=series("backbone_length"),
-        bodies=tuple(None if p is None else Body(p.shape.position, p.shape.rotation, p.radii) for p in poses),
-        contact=_contact_of_run(run) if run.study == BLOCKED_FORCE else None,
-        targets=_targets_of_run(run) if run.study == INVERSE else None,
-    )
-
-
-def _targets_of_run(run: Run) -> TargetView:
-    """Return the targets of a run."""
-
-    def series(name: str, size: tuple[int, ...] = ()) -> Array:
-        nothing = np.full(size, np.nan)
-        values = [None if step.aimed is None else getattr(step.aimed, name) for step in run.steps]
-        return np.array([nothing if value is None else value for value in values], dtype=float)
-
-    return TargetView(
-        series("position", (3,)),
-        series("direction", (3,)),
-        series("distance"),
-        series("angle"),
-        series("tip_position", (3,)),
-    )
-
-
-def _contact_of_run(run: Run) -> ContactView | None:
-    """Return the contact of a run; None where no solved step has a wall."""
-    contacts = [step.contact if solved_pose(step) is not None else None for step in run.steps]
-    known = [contact for contact in contacts if contact is not None]
-    if not known:
-        return None
-
-    def series(of: Callable[[Contact], Any], size: tuple[int, ...] = ()) -> Array:
-        nothing = np.full(size, np.nan)
-        return np.array([nothing if c is None else of(c) for c in contacts], dtype=float)
-
-    return ContactView(
-        closure=known[0].closure,
-        force=series(lambda c: c.force),
-        gap=series(lambda c: c.gap if c.normal.any() else np.nan),
-        wall_point=series(lambda c: c.wall_point if c.normal.any() else np.full(3, np.nan), (3,)),
-        normal=series(lambda c: c.normal if c.normal.any() else np.full(3, np.nan), (3,)),
-        tip_cap=known[0].tip_cap,
-        free_bending_angle=series(lambda c: c.free.bending_angle),
-        free=tuple(
-            None if c is None else Body(c.free.shape.position, c.free.shape.rotation, c.free.radii) for c in contacts
-        ),
     )
 
 
@@ -189,67 +145,59 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
     attributes = dataset.attrs
     material = json.loads(attributes["material"])
     values = {str(name): variable.values for name, variable in dataset.variables.items()}
-    steps = range(dataset.sizes["step"])
-    status = tuple(Status(str(word)) for word in values["status"])
-    return RunView(
+
+    def number(name: str) -> Any:
+        found, scale = values[OUTPUTS[name].key], OUTPUTS[name].scale
+        return found if scale == 1.0 else found * scale
+
+    def body(k: int, prefix: str) -> Body | None:
+        position = number(f"{prefix}position")[k]
+        points = np.isfinite(position).all(axis=1)
+        if not points.any():
+            return None
+        radii = {field.name: float(number(f"{field.name}_radius")[k]) for field in fields(SectionRadii)}
+        return Body(position[points], number(f"{prefix}rotation")[k][points], SectionRadii(**radii))
+
+    return _view(
+        number,
+        body,
+        values.get("closure", ()),
         title=str(attributes["title"]),
         study=str(attributes["study"]),
         material=_material_label(material["name"], material["model"]),
         conventions=str(attributes["conventions"]),
         robot=robot_of_table(json.loads(attributes["robot"])),
         loads=loads_of_table(json.loads(attributes["loads"])),
-        status=status,
-        pressure=values["pressure_bar"] * BAR,
-        time=values.get("t_s"),
-        stable=values["stable"],
-        stretch=values["stretch"],
-        bending_angle=values["bending_angle_deg"] * DEGREE,
-        backbone_length=values["backbone_length_mm"] * MILLIMETRE,
-        bodies=tuple(_body(values, k) if status[k].has_solution else None for k in steps),
-        contact=_contact_of_values(values) if str(attributes["study"]) == BLOCKED_FORCE else None,
-        targets=_targets_of_values(values) if str(attributes["study"]) == INVERSE else None,
+        status=tuple(Status(str(word)) for word in values["status"]),
+        pressure=number("pressure"),
+        time=values.get(OUTPUTS["t"].key),
     )
 
 
-def _targets_of_values(values: Mapping[str, Any]) -> TargetView:
-    """Return the targets of a dataset."""
-    return TargetView(
-        values["target_mm"] * MILLIMETRE,
-        values["target_direction"],
-        values["distance_mm"] * MILLIMETRE,
-        values["direction_error_deg"] * DEGREE,
-        values["nearest_mm"] * MILLIMETRE,
+def _view(number: Callable[[str], Any], body: Callable[[int, str], Body | None], closures: Any, **head: Any) -> RunView:
+    """Return a view. number : an output of every step by name, SI. body : of a step, with "free_" its free shape."""
+    solved = [status.has_solution for status in head["status"]]
+    contact = targets = None
+    if head["study"] == INVERSE:
+        targets = TargetView(*map(number, ("target", "target_direction", "distance", "direction_error", "nearest")))
+    if head["study"] == BLOCKED_FORCE and (known := np.flatnonzero(np.isfinite(number("blocked_force")))).size:
+        contact = ContactView(
+            closure=str(closures[known[0]]),
+            force=number("blocked_force"),
+            gap=number("gap"),
+            wall_point=number("wall_point"),
+            normal=number("wall_normal"),
+            tip_cap=float(number("tip_cap")[known[0]]),
+            free_bending_angle=number("free_bending_angle"),
+            free=tuple(body(k, "free_") if k in known else None for k in range(len(solved))),
+        )
+    return RunView(
+        **head,
+        **{name: number(name) for name in ("stable", "stretch", "bending_angle", "backbone_length")},
+        bodies=tuple(body(k, "") if solution else None for k, solution in enumerate(solved)),
+        contact=contact,
+        targets=targets,
     )
-
-
-def _contact_of_values(values: Mapping[str, Any]) -> ContactView | None:
-    """Return the contact of a dataset; None where no solved step has a wall."""
-    force = values["blocked_force_N"]
-    known = np.flatnonzero(np.isfinite(force))
-    if not known.size:
-        return None
-    return ContactView(
-        closure=str(values["closure"][known[0]]),
-        force=force,
-        gap=values["gap_mm"] * MILLIMETRE,
-        wall_point=values["wall_point_mm"] * MILLIMETRE,
-        normal=values["wall_normal"],
-        tip_cap=float(values["tip_cap_mm"][known[0]]) * MILLIMETRE,
-        free_bending_angle=values["free_bending_angle_deg"] * DEGREE,
-        free=tuple(_body(values, k, "free_") if np.isfinite(f) else None for k, f in enumerate(force)),
-    )
-
-
-def _body(values: Mapping[str, Any], k: int, shape: str = "") -> Body | None:
-    position = values[f"{shape}position_mm"][k]
-    points = np.isfinite(position).all(axis=1)
-    if not points.any():
-        return None
-    radii = {
-        name: float(values[f"{name}_radius_mm"][k]) * MILLIMETRE
-        for name in ("outer", "lumen", "chamber_circle", "chamber", "bore")
-    }
-    return Body(position[points] * MILLIMETRE, values[f"{shape}rotation"][k][points], SectionRadii(**radii))
 
 
 def _material_label(name: str, law: str) -> str:

@@ -12,16 +12,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import TIME_COLUMN, Columns, read_columns
 from softnlp.base.errors import InputError, listed, nearest
 from softnlp.base.ranges import noise_note
 from softnlp.base.reading import choices, read_text, shown
-from softnlp.base.units import DEGREE, MILLIMETRE
 from softnlp.model.contact_settings import CLOSURES, ContactSettings, ContactTask
 from softnlp.model.conventions import CONVENTIONS, Coefficients, Conventions
 from softnlp.model.materials import Material, load_materials
 from softnlp.model.robot import Robot
-from softnlp.scenario.measured_rows import SCALARS, TIP_COLUMNS, RobotRows, rows_by_robot
+from softnlp.scenario.measured_rows import SCALARS, RobotRows, rows_by_robot
 from softnlp.scenario.read import Scenario
 from softnlp.studies.compare import SHAPES, compare
 from softnlp.studies.comparison import Comparison
@@ -32,16 +32,11 @@ from softnlp.sweep.task import WorkspaceTask
 Array = NDArray[np.float64]
 
 STUDIES = ("forward", "blocked-force", "workspace")
-TILT_COLUMN, BACKBONE_COLUMN = "tilt_deg", "backbone_length_mm"
-_FORCE_COLUMN = SCALARS["blocked_force"][0]
-MEASURED_COLUMNS = (*TIP_COLUMNS, *(name for name, _ in SCALARS.values()), TILT_COLUMN, BACKBONE_COLUMN)
-ALIASES: Mapping[str, str] = {
-    **{f"tip_{name}": name for name in TIP_COLUMNS},
-    **{f"tip_position_{name}": name for name in TIP_COLUMNS},
-    "bending_deg": "bending_angle_deg",
-    "tip_tilt_deg": TILT_COLUMN,
-    "force_N": _FORCE_COLUMN,
-}
+_TILT, _BACKBONE, _ELONGATION = (OUTPUTS[name] for name in ("tilt", "backbone_length", "elongation"))
+_FORCE_COLUMN = SCALARS["blocked_force"].measured
+_COMPARED = (*(OUTPUTS[f"tip_{x}"] for x in "xyz"), *SCALARS.values(), _TILT, _BACKBONE)
+MEASURED_COLUMNS = tuple(output.measured for output in _COMPARED)
+ALIASES: Mapping[str, str] = {other: output.measured for output in _COMPARED for other in output.others_measured}
 """Other names of columns, as results and people spell them."""
 ALL = "all"
 _NEAR = 0.85
@@ -209,20 +204,18 @@ def _measured(scenario: Scenario, columns: Columns) -> tuple[tuple[RobotRows, ..
     measurements = []
     for of_robot in rows:
         seen = of_robot.scalars()
-        if SCALARS["elongation"][0] not in columns:
-            backbone = of_robot.column(BACKBONE_COLUMN) * MILLIMETRE
+        if _ELONGATION.measured not in columns:
+            backbone = of_robot.column(_BACKBONE.measured) * _BACKBONE.scale
             seen["elongation"] = backbone - float(of_robot.robot.length)
         if scenario.contact is None:
             seen["blocked_force"] = np.full(len(of_robot.places), np.nan)
-        tip, tilt = of_robot.tip_position(), of_robot.column(TILT_COLUMN) * DEGREE
+        tip, tilt = of_robot.tip_position(), of_robot.column(_TILT.measured) * _TILT.scale
         measurements.append(
             Measurements(
                 of_robot.robot,
                 of_robot.pressure(),
                 tip_position=tip,
-                bending_angle=seen["bending_angle"],
-                elongation=seen["elongation"],
-                blocked_force=seen["blocked_force"],
+                **seen,
                 tilt=tilt,
                 label=of_robot.label,
             )

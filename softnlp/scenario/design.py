@@ -17,7 +17,7 @@ from softnlp.scenario.schema import RobotTable, ScenarioFile
 from softnlp.scenario.schema_design import ActuationTable, DesignFile, MaterialChoices, RequirementsTable, RobotChoices
 from softnlp.studies.design_task import OUTPUTS, DesignTask, Limits, PressureSteps, Range, Setting, check_task
 
-_BY_FILE_KEY = {output.file_key: output for output in OUTPUTS.values()}
+_BY_FILE_KEY = {output.key: output for output in OUTPUTS.values()}
 _OTHER_STUDY = ("mode", "offsets_mm", "offset_ramp", "target_force_N")
 
 
@@ -142,7 +142,7 @@ def _in_file_words(error: InputError) -> InputError:
         key = next((d.file_key for d in DIMENSIONS if d.field == name), name)
         return InputError(error.message, table="choices", key=f"robot.{key}" if name else None)
     if head == "requirements":
-        return InputError(error.message, table="requirements", key=OUTPUTS[name].file_key)
+        return InputError(error.message, table="requirements", key=OUTPUTS[name].key)
     if head == "allow":
         return InputError(error.message, table="robot", key="allow")
     if head == "closure":

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import Columns, read_columns
 from softnlp.base.errors import InputError, listed, nearest
 from softnlp.base.ranges import noise_note
@@ -19,20 +20,17 @@ from softnlp.model.conventions import Coefficients
 from softnlp.model.laws import LAWS, Law
 from softnlp.model.materials import Material
 from softnlp.model.robot import Robot
-from softnlp.scenario.measured_rows import SCALARS, RobotRows, rows_by_robot
+from softnlp.scenario.measured_rows import RobotRows, rows_by_robot
 from softnlp.scenario.schema import ContactTable, RobotTable
 from softnlp.scenario.schema_identify import IdentifyFile, MeasurementsTable, SigmaTable, TensileTable
 from softnlp.studies.free_constants import free_constants
 from softnlp.studies.identify_task import RobotTask, TensileTask
-from softnlp.studies.measurements import Measurements, checked_measurements
+from softnlp.studies.measurements import OBSERVABLES, Measurements, checked_measurements
 from softnlp.studies.plausibility import Check, area_check
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
 RobotMaker = Callable[[RobotTable], Robot]
-
-FILE_KEYS: Mapping[str, tuple[str, float]] = {"tip_position": ("tip_position_mm", MILLIMETRE), **SCALARS}
-"""What an observable is called in files, and its unit there."""
 
 UNUSED_BY_TENSILE = ("robots", "sigma", "contact", "gravity", "tip_load", "stiffening", "corrections", "solver")
 _UNUSED_CONTACT = ("offsets_mm", "offset_ramp", "target_force_N")
@@ -253,7 +251,8 @@ def _measurements(rows: RobotRows, sigmas: SigmaTable) -> Measurements:
     seen = rows.scalars()
     count = len(pressure)
     sigma: dict[str, Array] = {}
-    for key, (name, unit) in FILE_KEYS.items():
+    for key in OBSERVABLES:
+        name, unit = OUTPUTS[key].key, OUTPUTS[key].scale
         measured = seen.get(key, np.full(count, np.nan))
         per_row = rows.column(f"sigma_{name}") * unit
         percent = getattr(sigmas, f"{key}_percent", None)

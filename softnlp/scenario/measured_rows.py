@@ -4,26 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import OUTPUTS, Output
 from softnlp.base.csv_columns import Columns
 from softnlp.base.errors import nearest
 from softnlp.base.ranges import PRESSURE, without_noise
 from softnlp.base.reading import one_line, shown
-from softnlp.base.units import BAR, DEGREE, MILLIMETRE
+from softnlp.base.units import BAR
 from softnlp.model.robot import ROBOTS, Robot
 
 Array = NDArray[np.float64]
 
-TIP_COLUMNS = ("x_mm", "y_mm", "z_mm")
-SCALARS: Mapping[str, tuple[str, float]] = {
-    "bending_angle": ("bending_angle_deg", DEGREE),
-    "elongation": ("elongation_mm", MILLIMETRE),
-    "blocked_force": ("blocked_force_N", 1.0),
-}
-"""The column of each number that is measured beside the tip, and its unit there."""
+TIP_COLUMNS = tuple(OUTPUTS[f"tip_{x}"].measured for x in "xyz")
+SCALARS: Mapping[str, Output] = {name: OUTPUTS[name] for name in ("bending_angle", "elongation", "blocked_force")}
+"""What is measured beside the tip."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,11 +79,11 @@ class RobotRows:
 
     def tip_position(self) -> Array:
         """Return the tips (rows, 3) [m]."""
-        return np.column_stack([self.column(name) for name in TIP_COLUMNS]) * MILLIMETRE
+        return np.column_stack([self.column(name) for name in TIP_COLUMNS]) * OUTPUTS["tip_position"].scale
 
-    def scalars(self) -> dict[str, Array]:
+    def scalars(self) -> dict[str, Any]:
         """Return each of `SCALARS` (rows,), SI."""
-        return {key: self.column(name) * unit for key, (name, unit) in SCALARS.items()}
+        return {name: self.column(output.measured) * output.scale for name, output in SCALARS.items()}
 
 
 def rows_by_robot(

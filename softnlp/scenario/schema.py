@@ -7,6 +7,7 @@ checked in `scenario` and `pressures`.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import partial
 from math import hypot
 from typing import Annotated, Any, Literal
@@ -101,6 +102,12 @@ class Table(BaseModel):
     """A table of the file: no unknown key, no conversion of types (but a whole number is a number), no nan or inf."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+
+def optional_keys(kind: Any, keys: Iterable[str]) -> Any:
+    """Return a table whose keys may each be left out and are all of one kind."""
+    fields: dict[str, Any] = dict.fromkeys(keys, (kind | None, None))
+    return create_model("OptionalKeys", __base__=Table, **fields)
 
 
 class RobotTable(Table):

@@ -8,7 +8,8 @@ from typing import Annotated, Any
 from pydantic import Field, PlainValidator
 
 from softnlp.base.reading import shown
-from softnlp.scenario.schema import ContactTable, Count, Label, ScenarioFile, Table, wrong
+from softnlp.scenario.schema import ContactTable, Count, Label, ScenarioFile, Table, optional_keys, wrong
+from softnlp.studies.design_task import OUTPUTS
 
 _RANGE = "{ from = 1.0, to = 2.0 }"
 _STEPS = "{ step = 0.2, to = 3.0 }"
@@ -112,28 +113,8 @@ class LimitsTable(Table):
     at_most: float | None = None
 
 
-class RequirementsTable(Table):
+class RequirementsTable(optional_keys(LimitsTable, (output.key for output in OUTPUTS.values()))):  # type: ignore[misc]
     """[requirements]: the names of `softnlp.studies.design_task.OUTPUTS` as they are in files."""
-
-    bending_angle_deg: LimitsTable | None = None
-    blocked_force_N: LimitsTable | None = None
-    stretch: LimitsTable | None = None
-    elongation_mm: LimitsTable | None = None
-    tip_x_mm: LimitsTable | None = None
-    tip_y_mm: LimitsTable | None = None
-    tip_z_mm: LimitsTable | None = None
-    tip_deflection_mm: LimitsTable | None = None
-    chamber_gap_mm: LimitsTable | None = None
-    pressure_bar: LimitsTable | None = None
-    outer_diameter_mm: LimitsTable | None = None
-    lumen_diameter_mm: LimitsTable | None = None
-    chamber_circle_diameter_mm: LimitsTable | None = None
-    chamber_diameter_mm: LimitsTable | None = None
-    chamber_wall_mm: LimitsTable | None = None
-    outer_wall_mm: LimitsTable | None = None
-    inner_wall_mm: LimitsTable | None = None
-    wall_mm: LimitsTable | None = None
-    length_mm: LimitsTable | None = None
 
 
 class ObjectiveTable(Table):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
 from pydantic import Field
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.scenario.schema import (
     ContactTable,
     FileName,
@@ -15,7 +17,9 @@ from softnlp.scenario.schema import (
     RobotTable,
     ScenarioFile,
     Table,
+    optional_keys,
 )
+from softnlp.studies.measurements import OBSERVABLES
 
 Files = Annotated[list[FileName], Field(min_length=1)]
 
@@ -47,16 +51,15 @@ class MeasurementsTable(Table):
     bounds: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(default_factory=dict)
 
 
-class SigmaTable(Table):
-    """[sigma]: the standard deviation of each observable, absolute or in percent of each number."""
+def _sigma_keys() -> Iterator[str]:
+    for name in OBSERVABLES:
+        yield OUTPUTS[name].key
+        if name != "tip_position":
+            yield f"{name}_percent"
 
-    tip_position_mm: Positive | None = None
-    bending_angle_deg: Positive | None = None
-    bending_angle_percent: Positive | None = None
-    elongation_mm: Positive | None = None
-    elongation_percent: Positive | None = None
-    blocked_force_N: Positive | None = None
-    blocked_force_percent: Positive | None = None
+
+class SigmaTable(optional_keys(Positive, _sigma_keys())):  # type: ignore[misc]
+    """[sigma]: the standard deviation of each observable, absolute or in percent of each number."""
 
 
 class IdentifyFile(ScenarioFile):

@@ -70,7 +70,6 @@ STABLE_FLAGS = {"undefined": -1, "unstable": 0, "stable": 1}
 """What files of numbers hold for `Pose.stable`."""
 SELF_INTERSECTING_FLAGS = {"not_solved": -1, "no": 0, "self_intersecting": 1}
 """What files of numbers hold for `Fit.self_intersecting`."""
-STABLE_MEANING = "no conjugate point on the rod; undefined under a dead tip moment and without a solution"
 
 
 def stable_flag(stable: bool | None) -> int:
@@ -192,6 +191,16 @@ class Contact:
     length_error: float
     weighted: tuple[EquationResidual, ...] = ()
     sensitivity: tuple[WeightSensitivity, ...] = ()
+
+    @property
+    def wall(self) -> Contact | None:
+        """Itself; None where the chambers alone are constrained, whose contact has no normal."""
+        return self if self.normal.any() else None
+
+    @property
+    def elasticities(self) -> dict[str, float]:
+        """The elasticity of the force to each weight, by its name."""
+        return {line.weight: line.elasticity for line in self.sensitivity}
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from softnlp.base.statistics import Statistics, statistics
 from softnlp.model.contact_settings import ContactSettings
-from softnlp.studies.observed import NUMBERS, OBSERVABLES, Observed, differences
+from softnlp.studies.observed import NUMBERS, OBSERVABLES, OF_LENGTH, Observed, differences
 from softnlp.studies.simulated import Solved
 from softnlp.studies.variants import Variant, labels
 
@@ -193,7 +193,7 @@ class Comparison:
 
     def _size(self, name: str) -> float:
         """Return the root mean square of what errors are compared with, over all that was measured."""
-        if OBSERVABLES[name].of_length:
+        if name in OF_LENGTH:
             sizes = [np.full(self.measured(name, k), float(o.robot.length)) for k, o in enumerate(self.observed)]
         else:
             sizes = [o.values[np.isfinite(self._measured(name, o)), NUMBERS.index(name)] for o in self.observed]

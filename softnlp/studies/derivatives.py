@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import DEG, OUTPUTS
 from softnlp.base.errors import InputError, nearest
 from softnlp.base.quantity import Quantity
 from softnlp.model.rod import RodSection
@@ -23,14 +24,11 @@ from softnlp.studies.force_inversion import joint_engine
 Array = NDArray[np.float64]
 
 UNITS: Mapping[str, str] = {
-    "tip_position": "m",
-    "tip_rotation": "rad",
-    "bending_angle": "rad",
-    "backbone_length": "m",
-    "elongation": "m",
-    "stretch": "1",
-    "chamber_lengths": "m",
-    "blocked_force": "N",
+    "tip_position": OUTPUTS["tip_position"].unit.si,
+    "tip_rotation": DEG.si,
+    **{name: OUTPUTS[name].unit.si for name in ("bending_angle", "backbone_length", "elongation", "stretch")},
+    "chamber_lengths": OUTPUTS["chamber_length"].unit.si,
+    "blocked_force": OUTPUTS["blocked_force"].unit.si,
 }
 """Every output that has derivatives, and its unit. `tip_rotation` is a rotation vector in the world frame,
 `elongation` the backbone's length less the robot's; `blocked_force` needs a wall."""

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import ONE, Output
 from softnlp.base.errors import RobotError
 from softnlp.base.status import Status
 from softnlp.model.quantities import Model
@@ -23,7 +24,7 @@ from softnlp.statics.pose_grid import Solved
 from softnlp.statics.step import Pose, Step
 from softnlp.statics.unloaded import unloaded_case
 from softnlp.statics.wall import Wall, standing_wall
-from softnlp.studies.design_task import OUTPUTS, DesignTask, Limits, Output, Setting
+from softnlp.studies.design_task import OUTPUTS, DesignTask, Limits, Setting
 
 Array = NDArray[np.float64]
 
@@ -37,7 +38,7 @@ def robot_outputs(robot: Robot) -> dict[str, Any]:
     """Return the outputs of kind "robot", SI; numbers or symbols as the dimensions are."""
     outer, inner = robot.side_walls
     walls = {"outer_wall": outer, "inner_wall": inner, "wall": robot.chamber_wall + robot.outer_wall}
-    names = [output.name for output in OUTPUTS.values() if output.kind == "robot" and output.name not in walls]
+    names = [output.name for output in OUTPUTS.values() if output.group == "robot" and output.name not in walls]
     return {name: getattr(robot, name) for name in names} | walls
 
 
@@ -77,7 +78,7 @@ def _smallest_gap(robot: Robot, stretch: float) -> float:
 
 def shown(output: Output, value: float) -> str:
     """Return a value in the unit of files."""
-    unit = "" if output.unit == "1" else f" {output.unit}"
+    unit = "" if output.unit is ONE else f" {output.unit}"
     return f"{value / output.scale:.5g}{unit}"
 
 
@@ -93,7 +94,7 @@ def missed(outputs: Mapping[str, float], requirements: Mapping[str, Limits]) -> 
         ):
             size = max(abs(limit), 1e-3 * output.scale) if np.isfinite(limit) else np.inf
             if not off <= FEASIBLE * size:
-                yield f"{output.file_key}: {shown(output, value)}, at {words} {shown(output, limit)} wanted", off / size
+                yield f"{output.key}: {shown(output, value)}, at {words} {shown(output, limit)} wanted", off / size
 
 
 def broken_rules(robot: Robot, task: DesignTask) -> list[str]:

@@ -318,7 +318,7 @@ class Optimiser:
         if abs(exact - optimum.objective) <= within * max(abs(exact), 1e-3 * OUTPUTS[name].scale):
             return ()
         return (
-            f"the optimum found is not on the branch from zero pressure: {OUTPUTS[name].file_key} is "
+            f"the optimum found is not on the branch from zero pressure: {OUTPUTS[name].key} is "
             f"{optimum.objective / OUTPUTS[name].scale:.5g} there and {exact / OUTPUTS[name].scale:.5g} on the branch",
         )
 

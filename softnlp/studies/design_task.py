@@ -7,10 +7,11 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 from math import inf, isfinite, prod
 from numbers import Integral
-from typing import Any, Literal
+from typing import Any
 
+from softnlp.base import columns
+from softnlp.base.columns import Output
 from softnlp.base.errors import InputError, nearest
-from softnlp.base.units import BAR, DEGREE, MILLIMETRE
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.model.materials import Material
@@ -22,53 +23,15 @@ MOST_ENUMERATED = 5000  # combinations above which a search takes the place of e
 COUNTS = tuple(d.field for d in DIMENSIONS if d.scale is None)
 SIZES = tuple(d.field for d in DIMENSIONS if d.scale is not None)
 
+FORCE = "blocked_force"
 _LAYOUT = ("chamber_circle_diameter", "chamber_diameter", "chamber_wall")
 _MOVED_BY = {"outer_wall": {"outer_diameter", *_LAYOUT}, "inner_wall": {"lumen_diameter", *_LAYOUT}}
 
 
-@dataclass(frozen=True)
-class Output:
-    """A number of a design that may be required or optimised.
-
-    name : in SI. file_key : in files, with the unit. scale : SI value of a file unit. kind : "free" for the free shape,
-    "force" for the blocked one, "robot" for its dimensions, "pressure".
-    """
-
-    name: str
-    file_key: str
-    scale: float
-    kind: Literal["free", "force", "robot", "pressure"]
-
-    @property
-    def unit(self) -> str:
-        """The unit of files, "1" for a plain number."""
-        unit = self.file_key.rpartition("_")[2]
-        return unit if self.scale != 1.0 or unit == "N" else "1"
-
-
+_OF_THE_BODY = ("stretch", "elongation", "tip_x", "tip_y", "tip_z", "tip_deflection", "chamber_gap", "pressure")
 OUTPUTS: Mapping[str, Output] = {
-    output.name: output
-    for output in (
-        Output("bending_angle", "bending_angle_deg", DEGREE, "free"),
-        Output("blocked_force", "blocked_force_N", 1.0, "force"),
-        Output("stretch", "stretch", 1.0, "free"),
-        Output("elongation", "elongation_mm", MILLIMETRE, "free"),
-        Output("tip_x", "tip_x_mm", MILLIMETRE, "free"),
-        Output("tip_y", "tip_y_mm", MILLIMETRE, "free"),
-        Output("tip_z", "tip_z_mm", MILLIMETRE, "free"),
-        Output("tip_deflection", "tip_deflection_mm", MILLIMETRE, "free"),
-        Output("chamber_gap", "chamber_gap_mm", MILLIMETRE, "free"),
-        Output("pressure", "pressure_bar", BAR, "pressure"),
-        Output("outer_diameter", "outer_diameter_mm", MILLIMETRE, "robot"),
-        Output("lumen_diameter", "lumen_diameter_mm", MILLIMETRE, "robot"),
-        Output("chamber_circle_diameter", "chamber_circle_diameter_mm", MILLIMETRE, "robot"),
-        Output("chamber_diameter", "chamber_diameter_mm", MILLIMETRE, "robot"),
-        Output("chamber_wall", "chamber_wall_mm", MILLIMETRE, "robot"),
-        Output("outer_wall", "outer_wall_mm", MILLIMETRE, "robot"),
-        Output("inner_wall", "inner_wall_mm", MILLIMETRE, "robot"),
-        Output("wall", "wall_mm", MILLIMETRE, "robot"),
-        Output("length", "length_mm", MILLIMETRE, "robot"),
-    )
+    **{name: columns.OUTPUTS[name] for name in ("bending_angle", FORCE, *_OF_THE_BODY)},
+    **{output.name: output for output in columns.outputs("robot")},
 }
 """By name: `tip_deflection` is the tip's distance from the z axis, `chamber_gap` the smallest one between neighbouring
 reinforced chambers under pressure, `outer_wall` and `inner_wall` what is left between their threads and the surface or
@@ -212,7 +175,7 @@ class DesignTask:
     @property
     def needs_force(self) -> bool:
         """Whether the blocked shape has to be solved."""
-        return self.objective.kind == "force" or any(OUTPUTS[name].kind == "force" for name in self.requirements)
+        return FORCE in (self.objective.name, *self.requirements)
 
     @property
     def ranges(self) -> dict[str, Range]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import OUTPUTS, Output
 from softnlp.base.errors import InputError
-from softnlp.base.units import DEGREE, MILLIMETRE
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.studies.forward import pressure_table
 from softnlp.studies.measurements import Measurements, number_array
@@ -24,31 +24,14 @@ FORCE = NUMBERS.index("blocked_force")
 _TIP = "tip_position"
 
 
-@dataclass(frozen=True)
-class Observable:
-    """key : in files and documents. unit, scale : the unit there, and its SI value. words : in figures and tables.
-
-    of_length : whether errors are told in % of the robot's length, not of the number measured.
-    """
-
-    key: str
-    unit: str
-    scale: float
-    words: str
-    of_length: bool = False
-
-
-OBSERVABLES: Mapping[str, Observable] = {
-    _TIP: Observable("tip_position_mm", "mm", MILLIMETRE, "distance of the tips", True),
-    "tip_x": Observable("x_mm", "mm", MILLIMETRE, "tip along x", True),
-    "tip_y": Observable("y_mm", "mm", MILLIMETRE, "tip along y", True),
-    "tip_z": Observable("z_mm", "mm", MILLIMETRE, "tip along z", True),
-    "bending_angle": Observable("bending_angle_deg", "deg", DEGREE, "bending angle"),
-    "elongation": Observable("elongation_mm", "mm", MILLIMETRE, "elongation"),
-    "tilt": Observable("tilt_deg", "deg", DEGREE, "tilt of the tip"),
-    "blocked_force": Observable("blocked_force_N", "N", 1.0, "blocked force"),
+_WORDS = {_TIP: "distance of the tips", "tilt": "tilt of the tip", **{f"tip_{x}": f"tip along {x}" for x in "xyz"}}
+OBSERVABLES: Mapping[str, Output] = {
+    name: replace(OUTPUTS[name], words=_WORDS.get(name, "")) for name in (_TIP, *NUMBERS)
 }
 """What errors are told of: `NUMBERS`, and how far apart the tips are."""
+
+OF_LENGTH = (_TIP, *NUMBERS[:3])
+"""Those whose errors are told in % of the robot's length, not of the number measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,5 +91,5 @@ def differences(name: str, simulated: Array, measured: Array, length: float) -> 
         return np.asarray(distance), np.full(len(measured), length)
     k = NUMBERS.index(name)
     error = simulated[:, k] - measured[:, k]
-    whole = np.full(len(measured), length) if OBSERVABLES[name].of_length else measured[:, k]
+    whole = np.full(len(measured), length) if name in OF_LENGTH else measured[:, k]
     return error, whole

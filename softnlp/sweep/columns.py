@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.base.units import BAR, DEGREE, MILLIMETRE, NEWTON_MILLIMETRE
+from softnlp.base.columns import DEG, MM, OUTPUTS
+from softnlp.base.netcdf import flag_attributes
+from softnlp.base.units import NEWTON_MILLIMETRE
 from softnlp.batch.plan import Plan
 from softnlp.batch.poses import STATUSES, Lane, Rows
 from softnlp.model.gravity import gravity_words
 from softnlp.model.robot import DIMENSIONS
-from softnlp.statics.step import SELF_INTERSECTING_FLAGS, STABLE_FLAGS, STABLE_MEANING
-from softnlp.studies.fields import SELF_INTERSECTING
+from softnlp.studies.fields import FLAGS
 
 Array = NDArray[Any]
 
@@ -45,8 +46,9 @@ class Column:
 
 def columns(plan: Plan) -> tuple[Column, ...]:
     """Return every quantity of the poses of a plan."""
+    given = OUTPUTS["pressure"]
     return (
-        _given("pressure_bar", ("set",), "bar", "gauge pressure of each chamber set", plan.pressures(), BAR),
+        _given(given.key, given.dims, given.unit.attribute, given.meaning, plan.pressures(), given.scale),
         *_times(plan),
         *(c for name in plan.varied if name != "pressure" for c in _varied(plan, name)),
         *_POSE,
@@ -55,63 +57,45 @@ def columns(plan: Plan) -> tuple[Column, ...]:
     )
 
 
-def _flags(names: dict[str, int]) -> dict[str, Any]:
-    return {"flag_values": np.array(list(names.values()), np.int8), "flag_meanings": " ".join(names)}
-
-
-def _number(name: str, unit: str, meaning: str, entry: str, scale: float = 1.0, dims: tuple[str, ...] = ()) -> Column:
-    """Return a column that is an entry of the rows in another unit."""
-    return Column(name, dims, "f8", unit, meaning, lambda rows, numbers: rows[entry] / scale)
-
-
-def _whole(name: str, entry: str, kind: str, meaning: str, **more: Any) -> Column:
-    return Column(name, (), kind, "1", meaning, lambda rows, numbers: rows[entry], more)
-
-
-def _tilt(rows: Rows, numbers: NDArray[np.int64]) -> Array:
+def _tilt(rows: Rows) -> Array:
     axis = rows["tip_rotation"][:, :, 2]
-    return np.asarray(np.arctan2(np.hypot(axis[:, 0], axis[:, 1]), axis[:, 2]) / DEGREE)
+    return np.asarray(np.arctan2(np.hypot(axis[:, 0], axis[:, 1]), axis[:, 2]))
+
+
+def _output(name: str, of: Callable[[Rows], Array] | None = None, kind: str = "f8") -> Column:
+    """Return the column of an output, an entry of the rows where nothing else is said."""
+    output = OUTPUTS[name]
+    more = flag_attributes(FLAGS[name]) if name in FLAGS else {}
+
+    def values(rows: Rows, numbers: NDArray[np.int64]) -> Array:
+        return np.asarray(output.shown(rows[name] if of is None else of(rows)))
+
+    return Column(output.key, output.dims, kind, output.unit.attribute, output.meaning, values, more)
 
 
 _POSE = (
     Column("status", (), TEXT, "1", "how the pose ended", lambda rows, numbers: _STATUS_NAMES[rows["status"]]),
-    _number("tip_position_mm", "mm", "tip position in the world frame", "tip_position", MILLIMETRE, ("axis",)),
-    _number("tip_rotation", "1", "tip rotation; columns are the body axes", "tip_rotation", dims=("row", "col")),
-    _number(
-        "bending_angle_deg", "degree", "bending angle: integral of sqrt(u_x^2 + u_y^2) over s", "bending_angle", DEGREE
-    ),
-    Column("tilt_deg", (), "f8", "degree", "angle between the tip axis and +z", _tilt),
-    _number("stretch", "1", "axial stretch from the pressure balance, Eq. (23)", "stretch"),
-    _number(
-        "backbone_length_mm", "mm", "length of the deformed axis: integral of |v| over s", "backbone_length", MILLIMETRE
-    ),
-    _number(
-        "chamber_length_mm", "mm", "length of each deformed chamber axis", "chamber_length", MILLIMETRE, ("chamber",)
-    ),
+    *map(_output, ("tip_position", "tip_rotation", "bending_angle")),
+    _output("tilt", _tilt),
+    *map(_output, ("stretch", "backbone_length", "chamber_length")),
 )
-_WALL = (
-    _number("blocked_force_N", "N", "the wall's push on the tip, not negative", "blocked_force"),
-    _number("gap_mm", "mm", "from the wall to the free shape's contact point; negative beyond it", "gap", MILLIMETRE),
-)
+_WALL = (_output("blocked_force"), _output("gap"))
+_LANES = {lane.name.lower(): int(lane) for lane in Lane}
 _SOLVE = (
-    _whole("stable", "stable", "i1", STABLE_MEANING, **_flags(STABLE_FLAGS)),
-    _whole(
-        SELF_INTERSECTING,
-        SELF_INTERSECTING,
-        "i1",
-        "curvature times outer radius reaches 1, or parts of the body lie inside each other",
-        **_flags(SELF_INTERSECTING_FLAGS),
-    ),
-    _number("residual", "1", "largest equation error: force by EI/L^2, moment by EI/L, length by L", "residual"),
-    _number("discretisation_error", "1", "estimated error of the tip position, of the robot's length L_0", "error"),
-    _whole("intervals", "intervals", "i4", "intervals on the rod, 0 where there is no grid"),
-    _whole("iterations", "iterations", "i4", "iterations of the solver"),
-    _whole(
+    _output("stable", kind="i1"),
+    _output("self_intersecting", kind="i1"),
+    _output("residual"),
+    _output("discretisation_error", lambda rows: rows["error"]),
+    _output("intervals", kind="i4"),
+    _output("iterations", kind="i4"),
+    Column(
         "lane",
-        "lane",
+        (),
         "i1",
+        "1",
         "which solver the pose comes from",
-        **_flags({lane.name.lower(): int(lane) for lane in Lane}),
+        lambda rows, numbers: rows["lane"],
+        flag_attributes(_LANES),
     ),
 )
 
@@ -137,7 +121,7 @@ def _varied(plan: Plan, name: str) -> list[Column]:
     value = values[:, 0]
     if table == "robot":
         dimension = next(d for d in DIMENSIONS if d.field == entry)
-        unit = "degree" if dimension.file_key.endswith("_deg") else "mm"
+        unit = (DEG if dimension.file_key.endswith(DEG.suffix) else MM).attribute
         meaning = f"{entry.replace('_', ' ')} of the robot"
         return [_given(f"robot_{dimension.file_key}", (), unit, meaning, value, dimension.scale or 1.0)]
     if name == "material.density":

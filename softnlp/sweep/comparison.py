@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
-from softnlp.base.units import BAR, DEGREE, MILLIMETRE
+from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.sweep.again import solve_again
 from softnlp.sweep.measured import Measured
 from softnlp.sweep.read import Workspace
@@ -17,6 +18,7 @@ from softnlp.sweep.read import Workspace
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+BENDING = OUTPUTS["bending_angle"]
 WITHIN = 1.0  # pressures that differ by no more are equal [Pa]
 _SAME_TIP = 1e-3  # of L_0: poses at one pressure with tips farther apart differ in something else
 
@@ -201,12 +203,12 @@ def comparison_rows(comparison: Comparison, measured: Measured | None = None) ->
 
     A measured file's own columns come first, as they stand in it; otherwise the pose's number and its pressures.
     """
-    mm = [f"{axis}_mm" for axis in "xyz"]
+    mm = [OUTPUTS[f"tip_{axis}"].measured for axis in "xyz"]
     header = ["pose", *(f"p{k + 1}_bar" for k in range(comparison.pressure.shape[1])), *(f"other_{x}" for x in mm)]
     if measured is not None:
         header = list(measured.header)
     header += [*(f"simulated_{x}" for x in mm), *(f"error_{x}" for x in mm), "error_mm", "error_percent"]
-    header += ["bending_angle_difference_deg"] * (comparison.angle is not None)
+    header += [f"{BENDING.name}_difference_{BENDING.unit}"] * (comparison.angle is not None)
     header += ["pose_from"] * (measured is not None)
     return header, _rows(comparison, measured)
 
@@ -216,7 +218,7 @@ def _rows(c: Comparison, measured: Measured | None) -> Iterator[list[str]]:
     if measured is None:
         columns = [c.pressure / BAR, c.other / MILLIMETRE, *columns]
     if c.angle is not None:
-        columns.append(c.angle / DEGREE)
+        columns.append(BENDING.shown(c.angle))
     table = np.column_stack(columns)
     for k, row in enumerate(c.row.tolist()):
         numbers = [f"{value:.9g}" for value in table[k].tolist()]

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import by_key
 from softnlp.base.files import placed_whole
 from softnlp.base.netcdf import as_characters, encoded, put, put_attributes, put_characters, said
 from softnlp.batch.plan import Plan
@@ -94,7 +95,7 @@ def write_csv(path: str | PathLike[str], plan: Plan, journal: Journal) -> Path:
     sizes = _sizes(plan)
     with placed_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(["pose", *(name for column in listed for name in _flat_names(column, sizes))])
+        table.writerow(["pose", *(name for column in listed for name in _names(column, sizes))])
         for start, rows in _slabs(plan, journal, MEMORY // 16):
             numbers = np.arange(start, start + rows.size, dtype=np.int64)
             cells: list[list[Any]] = [(numbers + 1).tolist()]
@@ -217,23 +218,10 @@ def _attributes(plan: Plan) -> dict[str, str]:
     }
 
 
-def _flat_names(column: Column, sizes: Mapping[str, int]) -> list[str]:
-    """Return the CSV columns of a variable: an index goes before the unit."""
-    if not column.dims:
-        return [column.name]
-    if column.name == "pressure_bar":
-        return [f"p{k}_bar" for k in range(1, sizes["set"] + 1)]
-    labels = [
-        list(_AXES) if sizes[d] == 3 and d != "chamber" else list(map(str, range(1, sizes[d] + 1))) for d in column.dims
-    ]
-    stem, unit = column.name, ""
-    if column.unit != "1":
-        stem, _, unit = column.name.rpartition("_")
-        unit = f"_{unit}"
-    names = [stem]
-    for several in labels:
-        names = [f"{name}_{label}" for name in names for label in several]
-    return [name + unit for name in names]
+def _names(column: Column, sizes: Mapping[str, int]) -> list[str]:
+    """Return the CSV columns of a variable; those with dimensions are outputs."""
+    output = by_key(column.name) if column.dims else None
+    return [column.name] if output is None else output.keys(sizes)
 
 
 def _cells(values: NDArray[Any]) -> list[Any]:

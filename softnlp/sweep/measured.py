@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import TIME_COLUMN, read_columns
 from softnlp.base.errors import InputError
 from softnlp.base.ranges import noise_note, without_noise
@@ -16,7 +17,7 @@ from softnlp.base.units import BAR, MILLIMETRE
 
 Array = NDArray[np.float64]
 
-TIP_COLUMNS = ("x_mm", "y_mm", "z_mm")
+TIP_COLUMNS = tuple(OUTPUTS[f"tip_{x}"].measured for x in "xyz")
 
 
 @dataclass(frozen=True, eq=False)

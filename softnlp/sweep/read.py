@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import OUTPUTS, by_key, outputs
 from softnlp.base.errors import InputError, nearest
 from softnlp.base.reading import one_line
 from softnlp.base.status import Status
-from softnlp.base.units import BAR, DEGREE, MILLIMETRE
 from softnlp.model.inputs import robot_of_table
 from softnlp.model.robot import Robot
 
@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 
 WORKSPACE_FILE = "workspace.nc"
 STATUSES: tuple[Status, ...] = tuple(Status)
+_PRESSURE, _TIP, _BENDING, _ROTATION = (
+    OUTPUTS[name] for name in ("pressure", "tip_position", "bending_angle", "tip_rotation")
+)
 _SLAB = 65_536  # poses read at a time where a column is not kept as it is in the file
 
 
@@ -103,14 +106,14 @@ def load_workspace(path: str | PathLike[str]) -> Workspace:
         N = _poses(data)
         status = _statuses(data, N)
         solved = np.array([s.has_solution for s in STATUSES])[status]
-        pressure = _numbers(data, "pressure_bar", (N, -1)) * BAR
+        pressure = _numbers(data, _PRESSURE.key, (N, -1)) * _PRESSURE.scale
         attributes = _attributes(data)
         robot = robot_of_table(attributes["robot"])
         if pressure.shape[1] != robot.chamber_sets:
             raise ValueError(f"pressures of {pressure.shape[1]} sets for a robot of {robot.chamber_sets}")
-        tip = _numbers(data, "tip_position_mm", (N, 3)) * MILLIMETRE
+        tip = _numbers(data, _TIP.key, (N, 3)) * _TIP.scale
         axis = _third_columns(data, N)
-        bending = _numbers(data, "bending_angle_deg", (N,)) * DEGREE
+        bending = _numbers(data, _BENDING.key, (N,)) * _BENDING.scale
         stable, through = (
             np.array(data[name][:], dtype=np.int8) if name in data else np.full(N, -1, np.int8)
             for name in ("stable", "self_intersecting")
@@ -217,10 +220,7 @@ def read_block(workspace: Workspace, names: Sequence[str], rows: slice) -> list[
     return found
 
 
-_POSE_NUMBERS = (
-    *("tip_position_mm", "tip_rotation", "bending_angle_deg", "tilt_deg", "stretch", "backbone_length_mm"),
-    *("chamber_length_mm", "discretisation_error", "blocked_force_N", "gap_mm", "stable", "self_intersecting"),
-)
+_POSE_NUMBERS = tuple(output.key for output in (*outputs("pose", "wall"), OUTPUTS["discretisation_error"]))
 """What a pose without a solution does not have, whatever the file says; the rest is what was asked, or how it went."""
 
 
@@ -245,7 +245,7 @@ def _opened(file: Path) -> Iterator[Any]:
 
 def _poses(data: Any) -> int:
     """Return the number of poses, or raise for a file of something else."""
-    if "tip_position_mm" in data and "position_mm" in data:
+    if _TIP.key in data and OUTPUTS["position"].key in data:
         raise InputError(f"expected a {WORKSPACE_FILE} of a sweep; this is a run's, which `softnlp plot run` draws")
     missing = [name for name in _NEEDED if name not in data]
     if missing:
@@ -256,7 +256,7 @@ def _poses(data: Any) -> int:
     return N
 
 
-_NEEDED = ("pressure_bar", "status", "tip_position_mm", "tip_rotation", "bending_angle_deg", "residual")
+_NEEDED = (_PRESSURE.key, "status", *(o.key for o in (_TIP, _ROTATION, _BENDING)), OUTPUTS["residual"].key)
 
 
 def _attributes(data: Any) -> dict[str, Any]:
@@ -314,8 +314,12 @@ def _columns(data: Any) -> Iterator[tuple[str, str, tuple[int, ...]]]:
             continue
         if variable == "pose":
             continue
+        output = by_key(variable)
         for index in np.ndindex(*found.shape[1:]):
-            yield _component(variable, index, _unit(found) != "1"), variable, index
+            if output is not None and len(output.entries) == len(index):
+                yield output.entry(index), variable, index
+            else:
+                yield "_".join([variable, *(str(k + 1) for k in index)]), variable, index
 
 
 def _unit(found: Any) -> str:
@@ -333,17 +337,3 @@ def _is_per_pose(found: Any) -> bool:
         return False
     scales = found.dims[0]
     return found.name == "/pose" or (len(scales) > 0 and str(scales[0].name).lstrip("/") == "pose")
-
-
-def _component(variable: str, index: tuple[int, ...], measured: bool) -> str:
-    """Return the name of a component: the index goes before the unit, if the variable is `measured` in one."""
-    if not index:
-        return variable
-    if variable == "pressure_bar":
-        return f"p{index[0] + 1}_bar"
-    stem, unit = variable, ""
-    if measured:
-        stem, _, unit = variable.rpartition("_")
-    lettered = variable.startswith("tip_")
-    label = "_".join("xyz"[i] if lettered else str(i + 1) for i in index)
-    return "_".join(part for part in (stem, label, unit) if part)

@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from nicegui import ui
 from numpy.typing import NDArray
 
-from softnlp.app.numbers import Line, certificate_words, step_lines
+from softnlp.app.numbers import NOTHING, Line, certificate_words, step_lines
 from softnlp.app.parts import Chart, csv_text, line
-from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE
+from softnlp.base.columns import MM, OUTPUTS, PER_M, Output
+from softnlp.base.units import MILLIMETRE
 from softnlp.figures.style import COLOURS
 from softnlp.results import table_text, to_json
 from softnlp.statics.step import Run, Shape
+from softnlp.studies.fields import value
 
 Array = NDArray[np.float64]
 
-_ALONG: Mapping[str, tuple[str, str, str, Callable[[Shape], Array]]] = {
-    "curvature": ("Curvature u", "1/m", "body", lambda s: s.curvature),
-    "strain": ("Shear and extension v", "–", "body", lambda s: s.shear_extension),
-    "force": ("Internal force n", "N", "world", lambda s: s.force),
-    "moment": ("Internal moment m", "N mm", "world", lambda s: s.moment / NEWTON_MILLIMETRE),
-    "position": ("Position p", "mm", "world", lambda s: s.position / MILLIMETRE),
+_ALONG: Mapping[str, Output] = {
+    key: OUTPUTS[name]
+    for key, name in (
+        ("curvature", "curvature"),
+        ("strain", "shear_extension"),
+        *((name, name) for name in ("force", "moment", "position")),
+    )
 }
 
 
@@ -68,12 +71,12 @@ class ResultsPanel:
         self._along.props("dense data-testid=along")
         with self._along:
             self._quantity = ui.select(
-                {key: f"{label} [{unit}]" for key, (label, unit, *_) in _ALONG.items()},
+                {key: f"{output.title} [{output.unit.sign or NOTHING}]" for key, output in _ALONG.items()},
                 value="curvature",
                 on_change=lambda: self._draw(force=True),
             ).props("dense outlined options-dense data-testid=along-quantity")
             self._quantity.classes("w-full")
-            self._plot = Chart("along-plot", "s [mm]", "u [1/m]", height="14rem")
+            self._plot = Chart("along-plot", f"s [{MM}]", f"u [{PER_M}]", height="14rem")
             ui.button("CSV along the rod", icon="download", on_click=self._download_along).props(
                 "flat dense no-caps size=sm data-testid=along-csv"
             )
@@ -132,15 +135,17 @@ class ResultsPanel:
         if shape is self._drawn and not force:
             return
         self._drawn = shape
-        label, unit, frame, of = _ALONG[str(self._quantity.value)]
+        output = _ALONG[str(self._quantity.value)]
         traces = []
         if pose is not None and shape is not None:
             s = np.asarray(shape.arc) * pose.stretch * self._run.robot.length / MILLIMETRE
             traces = [
                 line(s.tolist(), values.tolist(), COLOURS[k], axis, mode="lines")
-                for k, (axis, values) in enumerate(zip("xyz", of(shape).T, strict=True))
+                for k, (axis, values) in enumerate(zip("xyz", value(output, self._run.steps[0]).T, strict=True))
             ]
-        self._plot.show(traces, y_label=f"{label.split()[-1]} [{unit}], {frame} frame")
+        frame = output.meaning.split()[-2]  # "in the body frame"
+        words = f"{output.title.split()[-1]} [{output.unit.sign or NOTHING}], {frame} frame"
+        self._plot.show(traces, y_label=words)
 
     def _copy(self) -> None:
         if self._run is None:
@@ -168,10 +173,9 @@ def along_csv(run: Run) -> str:
     pose = run.steps[0].pose
     if pose is None:
         raise ValueError("the step has no pose")
-    names = {"curvature": "curvature_{}_per_m", "strain": "shear_extension_{}", "force": "force_{}_N",
-             "moment": "moment_{}_Nmm", "position": "position_{}_mm"}  # fmt: skip
-    header = ["arc", *(names[key].format(axis) for key in _ALONG for axis in "xyz")]
-    columns = np.hstack([np.asarray(pose.shape.arc)[:, None], *(of(pose.shape) for *_, of in _ALONG.values())])
+    header = ["arc", *(output.entry((k,)) for output in _ALONG.values() for k in range(3))]
+    along = (value(output, run.steps[0]) for output in _ALONG.values())
+    columns = np.hstack([np.asarray(pose.shape.arc)[:, None], *along])
     return csv_text(header, columns.tolist())
 
 

@@ -26,6 +26,7 @@ from softnlp.app.tabs.contact_table import (
     with_mode,
     with_wall,
 )
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR
 from softnlp.figures.style import colour
@@ -161,7 +162,7 @@ class _Curves:
         self._count.props("dense outlined hide-bottom-space data-testid=blocked.steps").classes("w-full")
         self._count.bind_visibility_from(self._source, "value", value="ramp")
         self._row = RunRow("blocked", "Run the curve", self._begin)
-        self._chart = Chart("blocked.chart", "pressure [bar]", "blocked force [N]")
+        self._chart = Chart("blocked.chart", "pressure [bar]", OUTPUTS["blocked_force"].axis)
         with ui.row().classes("gap-1") as self._buttons:
             keep = ui.button("Keep curve", icon="push_pin", on_click=self._keep).mark("blocked.keep")
             keep.props("dense flat no-caps size=sm data-testid=blocked.keep")
@@ -194,7 +195,7 @@ class _Curves:
     def _finish(self, run: Run) -> None:
         self._draw()
         self._row.say(said(run))
-        header, rows = step_rows(run, {"force [N]": force_points(run.steps)[1]})
+        header, rows = step_rows(run, {OUTPUTS["blocked_force"].heading: force_points(run.steps)[1]})
         self._table.show(header, rows, "force_pressure.csv", csv=table_text(run), failed=failures(run))
         self._pressures = [step.pressure for step in run.steps]
 

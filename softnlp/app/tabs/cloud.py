@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.app.job import Progress, Stopped
+from softnlp.base.columns import ONE, OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.scenario.planning import plan_of
@@ -29,11 +30,10 @@ MOST_POSES = 1_000_000
 """Of a sweep that is run from the page; `softnlp sweep` takes more."""
 MANIPULABILITY = "manipulability"
 QUANTITIES: Mapping[str, tuple[str, str]] = {
-    "bending_angle_deg": ("Bending angle", "deg"),
-    "tilt_deg": ("Tip tilt", "deg"),
-    "stretch": ("Stretch", "-"),
-    "backbone_length_mm": ("Backbone length", "mm"),
-    "blocked_force_N": ("Blocked force", "N"),
+    **{
+        output.key: (output.label.capitalize(), "-" if output.unit is ONE else output.unit.label)
+        for output in map(OUTPUTS.__getitem__, ("bending_angle", "tilt", "stretch", "backbone_length", "blocked_force"))
+    },
     MANIPULABILITY: ("Manipulability, by differences", "mm³/bar³"),
 }
 Point = tuple[float, float, float]

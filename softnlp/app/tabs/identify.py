@@ -14,7 +14,7 @@ from softnlp.app.parts import Chart, NumberTable, RunRow, csv_drop, plain_words
 from softnlp.app.session import Session
 from softnlp.app.stage import Stage
 from softnlp.app.tabs.identify_table import (
-    LABELS,
+    MEASURED,
     SIGMAS,
     Table,
     bounds_of,
@@ -28,6 +28,7 @@ from softnlp.app.tabs.identify_table import (
     with_free,
 )
 from softnlp.app.tabs.tensile import tensile_part
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import read_columns
 from softnlp.base.errors import InputError
 from softnlp.base.status import Status
@@ -36,6 +37,7 @@ from softnlp.scenario.read import Scenario
 from softnlp.scenario.run_identify import run_robots
 from softnlp.studies.identified import Identified
 from softnlp.studies.identify_task import RobotTask
+from softnlp.studies.measurements import OBSERVABLES
 
 STUDY = "identify"
 _GUESS = 40  # evaluations; most identifications need fewer
@@ -91,8 +93,7 @@ class _Measurements:
         self._file = ui.label("").classes("text-sm").mark("measurements.file")
         csv_drop("measurements.drop", "Drop a CSV of measurements", self._dropped)
         ui.label(
-            "Columns p1_bar, p2_bar, … and any of x_mm, y_mm, z_mm, bending_angle_deg, elongation_mm, "
-            "blocked_force_N; robot, weight and sigma_… if there are."
+            f"Columns p1_bar, p2_bar, … and any of {', '.join(MEASURED)}; robot, weight and sigma_… if there are."
         ).classes("text-xs opacity-70")
         with ui.column().classes("w-full gap-2") as self._more:
             self._free = ui.select({}, multiple=True, label="Free constants").classes("w-full")
@@ -248,10 +249,11 @@ class _Identification:
         self._draw()
 
     def _draw(self) -> None:
-        if self._found is not None and self._what.value in LABELS:
+        if self._found is not None and self._what.value in OBSERVABLES:
             key = str(self._what.value)
             traces = compared(self._found, key)
-            self._chart.show(traces, x_label=f"measured {LABELS[key]}", y_label=f"model {LABELS[key]}")
+            label = OUTPUTS[key].axis
+            self._chart.show(traces, x_label=f"measured {label}", y_label=f"model {label}")
 
     def _use(self) -> None:
         """Write the constants into the scenario."""

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.figures.style import colour
 from softnlp.model.conventions import Coefficients
 from softnlp.model.materials import Material
-from softnlp.results.identify_document import UNITS
 from softnlp.studies.free_constants import COEFFICIENTS, file_name, free_constants
 from softnlp.studies.identified import Identified
-from softnlp.studies.measurements import column_slice
+from softnlp.studies.measurements import OBSERVABLES, column_slice
 from softnlp.studies.tensile import TensileFit
 
 Table = dict[str, Any]
@@ -28,21 +28,15 @@ LETTERS: Mapping[str, str] = {
     "phi": "phi, part of the liner that pressure acts on",
     "k_c": "k_c, chamber reaction at a wall",
 }
-LABELS: Mapping[str, str] = {
-    "tip_position": "tip position [mm]",
-    "bending_angle": "bending angle [deg]",
-    "elongation": "elongation [mm]",
-    "blocked_force": "blocked force [N]",
-}
 SIGMAS: Mapping[str, tuple[str, str]] = {
-    "tip_position_mm": ("Tip position", "mm"),
-    "bending_angle_deg": ("Bending angle", "deg"),
-    "bending_angle_percent": ("Bending angle", "%"),
-    "elongation_mm": ("Elongation", "mm"),
-    "elongation_percent": ("Elongation", "%"),
-    "blocked_force_N": ("Blocked force", "N"),
-    "blocked_force_percent": ("Blocked force", "%"),
+    key: (OUTPUTS[name].label.capitalize(), unit)
+    for name in OBSERVABLES
+    for key, unit in (
+        (OUTPUTS[name].key, OUTPUTS[name].unit.label),
+        *([(f"{name}_percent", "%")] if name != "tip_position" else []),
+    )
 }
+MEASURED = [OUTPUTS[entry].measured for entries in OBSERVABLES.values() for entry in entries]
 GREY = "#909090"
 
 
@@ -54,9 +48,8 @@ def free_choices(material: Material | None) -> dict[str, str]:
 
 def first_free(header: Sequence[str]) -> list[str]:
     """Return which constants to free at first, by what a file has measured."""
-    poses = any(name in header for name in ("x_mm", "bending_angle_deg", "elongation_mm"))
-    forces = "blocked_force_N" in header
-    return ["k_e", "k_b"] * poses + ["k_c"] * forces or ["k_e", "k_b"]
+    *poses, force = (name in header for name in MEASURED)
+    return ["k_e", "k_b"] * any(poses) + ["k_c"] * force or ["k_e", "k_b"]
 
 
 def with_free(table: Table, free: Sequence[str]) -> Table:
@@ -106,15 +99,15 @@ def misfit_rows(found: Identified) -> tuple[list[str], Rows]:
     before, after = found.errors(False), found.errors()
     rows: Rows = []
     for key in after:
-        scale = UNITS[key][1]
-        row = [LABELS[key], after[key].count, *(m[key].rmse / scale for m in (before, after))]
+        scale = OUTPUTS[key].scale
+        row = [OUTPUTS[key].axis, after[key].count, *(m[key].rmse / scale for m in (before, after))]
         rows.append([*row, *(m[key].mape for m in (before, after))])
     return ["observable", "numbers", "rms before", "rms after", "mean before [%]", "mean after [%]"], rows
 
 
 def compared(found: Identified, observable: str) -> list[dict[str, Any]]:
     """Return the traces of model against measurement: grey before, in colour after, a marker a robot."""
-    scale, where = UNITS[observable][1], column_slice(observable)
+    scale, where = OUTPUTS[observable].scale, column_slice(observable)
     traces: list[dict[str, Any]] = []
     ends: list[float] = []
     for k, data in enumerate(found.data):
@@ -145,7 +138,7 @@ def compared(found: Identified, observable: str) -> list[dict[str, Any]]:
 
 def observables(found: Identified) -> dict[str, str]:
     """Return what was measured, by key, as an axis names it."""
-    return {key: LABELS[key] for key in found.errors(False)}
+    return {key: OUTPUTS[key].axis for key in found.errors(False)}
 
 
 def law_rows(fit: TensileFit) -> tuple[list[str], Rows]:

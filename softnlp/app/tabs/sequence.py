@@ -14,7 +14,6 @@ from softnlp.app.parts import Chart, NumberTable, RunRow, csv_drop, line, plain_
 from softnlp.app.session import Session
 from softnlp.app.stage import Stage
 from softnlp.app.tabs.sequence_table import (
-    LABELS,
     MOST_TYPED,
     QUANTITIES,
     RAMP,
@@ -24,6 +23,7 @@ from softnlp.app.tabs.sequence_table import (
     series,
     source_of,
 )
+from softnlp.base.columns import MM
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR
 from softnlp.figures.style import colour
@@ -230,7 +230,8 @@ class _Results:
         self._steps: list[Step] = []
         self._row = RunRow("sequence", "Run all steps", self._begin)
         with ui.row().classes("w-full gap-2 no-wrap") as self._choice:
-            self._what = ui.select(dict(QUANTITIES), value="bending", on_change=self._draw).classes("grow")
+            labels = {key: output.label.capitalize() for key, output in QUANTITIES.items()}
+            self._what = ui.select(labels, value="bending", on_change=self._draw).classes("grow")
             self._along = ui.select(
                 {"pressure": "Against pressure", "step": "Against step or time"}, value="pressure", on_change=self._draw
             ).classes("grow")
@@ -265,10 +266,10 @@ class _Results:
         self._choice.set_visibility(bool(steps))
         what = str(self._what.value)
         x, x_label = against(steps, str(self._along.value))
-        found = series(steps)
-        names = [name for name in found if name.startswith({"bending": "bend", "length": "back", "tip": "tip"}[what])]
-        traces = [line(x, found[name], colour(k), name.removesuffix(" [mm]")) for k, name in enumerate(names)]
-        self._chart.show(traces if steps else [], x_label=x_label, y_label=LABELS[what])
+        found, output = series(steps, [what]), QUANTITIES[what]
+        names = {name: name.removesuffix(f" [{MM}]") for name in found}
+        traces = [line(x, found[name], colour(k), words) for k, (name, words) in enumerate(names.items())]
+        self._chart.show(traces if steps else [], x_label=x_label, y_label=output.axis)
 
     def _show_step(self, row: int) -> None:
         scenario = self._session.scenario

@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import OUTPUTS, Output
 from softnlp.base.errors import InputError
 from softnlp.base.reading import shown
-from softnlp.base.units import BAR, DEGREE, MILLIMETRE
+from softnlp.base.units import BAR
 from softnlp.statics.step import Step
+from softnlp.studies import fields
 
 Array = NDArray[np.float64]
 
 RAMP: Mapping[str, Any] = {"sets": [1], "to_bar": 1.5, "steps": 11}
 MOST_TYPED = 200
 """Steps that are shown as text to be edited; more come from a file."""
-QUANTITIES: Mapping[str, str] = {
-    "bending": "Bending angle",
-    "length": "Backbone length",
-    "tip": "Tip position",
-}
-LABELS: Mapping[str, str] = {
-    "bending": "bending angle [deg]",
-    "length": "backbone length [mm]",
-    "tip": "tip position [mm]",
+QUANTITIES: Mapping[str, Output] = {
+    "bending": OUTPUTS["bending_angle"],
+    "length": OUTPUTS["backbone_length"],
+    "tip": OUTPUTS["tip_position"],
 }
 
 
@@ -65,18 +62,13 @@ def rows_of_text(text: str) -> list[list[float]]:
     return rows
 
 
-def series(steps: Sequence[Step]) -> dict[str, list[float]]:
+def series(steps: Sequence[Step], quantities: Iterable[str] = tuple(QUANTITIES)) -> dict[str, list[float]]:
     """Return what is drawn of steps by column label, nan where a step has no solution."""
-    found: dict[str, list[float]] = {
-        label: [] for label in ("bending angle [deg]", "backbone length [mm]", "tip x [mm]", "tip y [mm]", "tip z [mm]")
-    }
-    for step in steps:
-        pose = step.pose if step.status.has_solution else None
-        values = [float("nan")] * 5
-        if pose is not None:
-            values = [pose.bending_angle / DEGREE, pose.backbone_length / MILLIMETRE, *(pose.tip_position / MILLIMETRE)]
-        for column, value in zip(found.values(), values, strict=True):
-            column.append(float(value))
+    found: dict[str, list[float]] = {}
+    for output in (QUANTITIES[name] for name in quantities):
+        labels = [output.axis] if not output.dims else [f"tip {x} [{output.unit}]" for x in "xyz"]
+        values = fields.series(output, steps, {"axis": 3}).reshape(-1, len(labels))
+        found |= dict(zip(labels, values.T.tolist(), strict=True))
     return found
 
 
@@ -86,5 +78,5 @@ def against(steps: Sequence[Step], axis: str) -> tuple[list[float], str]:
         return [float(step.pressure.max()) / BAR for step in steps], "largest pressure [bar]"
     times = [step.time for step in steps]
     if all(time is not None for time in times) and times:
-        return [float(time or 0.0) for time in times], "time [s]"
+        return [float(time or 0.0) for time in times], OUTPUTS["t"].axis
     return [float(k) for k in range(1, len(steps) + 1)], "step"

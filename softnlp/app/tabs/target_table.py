@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from softnlp.base.units import BAR, DEGREE, MILLIMETRE
-from softnlp.results.targets import target_values
+from softnlp.base.columns import OUTPUTS
+from softnlp.base.units import BAR
 from softnlp.statics.step import Run, Step
+from softnlp.studies.fields import value
 
 Table = dict[str, Any]
 
-POSITION, DIRECTION = "tip_position_mm", "tip_direction"
+POSITION, DIRECTION = OUTPUTS["tip_position"].key, "tip_direction"
 KINDS: Mapping[str, tuple[str, ...]] = {
     "position": (POSITION,),
     "direction": (DIRECTION,),
     "both": (POSITION, DIRECTION),
 }
+_LEFT = {"distance": OUTPUTS["distance"], "angle": OUTPUTS["direction_error"]}
 _FIRST: Mapping[str, list[float]] = {POSITION: [-20.0, 0.0, 62.0], DIRECTION: [0.0, 0.0, 1.0]}
 
 
@@ -44,10 +46,10 @@ def with_kind(table: Table, kind: str) -> Table:
     return {key: (rows_of(table, key) + [_FIRST[key]] * count)[:count] for key in KINDS[kind]} | kept
 
 
-def with_number(table: Table, key: str, row: int, column: int, value: float) -> Table:
+def with_number(table: Table, key: str, row: int, column: int, entry: float) -> Table:
     """Return the table with one number of one target changed."""
     rows = rows_of(table, key)
-    rows[row][column] = value
+    rows[row][column] = entry
     return {**table, key: rows}
 
 
@@ -77,25 +79,23 @@ def words_of(step: Step) -> str:
     aimed = step.aimed
     if not step.status.has_solution or aimed is None:
         return f"{step.message[:1].upper()}{step.message[1:]}."
-    left = []
-    if aimed.distance is not None:
-        left.append(f"{aimed.distance / MILLIMETRE:.2g} mm")
-    if aimed.angle is not None:
-        left.append(f"{aimed.angle / DEGREE:.2g} deg")
+    known = [(value(output, step), output.unit) for output in _LEFT.values()]
+    left = [f"{size:.2g} {unit}" for size, unit in known if size is not None]
     return f"Reached at {bars} bar, {' and '.join(left)} left."
 
 
 def target_columns(run: Run) -> dict[str, list[Any]]:
     """Return the columns of a table of targets, by label; None where there is none."""
     columns: dict[str, list[Any]] = {}
+    wanted = OUTPUTS["target"]
     for step in run.steps:
-        values = target_values(run, step)
-        target = values["target_mm"]
-        entries = {f"{axis} wanted [mm]": None if target is None else float(target[k]) for k, axis in enumerate("xyz")}
-        entries |= {"distance left [mm]": values["distance_mm"], "angle left [deg]": values["direction_error_deg"]}
-        for label, value in entries.items():
-            columns.setdefault(label, []).append(value)
-    return {label: values for label, values in columns.items() if any(value is not None for value in values)}
+        target = value(wanted, step)
+        places = [None] * 3 if target is None else map(float, target)
+        entries = {f"{axis} wanted [{wanted.unit}]": place for axis, place in zip("xyz", places, strict=True)}
+        entries |= {f"{name} left [{output.unit}]": value(output, step) for name, output in _LEFT.items()}
+        for label, entry in entries.items():
+            columns.setdefault(label, []).append(entry)
+    return {label: values for label, values in columns.items() if any(entry is not None for entry in values)}
 
 
 def _last(table: Table, key: str) -> list[float]:
