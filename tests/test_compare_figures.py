@@ -248,5 +248,5 @@ def test_everything_is_documented(capsys: pytest.CaptureFixture[str]) -> None:
     assert set(MEASURED_COLUMNS) <= shown
     plain = {name for name in ALIASES if not re.search(r"_[yz]_mm$", name)}
     assert plain <= shown
-    assert {o.key for o in OBSERVABLES.values()} <= shown
+    assert {o.measured for o in OBSERVABLES.values()} <= shown
     assert set(STATISTICS) <= shown

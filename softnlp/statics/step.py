@@ -199,7 +199,7 @@ class Contact:
 
     @property
     def elasticities(self) -> dict[str, float]:
-        """The elasticity of the force to each weight, by its name."""
+        """The elasticity of the force to each weight by its name [1]."""
         return {line.weight: line.elasticity for line in self.sensitivity}
 
 
