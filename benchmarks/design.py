@@ -31,7 +31,7 @@ from softnlp.model.robot import Robot
 from softnlp.scenario.read import Scenario
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.design_evaluate import Evaluator, broken_rules, chamber_gaps, missed, pose_outputs, robot_outputs
-from softnlp.studies.design_task import OUTPUTS, Setting
+from softnlp.studies.design_task import Setting
 
 FILE = Path(__file__).parents[1] / "scenarios" / "design" / "D25L60_dimensions.toml"
 PENALTY = 20.0  # objective units for missing a requirement by all of its limit, or a wall by a millimetre
@@ -154,7 +154,7 @@ def compare_random(scenario: Scenario, task: DesignTask) -> None:
     setting = Setting(scenario.robot, scenario.material)
     evaluator = Evaluator(setting, task, Model(scenario.robot, scenario.material))
     assert isinstance(task.pressure, float)
-    free = {name: limits for name, limits in task.requirements.items() if OUTPUTS[name].kind != "force"}
+    free = {name: limits for name, limits in task.requirements.items() if name != "blocked_force"}
     rng = np.random.default_rng(11)
     objectives: list[float] = []
     drawn = made = 0
