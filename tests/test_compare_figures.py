@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -178,18 +178,19 @@ FIVE = ("linear", "neo-hookean", "mooney-rivlin", "yeoh", "ogden")
 
 
 @pytest.mark.parametrize(
-    "figure",
+    "draw",
     [
-        observable_figure(ramps(1, 1), "bending_angle", "One robot"),
-        observable_figure(ramps(4, 15, FIVE), "bending_angle", "$x^2 \\frac " + "long " * 60),
-        observable_figure(ramps(8, 3), "bending_angle", "More panels than are drawn"),
-        observable_figure(single(3), "blocked_force", "Lanes"),
-        tips_figure(tips(), "Tips"),
-        tips_figure(tips(300, 8), "Tips of many variants"),
+        lambda: observable_figure(ramps(1, 1), "bending_angle", "One robot"),
+        lambda: observable_figure(ramps(4, 15, FIVE), "bending_angle", "$x^2 \\frac " + "long " * 60),
+        lambda: observable_figure(ramps(8, 3), "bending_angle", "More panels than are drawn"),
+        lambda: observable_figure(single(3), "blocked_force", "Lanes"),
+        lambda: tips_figure(tips(), "Tips"),
+        lambda: tips_figure(tips(300, 8), "Tips of many variants"),
     ],
     ids=["one", "laws", "robots", "lanes", "tips", "many"],
 )
-def test_texts_do_not_meet(figure: Figure) -> None:
+def test_texts_do_not_meet(draw: Callable[[], Figure]) -> None:
+    figure = draw()
     figure.canvas.draw()
     shown = [*figure.texts, *(t for legend in figure.legends for t in legend.get_texts())]
     for axes in figure.axes:
