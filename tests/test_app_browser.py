@@ -78,7 +78,6 @@ def test_loads_coefficients_and_solver_reach_the_file(tab: Watched, tmp_path: Pa
     assert_same_as_the_command(tab, tmp_path)
 
 
-@pytest.mark.slow
 def test_past_the_last_equilibrium_the_sliders_stay(tab: Watched, tmp_path: Path) -> None:
     tab.open_panel("coefficients")
     tab.press("no-stiffening")
