@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from copy import copy
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,7 @@ from softnlp.statics.loadcase import RodFunctions
 from softnlp.statics.pose import between_nodes
 from softnlp.statics.solver import MOST_INTERVALS, PoseSolver
 from softnlp.statics.step import Step
-from softnlp.statics.wall import Situation, Wall
+from softnlp.statics.wall import Situation, Wall, keeps_plane, slipping_pressure
 
 Array = NDArray[np.float64]
 
@@ -37,23 +36,18 @@ TOUCHING = 1e-9  # of the length: a free contact point nearer to the wall than t
 _NEAR_FOLD = 0.2  # of the largest in-plane determinant on the way: below it a branch that ends has turned
 _LARGEST_JUMP = 0.3
 _FINEST_FIRST = 55  # intervals of a first grid, however far the free shape curls: the wall keeps the rod from that
+_SEARCHED_ON = 20  # intervals, at most, of the grid on which a branch is followed first
+_SURE = 1e-3  # estimated error of a shape on that grid below which the end of the branch after it is believed
 
 
 @dataclass(frozen=True, eq=False)
 class _Ended:
-    """Where a branch was lost: the situation reached, whether it had turned, iterations spent."""
+    """Where a branch was lost: the situation reached, whether it had turned, iterations spent, the error there."""
 
     situation: Situation
     folded: bool
     iterations: int
-
-
-def _slips(begin: Situation, end: Situation, sideways: list[tuple[float, float]]) -> float | None:
-    """Return the largest set pressure at which the out-of-plane determinant changed its sign, if it has."""
-    for (u, a), (w, b) in pairwise(sideways):
-        if a * b < 0:
-            return float(np.max(begin.towards(end, u + (w - u) * a / (a - b)).pressure))
-    return None
+    error: float = 0.0
 
 
 class BlockedSolver:
@@ -93,6 +87,11 @@ class BlockedSolver:
     def functions(self) -> RodFunctions:
         """The rod under the closure, see `RodFunctions`."""
         return self.equations.functions
+
+    @property
+    def _order(self) -> int:
+        """The order of the transcription's error."""
+        return method_named(self.numerics.transcription, 1).order
 
     def with_model(self, model: Model) -> BlockedSolver:
         """Return a solver for other numbers that shares what is compiled; `ValueError` for another `Model.kind`."""
@@ -161,12 +160,8 @@ class BlockedSolver:
                 found = self._followed(self.grid(intervals, plane), situation, pressed, free, plane, near)
             spent += found.solution.iterations if isinstance(found, Blocked) else found.iterations
         if not isinstance(found, Blocked):
-            for _ in range(2):
-                found = self._followed(self.grid(intervals, plane), situation, pressed, free, plane, None)
-                spent += found.solution.iterations if isinstance(found, Blocked) else found.iterations
-                if isinstance(found, Blocked) or found.folded or self.numerics.intervals is not None:
-                    break
-                intervals *= 2
+            found, more = self._searched(situation, pressed, free, plane, intervals)
+            spent += more
         target = self.poses.numerics.accuracy / 3
         while isinstance(found, Blocked):
             intervals = found.grid.intervals
@@ -181,22 +176,34 @@ class BlockedSolver:
         assert found is not None
         return found, spent
 
+    def _searched(
+        self, situation: Situation, pressed: Array, free: Free, plane: Array | None, first: int
+    ) -> tuple[Blocked | _Ended, int]:
+        """Follow the branch from zero pressure, on a coarse grid where its word is good; the answer is on `first`.
+
+        A fold costs many steps that all fail, so it is worth finding where a step is cheap.
+        """
+        spent = 0
+        sizes = [first] if self.numerics.intervals is not None else [first, 2 * first]
+        for size in sizes if first <= _SEARCHED_ON or self.numerics.intervals else [_SEARCHED_ON, *sizes]:
+            found = self._followed(self.grid(size, plane), situation, pressed, free, plane, None)
+            spent += found.solution.iterations if isinstance(found, Blocked) else found.iterations
+            if isinstance(found, _Ended) and found.folded and (size >= first or found.error <= _SURE):
+                break
+            if isinstance(found, Blocked):
+                finer = found if size >= first else self._refined(found, self.grid(first, plane))
+                if finer is not None:
+                    return finer, spent + (0 if finer is found else finer.solution.iterations)
+        return found, spent
+
     def plane(self, situation: Situation) -> Array | None:
         """Return the normal of the plane in which wall, pressures and loads keep the rod, or None in space."""
         plane = situation.wall.plane if situation.wall is not None else None
         if plane is None:
             return None
         column = self.poses.column(self.poses.values(situation.pressure, situation.loads))
-        c = np.asarray(self.functions.section(column, 1.2)[0]).ravel()
-        section_plane = abs(c[2] - c[3]) <= 1e-9 * abs(c[2]) or min(abs(plane[0]), abs(plane[1])) <= 1e-12
-        moment = np.array([c[6], c[7], 0.0])
-        along = np.cross(plane, [0.0, 0.0, 1.0])
-        up = np.array([0.0, 0.0, 1.0])
-        pairs = [(moment, along), (np.asarray(situation.loads.tip_moment, float), along)]
-        pairs += [(np.asarray(situation.loads.tip_moment, float), up)]
-        pairs += [(np.asarray(v, float), plane) for v in (situation.loads.tip_force, situation.loads.gravity)]
-        flat = all(abs(v @ d) <= 1e-9 * max(float(np.linalg.norm(v)), 1e-300) for v, d in pairs)
-        return plane if section_plane and flat else None
+        section = np.asarray(self.functions.section(column, 1.2)[0]).ravel()
+        return plane if keeps_plane(plane, section, situation.loads) else None
 
     def _leads_to(self, near: Blocked, situation: Situation, pressed: Array, plane: Array | None) -> bool:
         """Whether the sequence only rises from a solution to a situation, so that its branch is the followed one."""
@@ -262,7 +269,7 @@ class BlockedSolver:
         final = replace(final, iterations=final.iterations + rough.iterations)
         slips = near.slips if near is not None else None
         if slips is None:
-            slips = _slips(begin, end, [(u, aside) for u, (_, aside) in trace])
+            slips = slipping_pressure(begin, end, [(u, aside) for u, (_, aside) in trace])
         return self._examined(grid, final, end, pressed, (slips, trace[-1][1]), free)
 
     def _followed(
@@ -275,7 +282,7 @@ class BlockedSolver:
         near: Blocked | None,
     ) -> Blocked | _Ended:
         """Follow the branch to `end` from `near`, or from where contact begins on the way from zero pressure."""
-        intervals = free.solved.intervals if free.solved else grid.intervals
+        intervals = self._free_intervals(free, grid)
         shapes = FreeShapes(self.poses, self.functions, intervals, self.contact.tip_cap)
         unloaded = not self.has_wall
         if near is not None:
@@ -332,7 +339,14 @@ class BlockedSolver:
         reached = begin.towards(end, t_0 + followed.fraction * (1 - t_0))
         sizes = [abs(size) for _, (size, _) in trace]
         folded = len(sizes) > 1 and (grid.is_minimum or sizes[-1] < _NEAR_FOLD * max(sizes))
-        return _Ended(reached, folded, spent)
+        error = max(grid.refinement(followed.solution, self._order)) if folded else 0.0
+        return _Ended(reached, folded, spent, error)
+
+    def _free_intervals(self, free: Free, grid: BlockedGrid) -> int:
+        """Return the grid of the free shapes on the way: their lengths lead, only those at its end count."""
+        if free.solved is None:
+            return grid.intervals
+        return min(free.solved.intervals, self.poses.first_intervals(free.column, free.stretch))
 
     def _free_guess(self, grid: BlockedGrid, situation: Situation, shapes: FreeShapes) -> Array:
         """Return x of the free shape without force: exact without loads, else its solution moved to this grid."""
@@ -379,7 +393,7 @@ class BlockedSolver:
         free: Free,
     ) -> Blocked:
         """Return a solution with its discretisation error."""
-        position, rotation, force = grid.refinement(solution, method_named(self.numerics.transcription, 1).order)
+        position, rotation, force = grid.refinement(solution, self._order)
         constants = np.asarray(grid.problem.case_constants(solution.x, solution.p)).ravel()
         worst = max(position, rotation / 5, force / 5)
         return Blocked(situation, pressed, grid, solution, constants, position, worst, *aside, free)

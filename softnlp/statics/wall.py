@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -144,3 +145,24 @@ def standing_wall(poses: PoseSolver, contact: ContactSettings, pressures: Array,
         if branch.status is Status.SOLVED:
             return _wall_at(contact.offset, rest, arc.position + contact.tip_cap * arc.axis)
     return _wall_at(contact.offset, rest, rest)
+
+
+def slipping_pressure(begin: Situation, end: Situation, sideways: list[tuple[float, float]]) -> float | None:
+    """Return the largest set pressure at which the out-of-plane determinant changed its sign, if it has."""
+    for (u, a), (w, b) in pairwise(sideways):
+        if a * b < 0:
+            return float(np.max(begin.towards(end, u + (w - u) * a / (a - b)).pressure))
+    return None
+
+
+def keeps_plane(plane: Array, c: Array, loads: Loads) -> bool:
+    """Whether the section's constants c and the loads keep the rod in a plane of this normal."""
+    section_plane = abs(c[2] - c[3]) <= 1e-9 * abs(c[2]) or min(abs(plane[0]), abs(plane[1])) <= 1e-12
+    moment = np.array([c[6], c[7], 0.0])
+    along = np.cross(plane, [0.0, 0.0, 1.0])
+    up = np.array([0.0, 0.0, 1.0])
+    pairs = [(moment, along), (np.asarray(loads.tip_moment, float), along)]
+    pairs += [(np.asarray(loads.tip_moment, float), up)]
+    pairs += [(np.asarray(v, float), plane) for v in (loads.tip_force, loads.gravity)]
+    flat = all(abs(v @ d) <= 1e-9 * max(float(np.linalg.norm(v)), 1e-300) for v, d in pairs)
+    return section_plane and flat
