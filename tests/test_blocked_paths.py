@@ -18,7 +18,7 @@ from softnlp.base.status import Status
 from softnlp.model.contact_settings import ClosureWeights, ContactSettings
 from softnlp.model.quantities import Model
 from softnlp.nlp.solver import Solution
-from softnlp.statics import weighted
+from softnlp.statics import blocked, weighted
 from softnlp.statics.blocked import BlockedSolver, _Ended
 from softnlp.statics.blocked_grid import Blocked, BlockedGrid
 from softnlp.statics.blocked_step import solved_step
@@ -149,6 +149,32 @@ def test_a_path_that_is_lost_is_followed_once_more_on_a_finer_grid(lost: int, mo
         assert step.status is Status.DIVERGED
         assert last_bar(step) == pytest.approx(0.25 * 0.3)
         assert step.iterations == 14
+
+
+def test_a_fold_is_found_on_a_coarse_grid_and_a_shape_solved_on_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    solver, followed, sizes = of(Numerics()), BlockedSolver._followed, list[int]()
+
+    def watched(self: BlockedSolver, grid: BlockedGrid, *rest: Any) -> Any:
+        sizes.append(grid.intervals)
+        return followed(self, grid, *rest)
+
+    monkeypatch.setattr(BlockedSolver, "_followed", watched)
+    folded = solve(solver, 6.0)[0]
+    assert (folded.status, sizes) == (Status.FOLD, [20])
+    monkeypatch.setattr(blocked, "_SURE", 0.0)  # the coarse grid's word is not taken
+    again = solve(solver, 6.0)[0]
+    assert (again.status, sizes) == (Status.FOLD, [20, 20, 55])
+    assert last_bar(again) == pytest.approx(last_bar(folded), rel=0.01)
+    sizes.clear()
+    reference = solve(solver, 1.5)[0]
+    assert sizes[0] > 8
+    monkeypatch.setattr(blocked, "_SEARCHED_ON", 8)
+    sizes.clear()
+    step, found = solve(solver, 1.5)
+    assert sizes == [8]
+    assert found is not None
+    assert step.intervals == reference.intervals
+    assert force(step) == pytest.approx(force(reference), rel=1e-9)
 
 
 def test_without_a_finer_solution_the_coarse_one_says_how_wrong_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
