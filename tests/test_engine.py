@@ -12,15 +12,23 @@ import pytest
 
 from softnlp import (
     BAR,
+    MILLIMETRE,
     ContactSettings,
+    DesignTask,
     InputError,
     Loads,
+    Measurements,
     Numerics,
+    Range,
     Status,
     Step,
+    at_most,
     blocked_force,
     constrained_pose,
+    design,
+    fit_tensile,
     forward,
+    identify,
     inverse,
     load_scenario,
     material,
@@ -34,9 +42,12 @@ from softnlp.cli import main
 from softnlp.model.ipopt_options import IPOPT_OPTIONS
 from softnlp.nlp import bounded
 from softnlp.nlp.solver import Engine
+from softnlp.scenario.read import scenario_from_text
+from softnlp.studies import identify_nlp, tensile
 from softnlp.sweep import audit as auditing
 from softnlp.sweep.read import load_workspace
 
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
 D25, ECOFLEX = robot("D25L60"), material("Ecoflex 00-50")
 PRESSURES = np.array([[0.2, 0.05, 0.0], [0.4, 0.1, 0.0]]) * BAR
 LOADED = Loads(tip_force=(0.03, 0.02, -0.01), gravity="hanging")
@@ -277,3 +288,87 @@ def test_the_log_is_shown_on_standard_error(tmp_path: Path, capsys: pytest.Captu
     assert json.loads(told.out)["steps"][0]["status"] == "solved"
     assert main(["run", str(written(tmp_path, '[solver]\nengine = "newton"')), "--ipopt-log"]) == 2
     assert "--ipopt-log: IPOPT takes no part" in capsys.readouterr().err
+
+
+# --- searches of constants and of designs -----------------------------------------------------------------------------
+
+
+def measured() -> Measurements:
+    """Return angles of two pressures that no constants meet, and a force."""
+    P = BAR * np.array([[0.6, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    run, pressed = forward(D25, ECOFLEX, P), blocked_force(D25, ECOFLEX, P[:1])
+    angles = [step.pose.bending_angle for step in run.steps if step.pose is not None]
+    assert pressed.steps[0].contact is not None
+    force = [1.03 * pressed.steps[0].contact.force, np.nan]
+    return Measurements(D25, P, bending_angle=[1.02 * angles[0], 0.99 * angles[1]], blocked_force=force)
+
+
+@pytest.mark.parametrize("loads", [Loads(), Loads(gravity="hanging")], ids=["arcs", "loaded"])
+def test_identified_constants_are_those_of_the_whole_program(loads: Loads) -> None:
+    found = {
+        e: identify(measured(), ECOFLEX, ["k_b", "k_e"], loads=loads, numerics=Numerics(intervals=6, engine=e))  # type: ignore[arg-type]
+        for e in ENGINES
+    }
+    for engine, result in found.items():
+        assert (result.status, result.engine) == (Status.SOLVED, engine)
+        off = np.abs(result.constants - found["newton"].constants)
+        assert np.all(off <= 1e-3 * found["newton"].uncertainty.standard_errors)
+        assert (result.ipopt is None) == (engine == "newton")
+    assert found["auto"].ipopt is not None
+    assert found["auto"].ipopt.status == "Solve_Succeeded"
+    assert found["auto"].ipopt.iterations <= 6
+
+
+def test_constants_that_ipopt_can_better_are_disputed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(identify_nlp, "_OF_ERROR", 0.0)
+    real = Engine.solve
+
+    def elsewhere(self: Engine, *given: Any, **more: Any) -> Any:
+        found = real(self, *given, **more)
+        return replace(found, x=found.x + (1e-3 if self.problem.free else 0.0))
+
+    monkeypatch.setattr(Engine, "solve", elsewhere)
+    result = identify(measured(), ECOFLEX, ["k_b", "k_e"], numerics=Numerics(intervals=6))
+    assert result.status is Status.DISPUTED
+    assert np.all(np.isnan(result.constants))
+    assert "k_b = " in result.message
+    assert "IPOPT k_b = " in result.message
+
+
+@pytest.mark.parametrize("law", ["mooney-rivlin", "ogden"])
+def test_a_law_s_constants_are_closed(law: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    stretch = np.linspace(1.05, 2.5, 12)
+    stress = np.asarray(ECOFLEX.engineering_stress(stretch)) * (1 + 0.02 * np.sin(7 * stretch))
+    found = [fit_tensile(stretch, stress, law, numerics=Numerics(engine=e)).fits[law] for e in ENGINES]  # type: ignore[arg-type]
+    assert [fit.status for fit in found] == ["solved"] * 3
+    assert [fit.engine for fit in found] == list(ENGINES)
+    assert found[0].ipopt is None
+    assert all(fit.ipopt is not None and fit.ipopt.status == "Solve_Succeeded" for fit in found[1:])
+    near, real = tensile.nearest_constants, tensile.confirmed_constants
+    monkeypatch.setattr(tensile, "nearest_constants", lambda *given: 1.01 * near(*given))
+    fit = fit_tensile(stretch, stress, law).fits[law]
+    assert fit.status == "disputed"
+    assert fit.material is None
+    assert "the sum of squares falls to 0." in fit.problem
+    assert fit_tensile(stretch, stress, law, numerics=Numerics(engine="newton")).fits[law].status == "solved"
+    assert real is tensile.confirmed_constants
+
+
+def test_a_design_s_candidates_are_closed() -> None:
+    sizes = {"chamber_diameter": Range(4.0 * MILLIMETRE, 5.0 * MILLIMETRE)}
+    task = DesignTask(sizes, 0.8 * BAR, requirements={"stretch": at_most(1.2)}, maximise="blocked_force")
+    best = {e: design(D25, ECOFLEX, task, numerics=Numerics(engine=e)).best for e in ENGINES}  # type: ignore[arg-type]
+    for engine, candidate in best.items():
+        assert candidate is not None
+        assert candidate.step is not None
+        assert candidate.step.engine == engine
+        assert (candidate.step.ipopt is None) == (engine == "newton")
+        assert best["newton"] is not None
+        assert candidate.objective == pytest.approx(best["newton"].objective, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["identify/tensile", "design/D25L60_dimensions"])
+def test_these_studies_take_the_engine_from_a_scenario(name: str) -> None:
+    path = SCENARIOS / f"{name}.toml"
+    text = path.read_text().split("[solver]")[0] + '\n[solver]\nengine = "ipopt"\n'
+    assert scenario_from_text(text, path).numerics.engine == "ipopt"

@@ -84,9 +84,7 @@ def run(
 
 def _with_log(asked: Scenario) -> Scenario:
     """Let IPOPT print its log. Raises `InputError` where it takes no part."""
-    from softnlp.scenario.read import OWN_ENGINE
-
-    if asked.numerics.engine == "newton" or asked.study in OWN_ENGINE:
+    if asked.numerics.engine == "newton":
         raise InputError("IPOPT takes no part that a log shows here", key="--ipopt-log")
     told = {"print_level": 5, **dict(asked.numerics.ipopt)}
     return replace(asked, numerics=replace(asked.numerics, ipopt=told))

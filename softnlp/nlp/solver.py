@@ -20,6 +20,9 @@ from softnlp.nlp.problem import CompiledProblem
 
 Array = NDArray[np.float64]
 
+FROM_SOLUTION = {"mu_init": 1e-9, "bound_push": 1e-9, "bound_frac": 1e-9}
+"""Options for a start that is a solution: it may lie on a bound, from which IPOPT would move it."""
+
 _LONGEST_SOLVE = 60.0  # seconds after which IPOPT is stopped
 _NEWTON_STEPS = 12
 _DIVERGED = 1e4  # scaled residual past which Newton steps are not worth following

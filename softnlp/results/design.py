@@ -24,7 +24,7 @@ from softnlp.model.inputs import (
 )
 from softnlp.model.materials import Material
 from softnlp.model.robot import DIMENSIONS, Robot
-from softnlp.results.document import compact_json
+from softnlp.results.document import compact_json, engine_table
 from softnlp.studies.design import Design
 from softnlp.studies.design_candidate import Candidate
 from softnlp.studies.design_optimise import Active
@@ -90,6 +90,7 @@ def candidate_table(done: Design, candidate: Candidate) -> dict[str, Any]:
         "iterations": candidate.iterations,
         "intervals": candidate.intervals,
         "residual": _plain(candidate.step.residual if candidate.step else None),
+        **engine_table(*((step.engine, step.ipopt) if (step := candidate.step) else (None, None))),
         "warnings": list(candidate.warnings),
         columns.OUTPUTS["solve_time"].key: candidate.solve_time,
     }

@@ -19,9 +19,11 @@ from softnlp.model.inputs import (
     robot_table,
     tidy,
 )
-from softnlp.nlp.solver import EquationResidual
+from softnlp.nlp.solver import EquationResidual, Ipopt
 from softnlp.statics.step import Run, Step
 from softnlp.studies.fields import BLOCKED_FORCE, closure_of, document_outputs, left_by_weights, value
+
+_SAID = ("status", "iterations", "multipliers")
 
 
 def to_json(run: Run) -> dict[str, Any]:
@@ -76,13 +78,17 @@ def _step(run: Run, step: Step) -> dict[str, Any]:
         table["closure"] = closure_of(run, step)
         if table["closure"] == "weighted":
             table["weighted_residual"] = _lines(left_by_weights(step))
-    table["engine"] = step.engine
-    for name in ("status", "iterations", "multipliers"):
-        table[f"ipopt_{name}"] = None if step.ipopt is None else _plain(getattr(step.ipopt, name))
+    table |= engine_table(step.engine, step.ipopt)
     table["residual"] = _plain(step.residual)
     table["certificate"] = _lines(step.certificate)
     table["warnings"] = list(step.warnings)
     return table
+
+
+def engine_table(engine: str | None, ipopt: Ipopt | None) -> dict[str, Any]:
+    """Return which engine solved something, and what IPOPT said of it."""
+    said = {name: None if ipopt is None else _plain(getattr(ipopt, name)) for name in _SAID}
+    return {"engine": engine, **{f"ipopt_{name}": value for name, value in said.items()}}
 
 
 def _lines(residuals: tuple[EquationResidual, ...]) -> list[dict[str, Any]]:

@@ -16,6 +16,7 @@ from softnlp.base.statistics import Statistics
 from softnlp.base.units import BAR, MEGAPASCAL
 from softnlp.model.inputs import loads_table, package_version, tidy
 from softnlp.model.materials import Material
+from softnlp.results.document import engine_table
 from softnlp.studies.free_constants import COEFFICIENTS, file_name
 from softnlp.studies.measurements import OBSERVABLES, column_slice
 
@@ -108,6 +109,7 @@ def _law(fit: LawFit) -> dict[str, Any]:
         "mape_percent": number(fit.misfit.mape),
         "unstable_from_stretch": fit.unstable_from,
         "checks": [_check(check) for check in fit.checks],
+        **engine_table(fit.engine, fit.ipopt),
         "warnings": list(fit.warnings),
     }
 
@@ -197,6 +199,7 @@ def robot_document(asked: Scenario, task: RobotTask, found: Identified) -> dict[
         "tables": scenario_tables(found) if found.status == "solved" else None,
         "measurements": [row for k in range(len(found.data)) for row in _rows(found, k)],
         "evaluations": found.evaluations,
+        **engine_table(found.engine, found.ipopt),
         "warnings": list(found.warnings),
     }
 

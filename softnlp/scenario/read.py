@@ -227,16 +227,9 @@ def _scenario(text: str, path: Path) -> Scenario:
     )
 
 
-OWN_ENGINE = ("identify", "design")
-"""Studies that choose their engine themselves."""
-
-
 def _numerics(file: ScenarioFile) -> Numerics:
-    """Return the choices of [solver]; identification and design have one engine of their own."""
+    """Return the choices of [solver]."""
     solver, options = file.solver, cast(Any, file.solver.ipopt)
-    if file.study in OWN_ENGINE and (solver.engine != "auto" or options.model_fields_set):
-        key = "engine" if solver.engine != "auto" else "ipopt"
-        raise InputError(f"study {file.study!r} chooses its engine itself; remove it", key=key)
     return Numerics(**{**dict(solver), "ipopt": options.model_dump(exclude_unset=True)})
 
 

@@ -60,7 +60,15 @@ def run_tensile(scenario: Scenario) -> TensileFit:
     task = scenario.task
     assert isinstance(task, TensileTask)
     try:
-        fit = fit_tensile(task.stretch, task.stress, task.laws, name=task.name, density=task.density, start=task.start)
+        fit = fit_tensile(
+            task.stretch,
+            task.stress,
+            task.laws,
+            name=task.name,
+            density=task.density,
+            start=task.start,
+            numerics=scenario.numerics,
+        )
     except InputError as error:
         raise error.located(source=str(scenario.path), table="tensile") from None
     fits = {name: replace(law, warnings=(*law.warnings, *_further(task, law))) for name, law in fit.fits.items()}

@@ -138,7 +138,7 @@ class Evaluator:
         self.direction = np.zeros(model.robot.chamber_sets)
         self.direction[list(task.sets)] = 1.0
         self.is_loaded = bool(np.any([setting.loads.tip_force, setting.loads.tip_moment, setting.loads.gravity]))
-        numerics = setting.numerics.without_ipopt()
+        numerics = setting.numerics
         self.solver = blocked_solver(model, numerics, setting.contact) if task.needs_force else None
         self.poses = self.solver.poses if self.solver else pose_solver(model, numerics)
         case = unloaded_case("free", self.functions, self.poses.quantities)

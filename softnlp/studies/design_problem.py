@@ -56,13 +56,14 @@ class DesignProblem:
 
     cases : "free", and "blocked" where a force is asked. limits : of its inequality rows.
     guard : (x, p) -> the determinant of the blocked tip equations, over a fixed value; it keeps
-    its sign on the branch.
+    its sign on the branch. options : of IPOPT, which have the last word.
     """
 
     problem: CompiledProblem
     cases: tuple[LoadCase, ...]
     limits: tuple[Limit, ...]
     guard: ca.Function | None
+    options: tuple[tuple[str, Any], ...] = ()
 
     @property
     def lower(self) -> Array:
@@ -117,6 +118,7 @@ class DesignProblem:
                 "mu_strategy": "adaptive",
                 "max_iter": _ITERATIONS,
                 "max_wall_time": 60.0,
+                **dict(self.options),
             },
         }
         return ca.nlpsol("design", "ipopt", nlp, options)
@@ -177,7 +179,8 @@ def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) ->
         objective=-task.sign * outputs[task.objective.name] / scale.symbol,
     )
     guard = _guard(problem) if len(cases) > 1 else None
-    return DesignProblem(problem, tuple(cases), tuple(_limits(constraints, problem)), guard)
+    options = tuple(dict(evaluator.setting.numerics.ipopt).items())
+    return DesignProblem(problem, tuple(cases), tuple(_limits(constraints, problem)), guard, options)
 
 
 def _guard(problem: CompiledProblem) -> ca.Function:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from softnlp.base.statistics import Statistics, statistics
 from softnlp.base.status import Status
 from softnlp.model.conventions import Coefficients
 from softnlp.model.materials import Material
+from softnlp.nlp.solver import Ipopt
 from softnlp.studies.fit_statistics import Uncertainty, constant_note, determined
 from softnlp.studies.free_constants import FreeConstants
 from softnlp.studies.measurements import OBSERVABLES, Data, column_slice
@@ -49,6 +50,10 @@ class Identified:
         How often all poses were solved.
     warnings
         What the data leave open, and bounds that were reached.
+    engine
+        Which engine found them, of `Numerics`; None without a solution.
+    ipopt
+        What IPOPT said of them, where it took part.
     """
 
     status: Status
@@ -64,6 +69,8 @@ class Identified:
     after: tuple[Array, ...]
     evaluations: int
     warnings: tuple[str, ...]
+    engine: str | None = None
+    ipopt: Ipopt | None = None
 
     @property
     def determined(self) -> dict[str, bool | None]:
@@ -112,6 +119,21 @@ class Identified:
             `Misfit` by observable, in m, rad or N.
         """
         return observable_misfits(self.data, self.after if after else self.before)
+
+
+def without_constants(found: Identified, status: Status, message: str) -> Identified:
+    """Return an identification without a result, which keeps the measurements and the model at the start."""
+    n = len(found.free.names)
+    return replace(
+        found,
+        status=status,
+        message=message,
+        constants=np.full(n, np.nan),
+        at_bound=(),
+        uncertainty=Uncertainty(np.full(n, np.nan), np.full((n, n), np.nan), np.nan, ()),
+        after=tuple(np.full_like(values, np.nan) for values in found.before),
+        warnings=(),
+    )
 
 
 def grown_errors(found: Identified) -> list[str]:

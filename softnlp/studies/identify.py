@@ -23,21 +23,21 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.rod import Loads
 from softnlp.nlp.optimality import OPTIMAL, misfit_slope, not_optimal
-from softnlp.statics.body import Fit
+from softnlp.statics.closing import DisputedError
 from softnlp.statics.wall import checked_contact
 from softnlp.studies.fit_statistics import Uncertainty, open_constants, uncertainty
 from softnlp.studies.forward import checked_loads
 from softnlp.studies.free_constants import FreeConstants, file_name, free_constants
-from softnlp.studies.identified import Identified, grown_errors
+from softnlp.studies.identified import Identified, grown_errors, without_constants
+from softnlp.studies.identify_nlp import closed_fit
 from softnlp.studies.measurements import (
-    COLUMNS,
     POSE_COLUMNS,
     Data,
     Measurements,
     checked_measurements,
 )
-from softnlp.studies.predicted_force import BlockedForces
-from softnlp.studies.predicted_pose import ArcPoses, Failure, FreePoses, LoadedPoses, Prediction
+from softnlp.studies.predicted import Predicted
+from softnlp.studies.predicted_pose import Prediction
 from softnlp.studies.trial import TrialBlocked, TrialPoses
 
 Array = NDArray[np.float64]
@@ -47,6 +47,7 @@ _MOVED = 1e-4  # relative; constants that move more are followed once more from 
 _TIGHT = 1e-13
 _NEARLY = 1e-2  # of a constant or its scale: a rough search that ends nearer to a bound is about to reach it
 _AT_BOUND = 1e-6  # of a constant or its scale
+_NOTHING = Uncertainty(np.zeros(0), np.zeros((0, 0)), np.nan, ())
 _SMALL = 1e-6  # root mean square of residuals with nothing left in them [sigma]
 
 
@@ -105,57 +106,27 @@ def identify(
     contact = checked_contact(contact, [d.robot for d in data if np.any(d.measured[:, -1])])
     if contact.closure == "weighted" and any(np.any(d.measured[:, -1]) for d in data):
         raise InputError("expected a closure that has a definite force; 'weighted' depends on weights", key="closure")
+    searching = numerics if numerics.engine == "ipopt" else numerics.without_ipopt()
     poses: dict[tuple[int, int], TrialPoses] = {}
     forces: dict[tuple[int, int], TrialBlocked] = {}
     models = []
     for d in data:
         kind = (d.robot.chamber_sets, d.robot.chambers_per_set)
         if kind not in poses:
-            poses[kind] = TrialPoses(Model(d.robot, material, coefficients, conventions), numerics.without_ipopt())
+            poses[kind] = TrialPoses(Model(d.robot, material, coefficients, conventions), searching)
         if kind not in forces and np.any(d.measured[:, -1]):
             forces[kind] = TrialBlocked(poses[kind], contact)
-        models.append(_Predicted(d, poses[kind].of(d.robot), forces.get(kind), chosen, loads))
-    return _Fit(data, models, chosen, material, coefficients, progress).solve()
-
-
-class _Predicted:
-    """Everything measured of one robot, as the model predicts it."""
-
-    def __init__(
-        self, data: Data, poses: TrialPoses, blocked: TrialBlocked | None, free: FreeConstants, loads: Loads
-    ) -> None:
-        self._data = data
-        self._solver, self._loads = poses, loads
-        unloaded = not np.any([loads.tip_force, loads.tip_moment, loads.gravity])
-        self._poses: FreePoses = (
-            ArcPoses(poses, data.pressure, free.quantities)
-            if unloaded
-            else LoadedPoses(poses, data.pressure, loads, free.quantities)
-        )
-        self._rows = np.flatnonzero(data.measured[:, -1])
-        self._forces: BlockedForces | None = None
-        if self._rows.size and blocked is not None:
-            self._forces = BlockedForces(blocked.of(data.robot), data.pressure[self._rows], loads, free.quantities)
-
-    def fit(self, constants: Mapping[str, float], row: int) -> Fit | None:
-        """Return how the free shape of a row suits a body, None where it has none."""
-        pose = self._solver.at(constants).solve(self._data.pressure[row], self._loads)[0].pose
-        return None if pose is None else pose.fit
-
-    def evaluate(self, constants: Mapping[str, float], anew: bool) -> Prediction:
-        """Return the values in the order of `COLUMNS`, and their derivatives."""
-        poses = self._poses.evaluate(constants, anew)
-        k, n = len(POSE_COLUMNS), poses.slopes.shape[-1]
-        rows = len(self._data.pressure)
-        values, slopes = np.full((rows, len(COLUMNS)), np.nan), np.full((rows, len(COLUMNS), n), np.nan)
-        values[:, :k], slopes[:, :k] = poses.values[:, :k], poses.slopes[:, :k]
-        failures = poses.failures
-        if self._forces is not None and not failures:
-            r = self._rows
-            forces = self._forces.evaluate(constants, poses.values[r, k:], poses.slopes[r, k:], anew)
-            values[r, k:], slopes[r, k:] = forces.values, forces.slopes
-            failures = tuple(Failure(int(r[f.row]), f.status, f.message) for f in forces.failures)
-        return Prediction(values, slopes, failures)
+        models.append(Predicted(d, poses[kind].of(d.robot), forces.get(kind), chosen, loads))
+    found = _Fit(data, models, chosen, material, coefficients, progress).solve()
+    if found.status is not Status.SOLVED:
+        return found
+    if numerics.engine == "newton":
+        return replace(found, engine=numerics.engine)
+    try:
+        return closed_fit(found, contact, loads, conventions, numerics)
+    except DisputedError as error:
+        lost = without_constants(found, Status.DISPUTED, str(error))
+        return replace(lost, material=material, coefficients=coefficients)
 
 
 class _Fit:
@@ -164,7 +135,7 @@ class _Fit:
     def __init__(
         self,
         data: tuple[Data, ...],
-        models: Sequence[_Predicted],
+        models: Sequence[Predicted],
         free: FreeConstants,
         material: Material,
         coefficients: Coefficients,
@@ -357,11 +328,10 @@ class _Fit:
                 yield from (f"{d.label}, measurement {row + 1}: {words}" for words in fit.warnings)
 
     def _unsolved(self, status: Status, message: str, first: Sequence[Prediction]) -> Identified:
-        n = len(self.free.names)
-        nothing = Uncertainty(np.full(n, np.nan), np.full((n, n), np.nan), np.nan, ())
-        nowhere = [Prediction(np.full_like(p.values, np.nan), p.slopes, ()) for p in first]
-        x = np.full(n, np.nan)
-        return self._result(status, message, x, (), nothing, self.material, self.coefficients, first, nowhere, [])
+        found = self._result(
+            *(status, message, self.free.start, (), _NOTHING, self.material, self.coefficients, first, first, [])
+        )
+        return without_constants(found, status, message)
 
     def _result(
         self,

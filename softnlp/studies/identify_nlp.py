@@ -1,7 +1,7 @@
 """Identification as one NLP: every pose of every measurement an unknown, the constants shared, the misfit minimised.
 
 It is the same problem as that of `softnlp.studies.identify`, which eliminates the poses; here IPOPT moves poses and
-constants together. It is the slower of the two and there to check the other: nothing but the rod is shared.
+constants together. It closes what that search proposes, or solves alone: nothing but the rod is shared.
 """
 
 from __future__ import annotations
@@ -22,22 +22,26 @@ from softnlp.model.materials import Material
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.rod import Loads
-from softnlp.model.tip import tip_conditions
 from softnlp.nlp.problem import CompiledProblem, compile_problem
-from softnlp.nlp.solver import Engine
-from softnlp.nlp.transcription import method_named
-from softnlp.statics.blocked import BlockedSolver
+from softnlp.nlp.solver import FROM_SOLUTION, Engine
+from softnlp.nlp.transcription import Transcription, method_named
 from softnlp.statics.blocked_grid import Blocked
-from softnlp.statics.kept import pose_solver
-from softnlp.statics.loadcase import LoadCase, load_case, rod_functions
+from softnlp.statics.closing import DisputedError
+from softnlp.statics.kept import blocked_solver, pose_solver
+from softnlp.statics.loadcase import LoadCase, load_case
 from softnlp.statics.pose_grid import Solved
+from softnlp.statics.solver import PoseSolver
+from softnlp.statics.unloaded import unloaded_case
 from softnlp.statics.wall import checked_contact, standing_wall
 from softnlp.studies.forward import checked_loads
-from softnlp.studies.free_constants import FreeConstants, free_constants
+from softnlp.studies.free_constants import FreeConstants, file_name, free_constants
+from softnlp.studies.identified import Identified
 from softnlp.studies.measurements import COLUMNS, POSE_COLUMNS, RELATIVE_NOISE, Data, Measurements, checked_measurements
 
 Array = NDArray[np.float64]
 
+_TOLERANCE = 1e-10
+_OF_ERROR = 1e-3  # of a constant's standard error: what IPOPT may move it by
 _OBJECTIVE = RELATIVE_NOISE**2  # what multiplies the cost, so that its gradient is about as large as the equations'
 
 
@@ -59,10 +63,9 @@ class IdentifiedAtOnce:
 class _Nlp:
     """Load cases, values and first guesses, gathered measurement by measurement."""
 
-    def __init__(self, free: FreeConstants, intervals: int) -> None:
+    def __init__(self, free: FreeConstants, numerics: Numerics) -> None:
         self.free = free
-        self.numerics = Numerics(intervals=intervals)
-        self.method = method_named(self.numerics.transcription, intervals)
+        self.numerics = numerics.without_ipopt()
         self.declared: dict[str, Quantity] = {}
         self.cases: list[LoadCase] = []
         self.values: dict[str, Array] = {}
@@ -87,10 +90,10 @@ class _Nlp:
                 given[name] = self.declared.setdefault(name, q)
         for name in ("tip_force", "tip_moment", "gravity"):
             self.values[name] = np.asarray(getattr(loads, name), float)
-        blocked = BlockedSolver(model, self.numerics, contact, poses=poses)
         has_force = bool(np.any(data.measured[:, -1]))
-        wall = standing_wall(poses, blocked.contact, data.pressure, loads) if has_force else None
-        rod = rod_functions(model, tip_conditions(contact.closure)) if has_force else None
+        blocked = blocked_solver(model, self.numerics, contact) if has_force else None
+        wall = standing_wall(poses, blocked.contact, data.pressure, loads) if blocked else None
+        loaded = bool(np.any([loads.tip_force, loads.tip_moment, loads.gravity]))
         near_free: Solved | None = None
         near: Blocked | None = None
         for row, P in enumerate(data.pressure):
@@ -102,31 +105,40 @@ class _Nlp:
             if near_free is None:
                 raise InputError(f"measurement {row + 1}: no pose to start from: {step.message}", key="measurements")
             at = given | {"pressure": self.own(f"{here}.pressure", given["pressure"], P)}
-            free = load_case(f"{here} free", poses.functions, at, self.method)
+            free = self._free(f"{here} free", poses, at, near_free if loaded else None)
             self.cases.append(free)
-            self.guesses.append(near_free.solution.x)
+            self.guesses.append(near_free.solution.x[: None if loaded else 1])
             self._add_squares(_pose_observables(free), data, row, range(len(POSE_COLUMNS)))
             if not mask[-1]:
                 continue
             assert wall is not None
-            assert rod is not None
+            assert blocked is not None
             step, near = blocked.solve(P, loads, wall, near)
             if near is None:
                 raise InputError(f"measurement {row + 1}: no blocked shape: {step.message}", key="measurements")
             lengths = free.outputs["chamber_lengths"]
             contact_values = blocked.values(near.situation, near.pressed, np.zeros(0))
-            for name, q in rod.declared().items():
+            for name, q in blocked.functions.declared(model).items():
                 if name == "contact.free_lengths":
                     at[name] = replace(q, symbol=lengths)
                 elif name == "contact.chamber_reaction":
                     at[name] = self.declared.setdefault(name, q)
                 elif name.startswith("contact."):
                     at[name] = self.own(f"{here}.{name}", q, np.asarray(contact_values.get(name, q.nominal), float))
-            ordered = {name: at[name] for name in rod.declared()}
-            pressed = load_case(f"{here} blocked", rod, ordered, self.method)
+            ordered = {name: at[name] for name in blocked.functions.declared()}
+            pressed = load_case(f"{here} blocked", blocked.functions, ordered, self._method(near.grid.intervals))
             self.cases.append(pressed)
             self.guesses.append(near.solution.x)
             self._add_squares([pressed.outputs["tip_forces"][0]], data, row, [len(COLUMNS) - 1])
+
+    def _method(self, intervals: int) -> Transcription:
+        return method_named(self.numerics.transcription, intervals)
+
+    def _free(self, name: str, poses: PoseSolver, given: Mapping[str, Quantity], solved: Solved | None) -> LoadCase:
+        """Return the case of a free shape on the grid of its solution; None: in closed form, without loads."""
+        if solved is None:
+            return unloaded_case(name, poses.functions, given)
+        return load_case(name, poses.functions, given, self._method(solved.intervals))
 
     def _add_squares(self, observed: Sequence[ca.MX], data: Data, row: int, columns: Sequence[int]) -> None:
         """Add the squared residuals of what was measured."""
@@ -152,11 +164,58 @@ class _Nlp:
             objective=_OBJECTIVE * sum(self.squares[1:], self.squares[0]) / 2,
         )
 
+    def packed(self, problem: CompiledProblem) -> Array:
+        """Return the fixed values of the compiled problem."""
+        known = {q.name for q in problem.fixed}
+        return problem.pack({name: value for name, value in self.values.items() if name in known})
+
+    def start(self, problem: CompiledProblem, constants: Array) -> Array:
+        """Return the first guess of the compiled problem."""
+        return np.concatenate([problem.pack_free(self.free.values(constants)), *self.guesses])
+
 
 def _pose_observables(case: LoadCase) -> list[ca.MX]:
     out = case.outputs
     tip = out["tip_position"]
     return [tip[0], tip[1], tip[2], out["bending_angle"], out["backbone_length"] - case.length_unit]
+
+
+def closed_fit(
+    found: Identified, contact: ContactSettings, loads: Loads, conventions: Conventions, numerics: Numerics
+) -> Identified:
+    """Return constants with IPOPT's word on them.
+
+    IPOPT starts at them, with all poses among its unknowns, each on the grid of its own.
+
+    Raises
+    ------
+    DisputedError
+        Where it finds others: they differ by more than a thousandth of their standard error, and by more than the
+        accuracy asked for, relative to themselves.
+    """
+    nlp = _Nlp(found.free, numerics)
+    for k, data in enumerate(found.data):
+        model = Model(data.robot, found.material, found.coefficients, conventions)
+        nlp.add_robot(data, model, contact, loads, f"robot {k + 1}")
+    problem = nlp.compiled()
+    engine = Engine(problem, tolerance=_TOLERANCE, options={**FROM_SOLUTION, **dict(numerics.ipopt)})
+    solution = engine.solve(nlp.packed(problem), nlp.start(problem, found.constants))
+    constants = np.concatenate([np.zeros(0), *problem.free_values(solution.x).values()])
+    errors = found.uncertainty.standard_errors
+    close = np.fmax(_OF_ERROR * errors, numerics.accuracy * np.maximum(np.abs(found.constants), found.free.scale))
+    if solution.holds(numerics.tolerance) and bool(np.all(np.abs(constants - found.constants) <= close)):
+        return replace(found, engine=numerics.engine, ipopt=solution.ipopt)
+    units = [file_name(name, found.material) for name in found.free.names]
+    texts = (
+        ", ".join(f"{key} = {v / unit:.6g}" for (key, unit), v in zip(units, x, strict=True))
+        for x in (found.constants, constants)
+    )
+    said = "" if solution.ipopt is None else f" ({solution.ipopt.status})"
+    raise DisputedError(
+        "{}; the search found {} and IPOPT {}{}, whose largest residual is {:.2g}".format(
+            Status.DISPUTED.advice, *texts, said, solution.residual
+        )
+    )
 
 
 def identify_at_once(
@@ -183,16 +242,14 @@ def identify_at_once(
     """
     given = (measurements,) if isinstance(measurements, Measurements) else tuple(measurements)
     chosen = free_constants(free, material, coefficients, bounds)
-    nlp = _Nlp(chosen, intervals)
+    nlp = _Nlp(chosen, Numerics(intervals=intervals))
     loads, contact = checked_loads(loads), checked_contact(contact)
     for k, m in enumerate(given):
         data = checked_measurements(m)
         nlp.add_robot(data, Model(data.robot, material, coefficients, conventions), contact, loads, f"robot {k + 1}")
     problem = nlp.compiled()
-    known = {q.name for q in problem.fixed}
-    p = problem.pack({name: value for name, value in nlp.values.items() if name in known})
-    head = problem.pack_free(chosen.values(chosen.start))
-    solution = Engine(problem, tolerance=1e-10).solve(p, np.concatenate([head, *nlp.guesses]))
+    p = nlp.packed(problem)
+    solution = Engine(problem, tolerance=_TOLERANCE).solve(p, nlp.start(problem, chosen.start))
     cost = float(ca.Function("cost", [problem.nlp["x"], problem.nlp["p"]], [problem.nlp["f"]])(solution.x, p))
     cost /= _OBJECTIVE
     holds = solution.holds(nlp.numerics.tolerance)

@@ -20,7 +20,7 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.rod import Loads
 from softnlp.nlp.bounded import Limits
 from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
-from softnlp.nlp.solver import Engine, Solution
+from softnlp.nlp.solver import FROM_SOLUTION, Engine, Solution
 from softnlp.nlp.transcription import method_named
 from softnlp.statics.closing import DisputedError, confirmed
 from softnlp.statics.loadcase import load_case
@@ -31,9 +31,6 @@ from softnlp.studies.aiming import Aim
 from softnlp.studies.tip_map import TipPoint
 
 Array = NDArray[np.float64]
-
-# From a solution: it may lie on a bound, from which IPOPT would move it.
-_FROM_SOLUTION = {"mu_init": 1e-9, "bound_push": 1e-9, "bound_frac": 1e-9}
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +122,7 @@ def inverse_problem(
     problem = compile_problem(
         [*declared.values(), *extra], [case], free=["pressure"], constraints=constraints, objective=objective
     )
-    chosen = {**(_FROM_SOLUTION if closing else {}), **dict(options)}
+    chosen = {**(FROM_SOLUTION if closing else {}), **dict(options)}
     return InverseProblem(Engine(problem, options=chosen), meets)
 
 

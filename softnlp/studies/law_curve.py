@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations_with_replacement, product
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from softnlp.base.errors import InputError
 from softnlp.model.laws import LAWS, Law
+from softnlp.nlp.solver import FROM_SOLUTION, Ipopt
 
 Array = NDArray[np.float64]
 
@@ -24,6 +26,7 @@ _LARGEST_EXPONENT, _AT_BOUND = 40.0, 1 - 1e-6
 _FACTORS = (1.0, 0.2, 5.0, -1.0, 0.04, 25.0)  # of a start for a person's law
 _MOST_GRID, _STARTS_A_SIGN = 1296, 3
 _EXACT = 1e-26  # half the mean square of a misfit that is round-off, relative to the largest stress
+_CLOSE = 1e-11  # tolerance of IPOPT
 _RANK = 1e-13  # relative size below which a direction of the linear constants is noise
 
 
@@ -46,6 +49,10 @@ class LawCurve:
             raise InputError(f"law {law.name!r} has no constant to fit", key="laws")
 
         self.reach = np.where(self.linear, np.inf, _LARGEST_EXPONENT) if law is LAWS["ogden"] else np.full(n, np.inf)
+
+    def symbolic(self, stretch: Array, c: ca.MX) -> ca.MX:
+        """Return the stress (points, 1) of constants that are expressions, in file units."""
+        return self._function(ca.DM(stretch).T, c)[0].T
 
     def at_bound(self, c: Array) -> list[bool]:
         """Return whether each constant, in file units, is at a bound of the search."""
@@ -148,6 +155,26 @@ def nearest_constants(curve: LawCurve, x: Array, y: Array, size: float, starts: 
         if least < _EXACT * x.size:
             break
     return best
+
+
+def confirmed_constants(
+    curve: LawCurve, x: Array, y: Array, size: float, c: Array, options: Any
+) -> tuple[Ipopt, float]:
+    """Return IPOPT's word on constants (file units), from which it starts, and the sum of squares that it ends at.
+
+    options : of IPOPT, which have the last word.
+    """
+    z, root = ca.MX.sym("z", c.size), np.where(c == 0, 1.0, np.abs(c))
+    stress = curve.symbolic(x, z * root)
+    squares = ca.sumsqr((stress - y) / size) / (2 * x.size)
+    given = {"print_level": 0, "sb": "yes", "tol": _CLOSE, **FROM_SOLUTION, **dict(options)}
+    solver = ca.nlpsol("law", "ipopt", {"x": z, "f": squares}, {"print_time": False, "ipopt": given})
+    reach = np.where(np.isfinite(curve.reach), curve.reach, np.inf) / root
+    found = solver(x0=c / root, lbx=-reach, ubx=reach)
+    stats = solver.stats()
+    bounds = float(np.max(np.abs(np.asarray(found["lam_x"])), initial=0.0))
+    stress_there, _ = curve.evaluate(x, np.asarray(found["x"]).ravel() * root)
+    return Ipopt(str(stats["return_status"]), int(stats["iter_count"]), bounds), float(np.sum((stress_there - y) ** 2))
 
 
 def _promising(sums: Sequence[float], starts: Sequence[Array]) -> list[int]:

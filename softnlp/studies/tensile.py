@@ -14,15 +14,19 @@ from numpy.typing import NDArray
 
 from softnlp.base.errors import InputError, MaterialError, nearest
 from softnlp.base.statistics import Statistics, statistics
+from softnlp.base.status import Status
 from softnlp.model.laws import LAWS, Law
 from softnlp.model.materials import DENSITY, Material
+from softnlp.model.numerics import Numerics
+from softnlp.nlp.solver import Ipopt
 from softnlp.studies.fit_statistics import constant_note, determined, open_constants, uncertainty
-from softnlp.studies.law_curve import LawCurve, first_guesses, nearest_constants
+from softnlp.studies.law_curve import LawCurve, confirmed_constants, first_guesses, nearest_constants
 from softnlp.studies.plausibility import Check, curve_checks, law_checks, messages
 
 Array = NDArray[np.float64]
 
 _STRETCH, _STRESS = (1e-4, 1e4), 1e15  # [1], [Pa]: what is beyond is no measurement
+_SAME_SUM = 1e-9  # relative, and of the largest stress: sums of squares that differ by less are the same
 _STRETCHES = 401
 _LOOK_AHEAD = 1.5  # beyond the largest measured stretch, times its extension, stability is looked for
 
@@ -55,13 +59,18 @@ class LawFit:
     checks
         Of the fitted law.
     status
-        "solved", "implausible" where a check of the law or of the data failed, "unstable_material" where it is none.
+        "solved", "implausible" where a check of the law or of the data failed, "unstable_material" where it is none,
+        "disputed" where IPOPT finds a smaller sum of squares.
     material
         Ready to use, None where the fitted law is not solved.
     problem
         Why there is none.
     warnings
         What the data leave open.
+    engine
+        Which engine found the constants, of `Numerics`.
+    ipopt
+        What IPOPT said of them, where it took part.
     """
 
     law: Law
@@ -79,6 +88,8 @@ class LawFit:
     material: Material | None
     problem: str
     warnings: tuple[str, ...]
+    engine: str = "newton"
+    ipopt: Ipopt | None = None
 
     @property
     def determined(self) -> dict[str, bool | None]:
@@ -161,6 +172,7 @@ def fit_tensile(
     name: str = "fitted",
     density: float = DENSITY,
     start: Mapping[str, float] | None = None,
+    numerics: Numerics = Numerics(),
 ) -> TensileFit:
     """Fit laws to a tensile test.
 
@@ -178,6 +190,8 @@ def fit_tensile(
         Of the material that comes out [kg/m^3].
     start
         First guess of the constants of a law of your own [SI]; needed where the stress is not linear in them.
+    numerics
+        Its engine: but for "newton" IPOPT closes each fit from its constants.
 
     Returns
     -------
@@ -198,7 +212,7 @@ def fit_tensile(
         if isinstance(asked_law, str) and asked_law not in LAWS:
             raise InputError(f"unknown law {asked_law!r}{nearest(asked_law, LAWS)}", key="laws")
         law = LAWS[asked_law] if isinstance(asked_law, str) else asked_law
-        fits[law.name] = _fit(law, x, y, name, density, start, messages(checks, "failed"))
+        fits[law.name] = _fit(law, x, y, name, density, start, messages(checks, "failed"), numerics)
     return TensileFit(x, y, fits, checks)
 
 
@@ -241,6 +255,7 @@ def _fit(
     density: float,
     start: Mapping[str, float] | None,
     failed: tuple[str, ...],
+    numerics: Numerics,
 ) -> LawFit:
     """Fit one law. failed : what is wrong with the test itself."""
     curve = LawCurve(law)
@@ -276,6 +291,13 @@ def _fit(
         problem="",
         warnings=(*known.warnings, *open_constants(keys, c, known.standard_errors, held)),
     )
+    if numerics.engine != "newton":
+        said, better = confirmed_constants(curve, x, y, size, c, numerics.ipopt)
+        fit = replace(fit, engine=numerics.engine, ipopt=said)
+        least = float(residuals @ residuals)
+        if better < least * (1 - _SAME_SUM) - (_SAME_SUM * size) ** 2:
+            text = f"{Status.DISPUTED.advice}; the sum of squares falls to {better / least:.9g} of it"
+            return replace(fit, status=Status.DISPUTED.value, problem=text)
     try:
         made = Material(name, law, constants, density, fitted)
     except MaterialError as error:
