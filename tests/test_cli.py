@@ -291,6 +291,49 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_solve(
     assert written() == {"quick.toml"}
 
 
+@pytest.mark.parametrize(
+    ("out", "reason"),
+    [
+        (300 * "n", "not a possible file name"),
+        (f"deeper/{300 * 'n'}/still", "not a possible file name"),
+        ("a\0b", "not a possible file name"),
+        ("/proc/nowhere", "this folder cannot be written"),
+    ],
+    ids=["long", "long and deeper", "NUL", "of the kernel"],
+)
+@pytest.mark.parametrize("command", ["run", "sensitivity"])
+def test_a_folder_that_cannot_be_made_is_refused_before_the_solve(
+    command: str, out: str, reason: str, cli: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if out.startswith("/proc") and not Path("/proc/self").is_dir():
+        pytest.skip("there is no /proc")
+
+    def solve(*_: Any, **__: Any) -> None:
+        raise AssertionError("solved")
+
+    monkeypatch.setattr("softnlp.scenario.run.solve_steps", solve)
+    monkeypatch.setattr("softnlp.studies.report.sensitivity_report", solve)
+    assert reason in complaint(*cli(command, scenario(), "--out", out))
+    assert written() == {"quick.toml"}
+
+
+@pytest.mark.parametrize(
+    ("out", "reason"),
+    [("there.stl", "there.stl: expected a file, got a folder"), (300 * "n" + ".stl", "not a possible file name")],
+    ids=["folder", "long"],
+)
+def test_a_mesh_that_cannot_be_written_is_refused_before_the_solve(
+    out: str, reason: str, cli: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def solve(*_: Any) -> None:
+        raise AssertionError("solved")
+
+    monkeypatch.setattr("softnlp.scenario.run.solve_steps", solve)
+    Path("there.stl").mkdir()
+    assert reason in complaint(*cli("mesh", scenario(), "--out", out))
+    assert written() == {"quick.toml"}
+
+
 def test_results_that_cannot_be_written_are_shown(cli: Run) -> None:
     Path("kept/results.nc").mkdir(parents=True)
     status, out, err = cli("run", scenario(), "--out", "kept")

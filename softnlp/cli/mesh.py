@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say
-from softnlp.cli.folder import require_writable
+from softnlp.cli.folder import require_file
 
 if TYPE_CHECKING:
     from softnlp.figures.mesh import Solid
@@ -61,7 +61,7 @@ def mesh(
 
     target = out or Path(f"{_stem(scenario)}.stl")
     format_of(target)
-    require_writable(target.parent)
+    require_file(target)
     sides = FACETS if facets is None else facets
     require(sides)
     if undeformed:

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
 from softnlp.cli.figures import draw
+from softnlp.cli.folder import require_writable
 from softnlp.model.gravity import gravity_lines
 
 
@@ -59,6 +60,9 @@ def sensitivity(
         raise InputError(f"expected a step from 1 to {count}, got {chosen}", key="--step")
     if samples < 0 or samples == 1:
         raise InputError(f"expected 0, or at least 2 samples, got {samples}", key="--samples")
+    folder = out if out is not None or json else Path("results") / scenario.stem
+    if folder is not None:
+        require_writable(folder)
     pressure = asked.pressures[chosen - 1]
     model = (asked.robot, asked.material, asked.coefficients)
     tolerances = named_tolerances(tolerance, *model, pressure)
@@ -76,7 +80,6 @@ def sensitivity(
             progress=advance,
         )
     document = sensitivity_document(report, asked.title, chosen)
-    folder = out if out is not None or json else Path("results") / scenario.stem
     if folder is not None:
         from softnlp.base.files import make_folder, write_whole
         from softnlp.figures.sensitivity import sensitivity_figure

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import ConfigDict, Field, PlainValidator, TypeAdapter
 
 from softnlp.scenario.schema import MOST_STEPS, Normal, NotNegative, Positive, ScenarioFile, Table, Vector
 
 Rows = Annotated[list[Vector], Field(min_length=1, max_length=MOST_STEPS)]
-Bounds = Annotated[list[NotNegative | list[NotNegative]], Field(min_length=1)]
+_STRICT = ConfigDict(strict=True, allow_inf_nan=False)
+_BOUNDS = TypeAdapter(Annotated[list[NotNegative], Field(min_length=1)], config=_STRICT)
+_PAIRS = TypeAdapter(Annotated[list[list[NotNegative]], Field(min_length=1)], config=_STRICT)
+
+
+def _bounds(value: Any) -> list[float] | list[list[float]]:
+    """Return bounds as they are given: the form is chosen first, so that what is wrong is said of that form alone."""
+    pairs = isinstance(value, list) and any(isinstance(item, list) for item in value)
+    return (_PAIRS if pairs else _BOUNDS).validate_python(value)
+
+
+Bounds = Annotated[list[float] | list[list[float]], PlainValidator(_bounds)]
 Directions = Annotated[list[Normal], Field(min_length=1, max_length=MOST_STEPS)]
 
 
