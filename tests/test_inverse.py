@@ -427,6 +427,7 @@ def test_out_of_reach_is_said_in_every_result(tmp_path: Path, capsys: pytest.Cap
     assert (tmp_path / "figure.png").stat().st_size > 10_000
 
 
+BOUNDS = "[target]\ntip_position_mm = [[0, 0, 1]]\n[bounds]\n"
 BROKEN = {
     "": "[target]: missing",
     "[target]\n": "[target]: expected tip_position_mm, tip_direction or both, got none",
@@ -437,11 +438,11 @@ BROKEN = {
     "[target]\ntip_position_mm = [[0, 0, 1]]\ntip_direction = [[0, 0, 1], [0, 1, 0]]\n": "one direction a position",
     "[target]\ntip_position_mm = [[0, 0, 1]]\n[bounds]\npressure_bar = [1.0]\n": "pressure_bar: expected [lowest",
     "[target]\ntip_position_mm = [[0, 0, 1]]\n[bounds]\npressure_bar = [1.0, 0.5]\n": "highest pressure of at least",
-    "[target]\ntip_position_mm = [[0, 0, 1]]\n[bounds]\npressure_bar = [0, nan]\n": "pressure_bar: item 2: expected a finite number, got nan\n",
-    "[target]\ntip_position_mm = [[0, 0, 1]]\n[bounds]\npressure_bar = [0, true]\n": "pressure_bar: item 2: expected a number, got true\n",
-    "[target]\ntip_position_mm = [[0, 0, 1]]\n[bounds]\npressure_bar = [[0, 1], [0, -1], [0, 1]]\n": "pressure_bar: row 2 column 2: expected a number of at least 0, got -1\n",
-    "[target]\ntip_position_mm = [[0, 0, 1]]\n[bounds]\npressure_bar = [0, [0, 1]]\n": "pressure_bar: item 1: expected a list, got 0\n",
-    "[target]\ntip_position_mm = [[0, 0, 1]]\n[bounds]\npressure_bar = 1.5\n": "pressure_bar: expected a list, got 1.5\n",
+    BOUNDS + "pressure_bar = [0, nan]\n": "pressure_bar: item 2: expected a finite number, got nan\n",
+    BOUNDS + "pressure_bar = [0, true]\n": "pressure_bar: item 2: expected a number, got true\n",
+    BOUNDS + "pressure_bar = [[0, 1], [0, -1], [0, 1]]\n": "row 2 column 2: expected a number of at least 0, got -1\n",
+    BOUNDS + "pressure_bar = [0, [0, 1]]\n": "pressure_bar: item 1: expected a list, got 0\n",
+    BOUNDS + "pressure_bar = 1.5\n": "pressure_bar: expected a list, got 1.5\n",
     "[target]\ntip_position_mm = [[0, 0, 1]]\n[bounds]\npressure_bar = [0.0, 150.0]\n": "at most 100 bar",
     "[target]\ntip_position_mm = [[0, 0, 1]]\n[bounds]\npressure_bar = [[0, 1], [0, 1]]\n": "3 such pairs",
     "[target]\ntip_position_mm = [[0, 0, 1]]\n[pressure]\nsequence_bar = [[0, 0, 0]]\n": "this table is not used",
