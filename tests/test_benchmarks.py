@@ -10,7 +10,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # benchmarks/ is not installed
 
-from benchmarks import paper_method
+from benchmarks import paper_method, structure
 from benchmarks.numpy_field import numpy_field
 from benchmarks.statics import CASES, FIXED, MODEL, PRESSURES, our_new_sequence, paper_sequence, rod_at
 
@@ -33,3 +33,18 @@ def test_the_field_is_the_same_in_arrays_and_in_floats(lengths: bool) -> None:
     plain, arrays = (field(rod, lengths)(y) for field in (paper_method.field, numpy_field))
     assert np.abs(plain).max() > 0.1
     np.testing.assert_allclose(arrays, plain, rtol=1e-12, atol=1e-12)
+
+
+def test_the_structure_is_counted_from_the_sources() -> None:
+    """Known ones are found, and calls are counted from where they begin."""
+    assert {"nlp.solver.Engine", "statics.solver.PoseSolver"} <= set(structure.solvers())
+    assert "statics.branch" in structure.iterating()
+    assert "model.section" not in structure.iterating()
+    assert structure.floors() > structure.floors("studies") > 1
+    assert structure.lines() == sum(len(f.read_text().splitlines()) for f in structure.PACKAGE.rglob("*.py"))
+
+    def inner() -> None:
+        np.linalg.solve(np.eye(2), np.ones(2))
+
+    assert structure.frames(inner) == 0  # no frame of the package is open
+    assert 3 <= structure.frames(structure.calls()["forward"]) <= 12
