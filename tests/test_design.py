@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import queue
 import re
+import threading
 import tomllib
 from contextlib import chdir
 from dataclasses import replace
@@ -50,6 +52,7 @@ from softnlp.statics.solver import PoseSolver
 from softnlp.statics.wall import standing_wall
 from softnlp.studies import design as design_module
 from softnlp.studies.design import Design
+from softnlp.studies.design_candidate import Candidate
 from softnlp.studies.design_evaluate import Evaluator, broken_rules, unmet
 from softnlp.studies.design_optimise import Optimiser, spread
 from softnlp.studies.design_problem import FOLD
@@ -312,6 +315,27 @@ def test_processes_find_what_one_finds() -> None:
     assert [c.number for c in two.candidates] == [1, 2, 3]
     assert [c.objective for c in one.candidates] == [c.objective for c in two.candidates]
     assert [c.material.name for c in one.candidates] == [c.material.name for c in two.candidates]
+
+
+def test_a_process_sends_each_candidate_as_it_is_done_and_stops_between_two(monkeypatch: pytest.MonkeyPatch) -> None:
+    # a whole chunk at once would keep who presses Ctrl-C waiting for all of it
+    sent: queue.Queue[Candidate] = queue.Queue()
+    stop = threading.Event()
+    monkeypatch.setattr(design_module._Worker, "found", sent, raising=False)
+    monkeypatch.setattr(design_module._Worker, "stop", stop, raising=False)
+    task = DesignTask({"material": [SOFT, material("Dragon Skin 10"), material("Ecoflex 00-30")]}, 1.0 * BAR,
+                      maximise="bending_angle")  # fmt: skip
+    whole = design_module.Workshop.candidate
+
+    def candidate(self: Any, number: int, combination: Any) -> Candidate:
+        if number == 2:
+            stop.set()
+        return whole(self, number, combination)
+
+    monkeypatch.setattr(design_module.Workshop, "candidate", candidate)
+    setting = design(D25, SOFT, replace(task, choices={"material": [SOFT]})).setting
+    design_module._chunk(setting, task, list(enumerate(task.combinations(), start=1)))
+    assert [sent.get_nowait().number for _ in range(sent.qsize())] == [1, 2]
 
 
 def test_a_search_finds_the_best_of_few(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from multiprocessing.queues import Queue
+from multiprocessing.synchronize import Event
+from queue import Empty
 from typing import Any
 
 from softnlp.base.processes import begin_worker, process_context
@@ -24,6 +27,7 @@ from softnlp.studies.forward import checked_loads
 
 Progress = Callable[[int, Candidate], None]
 _CHUNK = 8  # candidates that a process is given at once; most of one structure, which is compiled once
+_PATIENCE = 0.2  # [s] without a candidate, after which it is asked whether a process has failed
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,16 +165,44 @@ def _in_processes(
     grouped = sorted(every, key=lambda pair: structure(*with_choices(setting, pair[1])))
     chunks = [grouped[k : k + _CHUNK] for k in range(0, len(grouped), _CHUNK)]
     count = min(workers, len(chunks), os.cpu_count() or 1)
-    pool = ProcessPoolExecutor(count, mp_context=process_context(), initializer=begin_worker)
+    context = process_context()
+    found, stop = context.Queue(), context.Event()
+    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_begin, initargs=(found, stop))
     try:
         jobs = [pool.submit(_chunk, setting, task, chunk) for chunk in chunks]
-        for job in as_completed(jobs):
-            yield from job.result()
+        left = len(every)
+        while left:
+            try:
+                candidate = found.get(timeout=_PATIENCE)
+            except Empty:
+                for job in jobs:
+                    if job.done():
+                        job.result()  # raises what ended it
+            else:
+                left -= 1
+                yield candidate
     finally:
+        stop.set()
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _chunk(setting: Setting, task: DesignTask, chunk: Sequence[tuple[int, Mapping[str, Any]]]) -> list[Candidate]:
-    """Return the candidates of a chunk."""
+class _Worker:
+    """What a worker was told as it began: where candidates go, and what says that no more are wanted."""
+
+    found: Queue[Candidate]
+    stop: Event
+
+
+def _begin(found: Queue[Candidate], stop: Event) -> None:
+    begin_worker()
+    found.cancel_join_thread()  # a parent that stops reads no more
+    _Worker.found, _Worker.stop = found, stop
+
+
+def _chunk(setting: Setting, task: DesignTask, chunk: Sequence[tuple[int, Mapping[str, Any]]]) -> None:
+    """Send the candidates of a chunk, each as it is done."""
     workshop = Workshop(setting, task)
-    return [workshop.candidate(number, combination) for number, combination in chunk]
+    for number, combination in chunk:
+        if _Worker.stop.is_set():
+            return
+        _Worker.found.put(workshop.candidate(number, combination))
