@@ -34,18 +34,21 @@ def run_robots(scenario: Scenario, progress: Progress | None = None) -> Identifi
     """
     task = scenario.task
     assert isinstance(task, RobotTask)
-    found = identify(
-        task.measurements,
-        scenario.material,
-        task.free,
-        coefficients=scenario.coefficients,
-        bounds=task.bounds,
-        contact=scenario.contact or ContactSettings(),
-        loads=scenario.loads,
-        conventions=scenario.conventions,
-        numerics=scenario.numerics,
-        progress=progress,
-    )
+    try:
+        found = identify(
+            task.measurements,
+            scenario.material,
+            task.free,
+            coefficients=scenario.coefficients,
+            bounds=task.bounds,
+            contact=scenario.contact or ContactSettings(),
+            loads=scenario.loads,
+            conventions=scenario.conventions,
+            numerics=scenario.numerics,
+            progress=progress,
+        )
+    except InputError as error:
+        raise error.located(source=str(scenario.path), table="measurements") from None
     return replace(found, warnings=(*task.notes, *found.warnings))
 
 

@@ -164,6 +164,8 @@ def _sigmas(data: Data, given: Mapping[str, Any]) -> Array:
                 raise InputError(f"expected a number or {len(values)} of them", key=f"sigma.{observable}")
             column = np.where(np.isnan(stated), column, stated)
         if not np.all(column[where] > 0) or not np.all(np.isfinite(column[where])):
+            if observable not in given:
+                raise InputError("expected a number that is not 0, or a standard deviation of these", key=observable)
             raise InputError("expected standard deviations above 0", key=f"sigma.{observable}")
         sigma[:, column_slice(observable)] = column[:, None]
     return sigma
