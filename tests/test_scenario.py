@@ -495,3 +495,19 @@ def test_any_value_is_accepted_or_one_line(value: str, key: str) -> None:
         read(scenario(robot=f"[robot]\n'{key}' = {quoted}\n"))
     assert str(caught.value).isprintable()
     assert str(caught.value).startswith("folder/bend.toml: [robot]")
+
+
+@pytest.mark.parametrize(
+    ("given", "warned"),
+    [
+        ('model = "neo-hookean"\nconstants = { mu0_MPa = 0.03 }', None),
+        ('model = "neo-hookean"\nconstants = { mu0_MPa = 30 }', "30 MPa"),
+        ('model = "linear"\nconstants = { E_l_MPa = 0.09e6 }', "3e+04 MPa"),
+        ('model = "own"\nformula = "a * (stretch - 1)"\nconstants = { a = 9e-8 }', "3e-08 MPa"),
+    ],
+    ids=["MPa", "kPa", "Pa", "a million times too soft"],
+)
+def test_constants_in_another_unit_are_warned_of(given: str, warned: str | None) -> None:
+    read = scenario_from_text(scenario(material=f'[material]\nname = "batch 7"\n{given}\n'), "s.toml")
+    said = [f"the shear modulus of batch 7 at stretch 1 is {warned}, expected 0.001 to 10 MPa"] if warned else []
+    assert [warning.split(": ")[0] for warning in read.warnings] == said

@@ -605,3 +605,18 @@ def test_every_key_of_a_target_is_documented() -> None:
     text = (ROOT / "docs" / "inverse.md").read_text()
     for key in (*TargetTable.model_fields, *BoundsTable.model_fields, *(output.key for output in outputs("target"))):
         assert f"`{key}`" in text
+
+
+def test_what_is_warned_of_in_a_scenario_is_said_with_its_sensitivities(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "s.toml"
+    file.write_text(
+        'study = "forward"\n[robot]\nname = "D25L60"\n[material]\nname = "Ecoflex 00-50"\nmodel = "mooney-rivlin"\n'
+        "[pressure]\nsequence_bar = [[0.5, -0.01, 0.0]]\n[solver]\nintervals = 8\naccuracy = 1e-3\n"
+    )
+    assert main(["sensitivity", str(file), "--json"]) == 0
+    shown = capsys.readouterr()
+    (noise,) = json.loads(shown.out)["warnings"]
+    assert "the lowest -0.01 bar, taken as 0" in noise
+    assert noise in shown.err

@@ -79,7 +79,7 @@ def sensitivity(
             samples=samples,
             progress=advance,
         )
-    document = sensitivity_document(report, asked.title, chosen)
+    document = sensitivity_document(report, asked.title, chosen, asked.warnings)
     if folder is not None:
         from softnlp.base.files import make_folder, write_whole
         from softnlp.figures.sensitivity import sensitivity_figure
@@ -95,7 +95,7 @@ def sensitivity(
         for heading, header, rows in table_rows(report):
             say(f"\n{heading}")
             say_rows(header, rows)
-    for warning in report.sensitivities.warnings:
+    for warning in document["warnings"]:
         complain(f"warning: {warning}")
     if not report.solved:
         complain(f"step {chosen}: {report.sensitivities.step.status.value}: {report.sensitivities.step.message}")

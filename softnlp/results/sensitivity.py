@@ -30,8 +30,8 @@ def shown(unit: str) -> tuple[str, float]:
     return SHOWN.get(unit, (unit, 1.0))
 
 
-def sensitivity_document(report: SensitivityReport, title: str, step: int) -> dict[str, Any]:
-    """Return the report as plain data, SI; what is not finite is None."""
+def sensitivity_document(report: SensitivityReport, title: str, step: int, notes: Sequence[str] = ()) -> dict[str, Any]:
+    """Return the report as plain data, SI; what is not finite is None. notes : warnings of what was asked."""
     s = report.sensitivities
     document: dict[str, Any] = {
         "softnlp": package_version(),
@@ -42,7 +42,7 @@ def sensitivity_document(report: SensitivityReport, title: str, step: int) -> di
         "loads": loads_table(report.loads),
         "status": s.step.status.value,
         "message": s.step.message,
-        "warnings": list(s.warnings),
+        "warnings": [*notes, *s.warnings],
         "outputs": [
             {"name": n, "unit": u, "value": v} for n, u, v in zip(s.outputs, s.output_units, s.values, strict=True)
         ],

@@ -30,6 +30,7 @@ from softnlp.scenario.inverse import inverse_task
 from softnlp.scenario.pressures import PressurePath, pressure_path
 from softnlp.scenario.schema import RobotTable, ScenarioFile
 from softnlp.scenario.workspace import workspace_task
+from softnlp.studies.plausibility import modulus_notes
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -68,7 +69,8 @@ class Scenario:
     task
         What else the study is asked.
     warnings
-        Rules of manufacture that the robot breaks with leave, and readings that count as 0.
+        Rules of manufacture that the robot breaks with leave, a silicone of an unlikely stiffness, and readings that
+        count as 0.
     """
 
     path: Path
@@ -223,8 +225,13 @@ def _scenario(text: str, path: Path) -> Scenario:
         numerics=numerics,
         contact=contact,
         task=task,
-        warnings=(*warnings, *steps.notes),
+        warnings=(*warnings, *_material_notes(file.study, chosen), *steps.notes),
     )
+
+
+def _material_notes(study: str, chosen: Material) -> tuple[str, ...]:
+    """Return what is unlikely of the silicone; where constants are to be found those given only begin the search."""
+    return () if study == "identify" else modulus_notes(chosen.name, float(chosen.shear_modulus(1.0)))
 
 
 def _numerics(file: ScenarioFile) -> Numerics:

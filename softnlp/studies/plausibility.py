@@ -134,6 +134,20 @@ def law_checks(modulus: float, r_squared: float, stretch: Array, stress: Array) 
     return tuple(found)
 
 
+def modulus_notes(name: str, modulus: float) -> tuple[str, ...]:
+    """Return the warning of a law that was given, where no silicone is so soft or so stiff.
+
+    name : of the silicone. modulus : its shear modulus at stretch 1 [Pa].
+    """
+    size, (low, high) = modulus / MEGAPASCAL, SHEAR_MODULUS[1]
+    if low <= size <= high:
+        return ()
+    return (
+        f"the shear modulus of {name} at stretch 1 is {size:.4g} MPa, expected {low:g} to {high:g} MPa: check the unit "
+        "of its constants; a stress is in MPa",
+    )
+
+
 def area_check(area: float) -> Check:
     """Return the check of a specimen's cross-section [mm^2]."""
     return Check("cross-section", area, *AREA, "looks like a size that was left at 1 or is not in mm", "mm^2")
