@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from softnlp.base.errors import InputError
 from softnlp.sweep.boundary import WIDENING, Extent, alpha_shape, convex_hull, reach, thinned
 
 RNG = np.random.default_rng(4)
@@ -201,3 +202,9 @@ def test_a_thinned_cloud_has_the_volume_of_the_whole() -> None:
     part = alpha_shape(cloud, most=5000)
     assert part.points <= 5000
     assert part.volume == pytest.approx(4 / 3 * pi * (1 - 0.125), rel=0.16)
+
+
+def test_a_radius_that_leaves_everything_out_is_refused() -> None:
+    with pytest.raises(InputError, match=r"expected a radius of at least 0\.00354 m") as caught:
+        alpha_shape(CUBE * 0.04, 1e-9)
+    assert caught.value.key == "radius"

@@ -388,6 +388,7 @@ def test_starts_are_spread_in_their_box() -> None:
         ({"requirements": {"stretch": replace(at_least(2.0), upper=1.0)}}, "a largest one above it"),
         ({"pressure": -1.0}, "a pressure above 0"),
         ({"pressure": PressureSteps(2.0, 1.0)}, "step <= highest"),
+        ({"pressure": PressureSteps(1e-4, 3e5)}, "at most 10000 steps of pressure, got 3e"),
         ({"sets": (0, 3)}, "sets of 0 to 2"),
         ({"starts": 0}, "at least 1"),
         ({"allow": ("chambers_inside_wall",)}, "expected rules"),

@@ -19,6 +19,7 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.robot import ALLOWABLE, DIMENSIONS, MINIMUM_WALL, Robot, is_number
 from softnlp.model.rod import Loads
 
+MOST_PRESSURES = 10_000  # of `PressureSteps`
 MOST_ENUMERATED = 5000  # combinations above which a search takes the place of enumeration
 COUNTS = tuple(d.field for d in DIMENSIONS if d.scale is None)
 SIZES = tuple(d.field for d in DIMENSIONS if d.scale is not None)
@@ -345,5 +346,10 @@ def _check_pressure(pressure: Any) -> None:
     elif isinstance(pressure, PressureSteps):
         if not 0 < pressure.step <= pressure.highest < inf:
             raise InputError("expected 0 < step <= highest", key="pressure")
+        if pressure.highest / pressure.step > MOST_PRESSURES:
+            raise InputError(
+                f"expected at most {MOST_PRESSURES} steps of pressure, got {pressure.highest / pressure.step:.6g}",
+                key="pressure",
+            )
     elif not (is_number(pressure) and 0 < pressure < inf):
         raise InputError(f"expected a pressure above 0, a range or steps, got {pressure!r}", key="pressure")

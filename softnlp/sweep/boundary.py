@@ -15,6 +15,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.errors import InputError
+
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
@@ -127,7 +129,7 @@ def alpha_shape(
     ----------
     points : the cloud; of more than `most`, one a cell of a grid is taken (`thinned`).
     radius : largest radius of a circumscribed sphere [m]; by default 2.5 times the smallest that takes in 95 % of
-        the points. Those that it leaves out are counted.
+        the points. Those that it leaves out are counted; one that leaves out all of them is an `InputError`.
     parameters : as in `convex_hull`; a surface or a curve in space has no concave boundary, and gets none.
     """
     cloud = _flattened(points)
@@ -140,6 +142,9 @@ def alpha_shape(
     made = _delaunay(local / scale)
     limit = WIDENING * _usual_radius(made, len(local)) if radius is None else radius / scale
     kept = made.radii <= limit
+    if not kept.any():
+        least = float(made.radii.min()) * scale
+        raise InputError(f"expected a radius of at least {least:.3g} m, which takes in part of the cloud", key="radius")
     facets = _outside_facets(made, kept)
     used, numbered = np.unique(facets, return_inverse=True)
     inside = float(np.abs(_contents(local, made.simplices[kept])).sum())
