@@ -694,3 +694,12 @@ def test_a_pose_beyond_the_fitted_stretch_is_named() -> None:
         coefficients=Coefficients(elongation=0),
     )
     assert any("D25L60, measurement 2: the free robot is stretched to" in w for w in far.warnings)
+
+
+@pytest.mark.parametrize(("angles", "told"), [((-28, -66), True), ((0.49, 1.15), True), ((28, 66), False)])
+def test_data_that_the_model_does_not_follow_are_said(angles: tuple[float, float], told: bool, tmp_path: Path) -> None:
+    """Angles with their sign turned or in radians end at a bound, with an error larger than what was measured."""
+    csv = f"p1_bar,p2_bar,p3_bar,bending_angle_deg\n0.5,0,0,{angles[0]}\n1,0,0,{angles[1]}\n"
+    found = run_robots(load_scenario(scenario(tmp_path, csv, 'free = ["k_b"]')))
+    assert found.status is Status.SOLVED
+    assert any("the model does not follow these data; check their unit and sign" in w for w in found.warnings) is told

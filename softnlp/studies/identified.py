@@ -19,6 +19,7 @@ from softnlp.studies.measurements import OBSERVABLES, Data, column_slice
 
 Array = NDArray[np.float64]
 
+UNEXPLAINED = 0.5  # of what was measured; a model that misses by more does not follow the data
 GROWN = 1e-3  # relative; an error that grew by less is the same
 
 
@@ -150,6 +151,18 @@ def grown_errors(found: Identified) -> list[str]:
     return [
         f"the rms error of the {' and of the '.join(grown)} from the start on, while what is minimised, the rms of the "
         f"errors divided by sigma, went {weighted}: say in [sigma] what each observable is worth"
+    ]
+
+
+def unexplained(found: Identified) -> list[str]:
+    """Say of which observables the constants found leave more than half: another unit or sign is likely."""
+    sizes = observable_misfits(found.data, [np.zeros_like(d.values) for d in found.data])
+    left = {key: 100 * after.rmse / sizes[key].rmse for key, after in found.errors().items() if sizes[key].rmse > 0}
+    return [
+        f"the rms error of the {key.replace('_', ' ')} that is left is {percent:.3g} % of what was measured: the model "
+        "does not follow these data; check their unit and sign, the pressures and the robot"
+        for key, percent in left.items()
+        if percent > 100 * UNEXPLAINED
     ]
 
 

@@ -28,7 +28,7 @@ from softnlp.statics.wall import checked_contact
 from softnlp.studies.fit_statistics import Uncertainty, open_constants, uncertainty
 from softnlp.studies.forward import checked_loads
 from softnlp.studies.free_constants import FreeConstants, file_name, free_constants
-from softnlp.studies.identified import Identified, grown_errors, without_constants
+from softnlp.studies.identified import Identified, grown_errors, unexplained, without_constants
 from softnlp.studies.identify_nlp import closed_fit
 from softnlp.studies.measurements import (
     POSE_COLUMNS,
@@ -365,4 +365,4 @@ class _Fit:
             evaluations=self.evaluations,
             warnings=tuple(warnings),
         )
-        return replace(found, warnings=(*found.warnings, *grown_errors(found)))
+        return replace(found, warnings=(*found.warnings, *unexplained(found), *grown_errors(found)))
