@@ -13,6 +13,7 @@ from broken_files import MATERIAL, PRESSURE, ROBOT, STUDY, scenario
 
 from softnlp import BAR, ContactSettings, InputError, Loads, Material, blocked_force, forward, material, robot
 from softnlp.base.ranges import FORCE, RANGES, READING, Range, noise_note, range_of, without_noise
+from softnlp.base.ranges import PRESSURE as PRESSURES
 from softnlp.cli import main
 from softnlp.model.laws import LAWS
 from softnlp.scenario.compare import compare_task
@@ -197,3 +198,8 @@ def test_noise_in_measurements(tmp_path: Path) -> None:
     for read in (lambda: load_measured(table, 3), lambda: compare_task(load_scenario(asked), table)):
         with pytest.raises(InputError, match=r"line 3: p2_bar: expected at least 0 .*got -0.06 bar"):
             read()
+
+
+@pytest.mark.parametrize(("number", "shown"), [(100.0001, "100.0001"), (100.00000000001, "100.00000000001")])
+def test_a_number_refused_is_not_shown_as_one_that_is_expected(number: float, shown: str) -> None:
+    assert PRESSURES.refusal(number).startswith(f"expected at least 0 and at most 100 bar, got {shown} bar")

@@ -51,6 +51,8 @@ class Range:
         unit = f" {self.unit}" if self.unit else ""
         noise = f"; readings down to {self.low - self.noise:g}{unit} count as 0" if self.noise and value < 0 else ""
         got = shown(value) if isinstance(value, int) else f"{value:g}"
+        if not isinstance(value, int) and self.holds(float(got)):  # rounded, it would be a number that is expected
+            got = repr(float(value))
         return f"expected at least {self.low:g} and at most {self.high:g}{unit}, got {got}{unit}{noise}{self.hint}"
 
     def require(self, values: Any, key: str) -> None:
