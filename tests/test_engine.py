@@ -13,6 +13,7 @@ import pytest
 from softnlp import (
     BAR,
     MILLIMETRE,
+    Coefficients,
     ContactSettings,
     DesignTask,
     InputError,
@@ -293,10 +294,15 @@ def test_the_log_is_shown_on_standard_error(tmp_path: Path, capsys: pytest.Captu
 # --- searches of constants and of designs -----------------------------------------------------------------------------
 
 
+PRESSED = ContactSettings(closure="compliant")
+
+
 def measured() -> Measurements:
     """Return angles of two pressures that no constants meet, and a force."""
     P = BAR * np.array([[0.6, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    run, pressed = forward(D25, ECOFLEX, P), blocked_force(D25, ECOFLEX, P[:1])
+    stiff = Coefficients(bending=4.0)
+    run = forward(D25, ECOFLEX, P, coefficients=stiff)
+    pressed = blocked_force(D25, ECOFLEX, P[:1], contact=PRESSED, coefficients=stiff)
     angles = [step.pose.bending_angle for step in run.steps if step.pose is not None]
     assert pressed.steps[0].contact is not None
     force = [1.03 * pressed.steps[0].contact.force, np.nan]
@@ -306,7 +312,9 @@ def measured() -> Measurements:
 @pytest.mark.parametrize("loads", [Loads(), Loads(gravity="hanging")], ids=["arcs", "loaded"])
 def test_identified_constants_are_those_of_the_whole_program(loads: Loads) -> None:
     found = {
-        e: identify(measured(), ECOFLEX, ["k_b", "k_e"], loads=loads, numerics=Numerics(intervals=6, engine=e))  # type: ignore[arg-type]
+        e: identify(
+            measured(), ECOFLEX, ["k_b", "k_c"], loads=loads, contact=PRESSED, numerics=Numerics(intervals=6, engine=e)
+        )  # type: ignore[arg-type]
         for e in ENGINES
     }
     for engine, result in found.items():
@@ -328,7 +336,7 @@ def test_constants_that_ipopt_can_better_are_disputed(monkeypatch: pytest.Monkey
         return replace(found, x=found.x + (1e-3 if self.problem.free else 0.0))
 
     monkeypatch.setattr(Engine, "solve", elsewhere)
-    result = identify(measured(), ECOFLEX, ["k_b", "k_e"], numerics=Numerics(intervals=6))
+    result = identify(measured(), ECOFLEX, ["k_b", "k_c"], contact=PRESSED, numerics=Numerics(intervals=6))
     assert result.status is Status.DISPUTED
     assert np.all(np.isnan(result.constants))
     assert "k_b = " in result.message

@@ -194,5 +194,5 @@ def _without_second_source(study: str, tables: tomlkit.TOMLDocument) -> None:
 def _without_a_robots_tables(study: str, tables: tomlkit.TOMLDocument) -> None:
     """Take what a tensile test does not use out of it."""
     if study == "identify" and "tensile" in tables and "measurements" not in tables:
-        for name in UNUSED_BY_TENSILE:
+        for name in (*UNUSED_BY_TENSILE, "solver"):  # whose grid means nothing there
             tables.pop(name, None)

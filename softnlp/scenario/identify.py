@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 RobotMaker = Callable[[RobotTable], Robot]
 
-UNUSED_BY_TENSILE = ("robots", "sigma", "contact", "gravity", "tip_load", "stiffening", "corrections", "solver")
+UNUSED_BY_TENSILE = ("robots", "sigma", "contact", "gravity", "tip_load", "stiffening", "corrections")
 _UNUSED_CONTACT = ("offsets_mm", "offset_ramp", "target_force_N")
 _STRETCHES: Mapping[str, tuple[float, float]] = {"stretch": (1, 0), "strain": (1, 1), "strain_percent": (0.01, 1)}
 _STRESSES: Mapping[str, float] = {"stress_MPa": MEGAPASCAL, "stress_kPa": KILOPASCAL, "stress_Pa": 1.0}
@@ -68,6 +68,8 @@ def identify_task(given: Given) -> TensileTask | RobotTask:
         for name in UNUSED_BY_TENSILE:
             if name in given.written:
                 raise InputError("this table is not used by a tensile test; remove it", table=name)
+        for key in sorted(file.solver.model_fields_set - {"engine", "ipopt"}):
+            raise InputError("not used by a tensile test; remove it", table="solver", key=key)
         return _located("tensile", lambda: _tensile(given, tensile))
     if measured is None or tensile is not None:
         got = "neither" if measured is None else "both"

@@ -113,7 +113,10 @@ class _Nlp:
                 continue
             assert wall is not None
             assert blocked is not None
-            step, near = blocked.solve(P, loads, wall, near)
+            step, found = blocked.solve(P, loads, wall, near)
+            if found is None and step.status.has_solution:
+                continue  # it does not press the wall, whatever the constants: the force is 0
+            near = found
             if near is None:
                 raise InputError(f"measurement {row + 1}: no blocked shape: {step.message}", key="measurements")
             lengths = free.outputs["chamber_lengths"]
@@ -196,7 +199,10 @@ def closed_fit(
     nlp = _Nlp(found.free, numerics)
     for k, data in enumerate(found.data):
         model = Model(data.robot, found.material, found.coefficients, conventions)
-        nlp.add_robot(data, model, contact, loads, f"robot {k + 1}")
+        try:
+            nlp.add_robot(data, model, contact, loads, f"robot {k + 1}")
+        except InputError as error:
+            raise DisputedError(f"{Status.DISPUTED.advice}; {error.message}") from None
     problem = nlp.compiled()
     engine = Engine(problem, tolerance=_TOLERANCE, options={**FROM_SOLUTION, **dict(numerics.ipopt)})
     solution = engine.solve(nlp.packed(problem), nlp.start(problem, found.constants))
