@@ -299,14 +299,14 @@ PRESSED = ContactSettings(closure="compliant")
 
 def measured() -> Measurements:
     """Return angles of two pressures that no constants meet, and a force."""
-    P = BAR * np.array([[0.6, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    P = BAR * np.array([[0.6, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # the last one is straight
     stiff = Coefficients(bending=4.0)
     run = forward(D25, ECOFLEX, P, coefficients=stiff)
     pressed = blocked_force(D25, ECOFLEX, P[:1], contact=PRESSED, coefficients=stiff)
     angles = [step.pose.bending_angle for step in run.steps if step.pose is not None]
     assert pressed.steps[0].contact is not None
-    force = [1.03 * pressed.steps[0].contact.force, np.nan]
-    return Measurements(D25, P, bending_angle=[1.02 * angles[0], 0.99 * angles[1]], blocked_force=force)
+    force = [1.03 * pressed.steps[0].contact.force, np.nan, np.nan]
+    return Measurements(D25, P, bending_angle=[1.02 * angles[0], 0.99 * angles[1], 0.0], blocked_force=force)
 
 
 @pytest.mark.parametrize("loads", [Loads(), Loads(gravity="hanging")], ids=["arcs", "loaded"])

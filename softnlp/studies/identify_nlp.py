@@ -37,10 +37,12 @@ from softnlp.studies.forward import checked_loads
 from softnlp.studies.free_constants import FreeConstants, file_name, free_constants
 from softnlp.studies.identified import Identified
 from softnlp.studies.measurements import COLUMNS, POSE_COLUMNS, RELATIVE_NOISE, Data, Measurements, checked_measurements
+from softnlp.studies.predicted_pose import STRAIGHT
 
 Array = NDArray[np.float64]
 
 _TOLERANCE = 1e-10
+_ANGLE = POSE_COLUMNS.index("bending_angle")  # which has no derivative where a shape is straight
 _OF_ERROR = 1e-3  # of a constant's standard error: what IPOPT may move it by
 _OBJECTIVE = RELATIVE_NOISE**2  # what multiplies the cost, so that its gradient is about as large as the equations'
 
@@ -108,7 +110,10 @@ class _Nlp:
             free = self._free(f"{here} free", poses, at, near_free if loaded else None)
             self.cases.append(free)
             self.guesses.append(near_free.solution.x[: None if loaded else 1])
-            self._add_squares(_pose_observables(free), data, row, range(len(POSE_COLUMNS)))
+            assert step.pose is not None
+            columns = [k for k in range(len(POSE_COLUMNS)) if k != _ANGLE or step.pose.bending_angle >= STRAIGHT]
+            observed = _pose_observables(free)
+            self._add_squares([observed[k] for k in columns], data, row, columns)
             if not mask[-1]:
                 continue
             assert wall is not None
@@ -239,7 +244,7 @@ def identify_at_once(
     """Find the constants as `softnlp.studies.identify.identify` does, with all poses as unknowns of one NLP.
 
     The arguments are those of `identify`; intervals : of every rod. It starts from the poses at the first constants.
-    A bending angle of a straight shape cannot be among the measurements: it has no derivative.
+    The bending angle of a straight shape, which has no derivative, is left out.
 
     Raises
     ------

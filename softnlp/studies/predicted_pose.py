@@ -28,7 +28,8 @@ Array = NDArray[np.float64]
 
 _NEWTON_STEPS, _LARGEST_CHANGE = 20, 0.1
 _NO_CURVATURE = 1e-30  # squared, under the root: the bending angle has no derivative at a straight shape
-_STRAIGHT = 1e-8  # [rad]
+STRAIGHT = 1e-8
+"""Bending angle of a straight shape [rad]; it has no derivative there."""
 _LARGEST_JUMP = 0.3  # of a scaled position or direction cosine, between solutions at two sets of constants
 
 
@@ -191,7 +192,7 @@ class LoadedPoses:
             found.intervals, lambda: _pose_derivatives(found.grid, len(self._positions))
         )
         values, slopes = derivatives(x, p, unit_directions(p.size, self._positions))
-        if values[3] < _STRAIGHT:
+        if values[3] < STRAIGHT:
             slopes[3] = 0.0
         return values, slopes
 
