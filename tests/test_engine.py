@@ -343,6 +343,13 @@ def test_constants_that_ipopt_can_better_are_disputed(monkeypatch: pytest.Monkey
     assert "IPOPT k_b = " in result.message
 
 
+def test_more_rods_than_ipopt_takes_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(identify_nlp, "MOST_RODS", 0)
+    result = identify(measured(), ECOFLEX, ["k_b", "k_c"], contact=PRESSED, numerics=Numerics(intervals=6))
+    assert (result.status, result.engine, result.ipopt) == (Status.SOLVED, "auto", None)
+    assert "IPOPT did not close the constants: 1 rods would be" in result.warnings[-1]
+
+
 @pytest.mark.parametrize("law", ["mooney-rivlin", "ogden"])
 def test_a_law_s_constants_are_closed(law: str, monkeypatch: pytest.MonkeyPatch) -> None:
     stretch = np.linspace(1.05, 2.5, 12)

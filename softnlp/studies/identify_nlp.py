@@ -41,6 +41,9 @@ from softnlp.studies.predicted_pose import STRAIGHT
 
 Array = NDArray[np.float64]
 
+MOST_RODS = 16
+"""Loaded and blocked shapes that IPOPT takes as unknowns at once; its second derivatives of more take minutes."""
+
 _TOLERANCE = 1e-10
 _ANGLE = POSE_COLUMNS.index("bending_angle")  # which has no derivative where a shape is straight
 _OF_ERROR = 1e-3  # of a constant's standard error: what IPOPT may move it by
@@ -191,7 +194,7 @@ def _pose_observables(case: LoadCase) -> list[ca.MX]:
 def closed_fit(
     found: Identified, contact: ContactSettings, loads: Loads, conventions: Conventions, numerics: Numerics
 ) -> Identified:
-    """Return constants with IPOPT's word on them.
+    """Return constants with IPOPT's word on them, or with a warning where there are too many rods for it.
 
     IPOPT starts at them, with all poses among its unknowns, each on the grid of its own.
 
@@ -201,6 +204,11 @@ def closed_fit(
         Where it finds others: they differ by more than a thousandth of their standard error, and by more than the
         accuracy asked for, relative to themselves.
     """
+    loaded = bool(np.any([loads.tip_force, loads.tip_moment, loads.gravity]))
+    rods = sum(int(np.sum(d.measured[:, -1])) + loaded * len(d.pressure) for d in found.data)
+    if rods > MOST_RODS:
+        note = f"IPOPT did not close the constants: {rods} rods would be its unknowns, and it takes at most {MOST_RODS}"
+        return replace(found, engine=numerics.engine, warnings=(*found.warnings, note))
     nlp = _Nlp(found.free, numerics)
     for k, data in enumerate(found.data):
         model = Model(data.robot, found.material, found.coefficients, conventions)
