@@ -5,7 +5,8 @@ A solve that fails is not an exception: it is a step with a named `softnlp.base.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 
 _MOST_LISTED = 50  # names in one message
@@ -87,3 +88,12 @@ def listed(names: Iterable[str]) -> str:
     every = list(names)
     more = len(every) - _MOST_LISTED
     return ", ".join(every) if more <= 0 else f"{', '.join(every[:_MOST_LISTED])} and {more} more"
+
+
+@contextmanager
+def located(*, source: str | None = None, table: str | None = None) -> Iterator[None]:
+    """Fill the places in that an `InputError` from within does not know, see `InputError.located`."""
+    try:
+        yield
+    except InputError as error:
+        raise error.located(source=source, table=table) from None

@@ -46,6 +46,11 @@ class Loads:
         if isinstance(self.gravity, str):
             object.__setattr__(self, "gravity", gravity_named(self.gravity))
 
+    @property
+    def act(self) -> bool:
+        """Whether any of them is not zero."""
+        return any(bool(value) for load in (self.tip_force, self.tip_moment, self.gravity) for value in load)
+
 
 class RodSection(NamedTuple):
     """What the rod asks of its section at s, in one consistent system of units.

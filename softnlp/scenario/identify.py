@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import Columns, read_columns
-from softnlp.base.errors import InputError, listed, nearest
+from softnlp.base.errors import InputError, listed, located, nearest
 from softnlp.base.ranges import noise_note
 from softnlp.base.reading import shown
 from softnlp.base.units import KILOPASCAL, MEGAPASCAL, MILLIMETRE
@@ -70,21 +69,16 @@ def identify_task(given: Given) -> TensileTask | RobotTask:
                 raise InputError("this table is not used by a tensile test; remove it", table=name)
         for key in sorted(file.solver.model_fields_set - {"engine", "ipopt"}):
             raise InputError("not used by a tensile test; remove it", table="solver", key=key)
-        return _located("tensile", lambda: _tensile(given, tensile))
+        with located(table="tensile"):
+            return _tensile(given, tensile)
     if measured is None or tensile is not None:
         got = "neither" if measured is None else "both"
         raise InputError(f"expected a table [tensile] or a table [measurements], got {got}", table="measurements")
     if "material" not in given.written:
         raise InputError("missing; expected a table with name and model", table="material")
     _refuse_contact(file.contact)
-    return _located("measurements", lambda: _robots(given, measured))
-
-
-def _located(table: str, build: Callable[[], T]) -> T:
-    try:
-        return build()
-    except InputError as error:
-        raise error.located(table=table) from None
+    with located(table="measurements"):
+        return _robots(given, measured)
 
 
 def _refuse_contact(table: ContactTable) -> None:
@@ -223,7 +217,10 @@ def _size(table: TensileTable, key: str) -> float:
 
 def _robots(given: Given, table: MeasurementsTable) -> RobotTask:
     tables = [read_columns(given.folder, file) for file in _files(table)]
-    own = {name: _located(f"robots.{name}", partial(given.make_robot, t)) for name, t in given.file.robots.items()}
+    own = {}
+    for name, described in given.file.robots.items():
+        with located(table=f"robots.{name}"):
+            own[name] = given.make_robot(described)
     header = tuple(dict.fromkeys(name for columns in tables for name in columns.header))
     for columns in tables:
         if "robot" not in columns and "robot" not in given.written:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from softnlp.base.errors import InputError
+from softnlp.base.errors import located
 from softnlp.base.statistics import NOTHING
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.scenario.read import Scenario
@@ -34,7 +34,7 @@ def run_robots(scenario: Scenario, progress: Progress | None = None) -> Identifi
     """
     task = scenario.task
     assert isinstance(task, RobotTask)
-    try:
+    with located(source=str(scenario.path), table="measurements"):
         found = identify(
             task.measurements,
             scenario.material,
@@ -47,8 +47,6 @@ def run_robots(scenario: Scenario, progress: Progress | None = None) -> Identifi
             numerics=scenario.numerics,
             progress=progress,
         )
-    except InputError as error:
-        raise error.located(source=str(scenario.path), table="measurements") from None
     return replace(found, warnings=(*task.notes, *found.warnings))
 
 
@@ -62,7 +60,7 @@ def run_tensile(scenario: Scenario) -> TensileFit:
     """
     task = scenario.task
     assert isinstance(task, TensileTask)
-    try:
+    with located(source=str(scenario.path), table="tensile"):
         fit = fit_tensile(
             task.stretch,
             task.stress,
@@ -72,8 +70,6 @@ def run_tensile(scenario: Scenario) -> TensileFit:
             start=task.start,
             numerics=scenario.numerics,
         )
-    except InputError as error:
-        raise error.located(source=str(scenario.path), table="tensile") from None
     fits = {name: replace(law, warnings=(*law.warnings, *_further(task, law))) for name, law in fit.fits.items()}
     return replace(fit, fits=fits, checks=(*task.checks, *fit.checks))
 

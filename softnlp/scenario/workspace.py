@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.base.errors import InputError, nearest
+from softnlp.base.errors import InputError, located, nearest
 from softnlp.base.reading import shown
 from softnlp.base.units import BAR, MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.model.contact_settings import require_in_front
@@ -71,10 +71,8 @@ def workspace_task(file: WorkspaceFile, robot: Robot, material: Material, pressu
     _check_varied(task, file, robot, material)
     if file.contact is not None:
         lengths = [v for axis in task.vary if axis.quantity == "robot.length" for v in axis.values.tolist()]
-        try:
+        with located(table="contact"):
             require_in_front(contact_settings(file.contact), lengths)
-        except InputError as error:
-            raise error.located(table="contact") from None
     return task
 
 

@@ -117,7 +117,7 @@ class BlockedSolver:
         free = free_shape(self.poses, situation.pressure, free_loads, self.contact.tip_cap, near.free if near else None)
         if isinstance(free, Step):
             return replace(free, solve_time=time.perf_counter() - began), None
-        touch = TOUCHING + 3 * free.error if situation.is_loaded else TOUCHING
+        touch = TOUCHING + 3 * free.error if situation.loads.act else TOUCHING
         if wall is not None:
             ahead = wall.gap(free.contact_point)
             if ahead > -touch * float(self.model.robot.length):
@@ -354,7 +354,7 @@ class BlockedSolver:
         stretch = shapes.stretch(column)
         s = grid.case.transcribed.points
         states = np.asarray(self.functions.arc(column, stretch, s[None, :]))
-        if situation.is_loaded and self.has_wall:
+        if situation.loads.act and self.has_wall:
             _, solved = self.poses.solve(situation.pressure, situation.loads)
             if solved is not None:
                 nodes = np.vstack([solved.nodes, np.zeros((states.shape[0] - STATE_SIZE, solved.nodes.shape[1]))])

@@ -42,8 +42,10 @@ def confirmed(engine: Engine, proposed: Solution, found: Solution, numerics: Num
         return found
     length = float(np.asarray(engine.problem.units(proposed.x, proposed.p)).ravel()[0]) / MILLIMETRE
     here, there = (", ".join(f"{length * v:.6g}" for v in solution.x[tip]) for solution in (proposed, found))
+    raise disputed(f"the tip is at ({here}) mm by Newton's method and at ({there}) mm by IPOPT", found)
+
+
+def disputed(both: str, found: Solution) -> DisputedError:
+    """Return the error of two answers, in words that end with that of IPOPT."""
     said = "" if found.ipopt is None else f" ({found.ipopt.status})"
-    raise DisputedError(
-        f"{Status.DISPUTED.advice}; the tip is at ({here}) mm by Newton's method and at ({there}) mm by IPOPT{said}, "
-        f"whose largest residual is {found.residual:.2g}"
-    )
+    return DisputedError(f"{Status.DISPUTED.advice}; {both}{said}, whose largest residual is {found.residual:.2g}")

@@ -21,10 +21,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.nlp.linear import BorderedSolver, LinearSolver, ManySidedSolver, SparseSolver
+from softnlp.nlp.case import Case
+from softnlp.nlp.linear import BorderedSolver, LinearSolver, SparseSolver
 from softnlp.nlp.problem import CompiledProblem
 from softnlp.nlp.transcription import MultipleShooting, Tableau, rk_step
-from softnlp.statics.loadcase import LoadCase, RodFunctions
+from softnlp.statics.loadcase import LoadCase, RodFunctions, stretch_imbalance
 
 Array = NDArray[np.float64]
 
@@ -137,26 +138,29 @@ def plane_directions(normal: Array, size: int) -> tuple[Array, Array]:
 
 def linear_solver(problem: CompiledProblem) -> LinearSolver:
     """Return what solves J dx = -g of a square problem: its cases condensed where all are by multiple shooting."""
-    solvers: list[ManySidedSolver] = []
-    for case in problem.cases:
-        if not isinstance(case, LoadCase) or not (case.method is None or isinstance(case.method, MultipleShooting)):
-            return SparseSolver(problem)
-        shooting = case.method
-        solvers.append(CondensedSolver(case.functions, shooting) if shooting else StretchSolver(case.functions))
-    return BorderedSolver(problem, solvers)
+    solvers = [case_solver(case) for case in problem.cases]
+    own = [solver for solver in solvers if solver is not None]
+    return BorderedSolver(problem, own) if len(own) == len(solvers) else SparseSolver(problem)
+
+
+def case_solver(case: Case) -> CondensedSolver | StretchSolver | None:
+    """Return what solves a case with every quantity fixed, None where a sparse factorisation has to."""
+    if isinstance(case, LoadCase) and case.method is None:
+        return StretchSolver(case.functions)
+    if isinstance(case, LoadCase) and isinstance(case.method, MultipleShooting):
+        return CondensedSolver(case.functions, case.method)
+    return None
 
 
 class StretchSolver:
     """Solves the stretch balance of a shape without loads, whose stretch is all that is unknown."""
 
     def __init__(self, functions: RodFunctions) -> None:
-        column, stretch = ca.SX.sym("p", functions.section.size1_in(0)), ca.SX.sym("stretch")
-        _, balance, _ = functions.section(column, stretch)
-        self._slope = ca.Function("slope", [stretch, column], [ca.jacobian(balance, stretch)])
+        self._imbalance = stretch_imbalance(functions)
 
     def solve_many(self, x: Array, p: Array, G: Array) -> Array:
         """Return the columns dx (1, r). Raises `numpy.linalg.LinAlgError` at the end of the branch."""
-        slope = float(self._slope(x, p))
+        slope = float(self._imbalance(p, x)[1])
         if not (np.isfinite(slope) and slope):
             raise np.linalg.LinAlgError("the slope of the stretch balance is zero or not finite")
         return -np.asarray(G) / slope

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.status import Status
 from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.statics.arc import Arc, arc_pose, unloaded_arc
-from softnlp.statics.loadcase import RodFunctions
+from softnlp.statics.loadcase import RodFunctions, stretch_imbalance
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Pose, Step
@@ -63,7 +61,7 @@ def free_shape(poses: PoseSolver, pressure: Array, loads: Loads, tip_cap: float,
 
     near : of a neighbouring pose, where there is one.
     """
-    if not np.any([loads.tip_force, loads.tip_moment, loads.gravity]):
+    if not loads.act:
         branch, arc = unloaded_arc(poses, pressure)
         if branch.status is not Status.SOLVED:
             return Step(pressure, branch.status, branch.message)
@@ -76,14 +74,6 @@ def free_shape(poses: PoseSolver, pressure: Array, loads: Loads, tip_cap: float,
     return Free(solved.solution.p, float(x[0]), pose.chamber_length, point, solved=solved, step=step)
 
 
-@lru_cache(maxsize=8)
-def _balance(functions: RodFunctions) -> ca.Function:
-    """Return (quantities, stretch) -> the stretch imbalance and its slope."""
-    column, stretch = ca.SX.sym("p", functions.section.size1_in(0)), ca.SX.sym("stretch")
-    _, balance, _ = functions.section(column, stretch)
-    return ca.Function("balance", [column, stretch], [balance, ca.jacobian(balance, stretch)])
-
-
 class FreeShapes:
     """Free shapes of one model, each found from the last: an arc in closed form, or Newton where loads act."""
 
@@ -94,7 +84,7 @@ class FreeShapes:
         self._tip_cap = tip_cap
         self._last_x: Array | None = None
         self._last_stretch = 1.0
-        self._balance = _balance(functions)
+        self._balance = stretch_imbalance(functions)
 
     def begin(self, stretch: float, x: Array | None) -> None:
         """Start again from a known stretch, and from the pose problem's solution x there if it is known."""
@@ -118,7 +108,7 @@ class FreeShapes:
         column = self._poses.column(values)
         stretch = self.stretch(column)
         L_0 = float(self._poses.model.robot.length)
-        if not situation.is_loaded:
+        if not situation.loads.act:
             state = np.asarray(self._functions.arc(column, stretch, 1.0)).ravel()
             return state[STATE_SIZE:] * L_0, (state[:3] + self._tip_cap / L_0 * state[9:12]) * L_0
         grid = self._poses.grid(self._intervals)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -117,6 +118,14 @@ def rod_functions(model: Model, conditions: TipConditions = DEAD_LOADS) -> RodFu
         contact=ca.Function("contact", [x, c, y, a, units], judged),
         arc=ca.Function("arc", [column, stretch, s], [arc]),
     )
+
+
+@lru_cache(maxsize=8)
+def stretch_imbalance(functions: RodFunctions) -> ca.Function:
+    """Return (quantities, stretch) -> the scaled stretch imbalance and its slope."""
+    column, stretch = ca.SX.sym("p", functions.section.size1_in(0)), ca.SX.sym("stretch")
+    _, balance, _ = functions.section(column, stretch)
+    return ca.Function("imbalance", [column, stretch], [balance, ca.jacobian(balance, stretch)])
 
 
 def _given(model: Model, conditions: TipConditions, units: Any) -> tuple[Any, Given | None]:

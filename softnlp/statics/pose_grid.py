@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from softnlp.model.numerics import Numerics
 from softnlp.model.rod import STATE_SIZE
-from softnlp.nlp.linear import LinearSolver, SparseSolver
+from softnlp.nlp.linear import SparseSolver
 from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.solver import Engine, Solution
-from softnlp.nlp.transcription import MultipleShooting, method_named
+from softnlp.nlp.transcription import method_named
 from softnlp.statics.compiled import RodEquations
-from softnlp.statics.condensed import CondensedSolver
+from softnlp.statics.condensed import case_solver
 from softnlp.statics.loadcase import LoadCase, load_case
 
 Array = NDArray[np.float64]
@@ -78,9 +78,7 @@ def compiled_grid(equations: RodEquations, numerics: Numerics, intervals: int) -
     given = equations.declared
     case = load_case("pose", equations.functions, given, method)
     problem = compile_problem(list(given.values()), [case])
-    linear: LinearSolver = SparseSolver(problem)
-    if isinstance(method, MultipleShooting):
-        linear = CondensedSolver(equations.functions, method)
+    linear = case_solver(case) or SparseSolver(problem)
     chosen: dict[str, Any] = {"linear": linear, "newton_only": True}
     if numerics.engine == "ipopt":
         chosen = {"linear": linear, "ipopt_only": True, "options": numerics.ipopt}

@@ -230,7 +230,7 @@ class PoseSolver:
     def target_accuracy(self, loads: Loads) -> float:
         """Return the estimate to aim for: a third of the accuracy, since estimates are good to a factor of 3."""
         accuracy = self.numerics.accuracy
-        if not np.any([loads.tip_force, loads.tip_moment, loads.gravity]):
+        if not loads.act:
             accuracy = min(accuracy, self._unloaded_accuracy)
         return accuracy / 3
 

@@ -121,11 +121,6 @@ class Situation:
             wall = Wall(between(self.wall.point, wall.point), wall.normal)
         return Situation(between(self.pressure, other.pressure), loads, wall)
 
-    @property
-    def is_loaded(self) -> bool:
-        """Whether any dead load acts."""
-        return bool(np.any([self.loads.tip_force, self.loads.tip_moment, self.loads.gravity]))
-
 
 def standing_wall(poses: PoseSolver, contact: ContactSettings, pressures: Array, loads: Loads) -> Wall:
     """Return the wall that the settings describe; one at an offset stands where the free shape goes.
@@ -136,7 +131,7 @@ def standing_wall(poses: PoseSolver, contact: ContactSettings, pressures: Array,
         return Wall(np.asarray(contact.wall_point, float), np.asarray(contact.wall_normal, float))
     largest = pressures[int(np.argmax(np.sum(pressures, axis=1)))]
     rest = np.array([0.0, 0.0, float(poses.model.robot.length) + contact.tip_cap])
-    if np.any([loads.tip_force, loads.tip_moment, loads.gravity]):
+    if loads.act:
         pose = poses.solve(largest, loads)[0].pose
         if pose is not None:
             return _wall_at(contact.offset, rest, pose.tip_position + contact.tip_cap * pose.tip_rotation[:, 2])

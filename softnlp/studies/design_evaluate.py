@@ -137,7 +137,6 @@ class Evaluator:
         self.task = task
         self.direction = np.zeros(model.robot.chamber_sets)
         self.direction[list(task.sets)] = 1.0
-        self.is_loaded = bool(np.any([setting.loads.tip_force, setting.loads.tip_moment, setting.loads.gravity]))
         numerics = setting.numerics
         self.solver = blocked_solver(model, numerics, setting.contact) if task.needs_force else None
         self.poses = self.solver.poses if self.solver else pose_solver(model, numerics)
@@ -158,7 +157,7 @@ class Evaluator:
         poses = self.poses.with_model(model)
         values = poses.values(P, self.setting.loads)
         known = {**robot_outputs(model.robot), "pressure": pressure}
-        if self.is_loaded:
+        if self.setting.loads.act:
             step, solved = poses.solve(P, self.setting.loads)
             return self._of_pose(model, pressure, known, step, step.pose, solved)
         branch = stretch_on_branch(poses.branch, poses.column(values), P)

@@ -353,7 +353,7 @@ class Optimiser:
         points = [dict(zip(box, point, strict=True)) for point in spread(list(box.values()), _TRIES)]
         made = (q for q in points if not broken_rules(_at(model, q).robot, task))
         # An arc is all that the program needs where nothing else is solved.
-        arcs = self.evaluator.solver is None and not self.evaluator.is_loaded
+        arcs = self.evaluator.solver is None and not self.evaluator.setting.loads.act
         look = self.evaluator.free if arcs else self.evaluator.full
         wanted = task.first_guesses
         fixed = pressure if not isinstance(pressure, Range) else 0.0

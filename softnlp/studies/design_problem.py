@@ -63,7 +63,7 @@ class DesignProblem:
     cases: tuple[LoadCase, ...]
     limits: tuple[Limit, ...]
     guard: ca.Function | None
-    options: tuple[tuple[str, Any], ...] = ()
+    options: Mapping[str, Any]
 
     @property
     def lower(self) -> Array:
@@ -118,7 +118,7 @@ class DesignProblem:
                 "mu_strategy": "adaptive",
                 "max_iter": _ITERATIONS,
                 "max_wall_time": 60.0,
-                **dict(self.options),
+                **self.options,
             },
         }
         return ca.nlpsol("design", "ipopt", nlp, options)
@@ -146,7 +146,7 @@ def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) ->
 
     method = MultipleShooting(intervals)
     # The closed form takes the functions with chamber lengths in the state as well as those without.
-    if evaluator.is_loaded:
+    if evaluator.setting.loads.act:
         free_case = load_case("free", evaluator.poses.functions, given, method)
     else:
         free_case = unloaded_case("free", functions, given)
@@ -179,7 +179,7 @@ def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) ->
         objective=-task.sign * outputs[task.objective.name] / scale.symbol,
     )
     guard = _guard(problem) if len(cases) > 1 else None
-    options = tuple(dict(evaluator.setting.numerics.ipopt).items())
+    options = dict(evaluator.setting.numerics.ipopt)
     return DesignProblem(problem, tuple(cases), tuple(_limits(constraints, problem)), guard, options)
 
 

@@ -117,6 +117,11 @@ def file_name(name: str, material: Material) -> tuple[str, float]:
     return name, 1.0
 
 
+def constants_text(keys: Sequence[tuple[str, float]], x: Array, form: str = ".4g") -> str:
+    """Return values [SI] in words; keys : of files with their units, of `file_name`."""
+    return ", ".join(f"{key} = {value / unit:{form}}" for (key, unit), value in zip(keys, x, strict=True))
+
+
 def _bounds(name: str, quantity: str) -> tuple[float, float]:
     if quantity.startswith("material."):
         return -np.inf, np.inf

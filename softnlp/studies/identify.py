@@ -27,7 +27,7 @@ from softnlp.statics.closing import DisputedError
 from softnlp.statics.wall import checked_contact
 from softnlp.studies.fit_statistics import Uncertainty, open_constants, uncertainty
 from softnlp.studies.forward import checked_loads
-from softnlp.studies.free_constants import FreeConstants, file_name, free_constants
+from softnlp.studies.free_constants import FreeConstants, constants_text, file_name, free_constants
 from softnlp.studies.identified import Identified, grown_errors, unexplained, without_constants
 from softnlp.studies.identify_nlp import closed_fit
 from softnlp.studies.measurements import (
@@ -178,12 +178,9 @@ class _Fit:
         if after @ after <= before @ before + after.size * _SMALL**2:
             return None
         return Status.DIVERGED, (
-            f"the search ended at {self._text(x)}, further from the measurements than its start; give bounds or "
-            "another start"
+            f"the search ended at {constants_text(self.keys, x)}, further from the measurements than its start; "
+            "give bounds or another start"
         )
-
-    def _text(self, x: Array) -> str:
-        return ", ".join(f"{key} = {value / unit:.4g}" for (key, unit), value in zip(self.keys, x, strict=True))
 
     def predictions(self, x: Array, anew: bool = False) -> list[Prediction]:
         """Return what the model says of every robot; the last result is kept."""
@@ -304,7 +301,8 @@ class _Fit:
             material, coefficients = self.free.applied(x, material, coefficients)
         except MaterialError as error:
             status, message = Status.UNSTABLE_MATERIAL, f"the constants found are no material: {error.message}"
-        return self._result(status, message, x, at_bound, known, material, coefficients, first, last, warnings)
+        found = self._result(status, message, x, at_bound, known, material, coefficients, first, last, warnings)
+        return replace(found, warnings=(*found.warnings, *unexplained(found), *grown_errors(found)))
 
     def _stretched(self, found: Sequence[Prediction]) -> list[str]:
         """Say where a free robot is stretched beyond the range in which the material was fitted."""
@@ -350,7 +348,7 @@ class _Fit:
             tuple(np.where(m, p.values, np.nan) for p, m in zip(every, self.measured, strict=True))
             for every in (first, last)
         )
-        found = Identified(
+        return Identified(
             status=status,
             message=message,
             free=self.free,
@@ -365,4 +363,3 @@ class _Fit:
             evaluations=self.evaluations,
             warnings=tuple(warnings),
         )
-        return replace(found, warnings=(*found.warnings, *unexplained(found), *grown_errors(found)))

@@ -26,7 +26,7 @@ from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.solver import FROM_SOLUTION, Engine
 from softnlp.nlp.transcription import Transcription, method_named
 from softnlp.statics.blocked_grid import Blocked
-from softnlp.statics.closing import DisputedError
+from softnlp.statics.closing import DisputedError, disputed
 from softnlp.statics.kept import blocked_solver, pose_solver
 from softnlp.statics.loadcase import LoadCase, load_case
 from softnlp.statics.pose_grid import Solved
@@ -34,7 +34,7 @@ from softnlp.statics.solver import PoseSolver
 from softnlp.statics.unloaded import unloaded_case
 from softnlp.statics.wall import checked_contact, standing_wall
 from softnlp.studies.forward import checked_loads
-from softnlp.studies.free_constants import FreeConstants, file_name, free_constants
+from softnlp.studies.free_constants import FreeConstants, constants_text, file_name, free_constants
 from softnlp.studies.identified import Identified
 from softnlp.studies.measurements import COLUMNS, POSE_COLUMNS, RELATIVE_NOISE, Data, Measurements, checked_measurements
 from softnlp.studies.predicted_pose import STRAIGHT
@@ -98,7 +98,6 @@ class _Nlp:
         has_force = bool(np.any(data.measured[:, -1]))
         blocked = blocked_solver(model, self.numerics, contact) if has_force else None
         wall = standing_wall(poses, blocked.contact, data.pressure, loads) if blocked else None
-        loaded = bool(np.any([loads.tip_force, loads.tip_moment, loads.gravity]))
         near_free: Solved | None = None
         near: Blocked | None = None
         for row, P in enumerate(data.pressure):
@@ -110,9 +109,9 @@ class _Nlp:
             if near_free is None:
                 raise InputError(f"measurement {row + 1}: no pose to start from: {step.message}", key="measurements")
             at = given | {"pressure": self.own(f"{here}.pressure", given["pressure"], P)}
-            free = self._free(f"{here} free", poses, at, near_free if loaded else None)
+            free = self._free(f"{here} free", poses, at, near_free if loads.act else None)
             self.cases.append(free)
-            self.guesses.append(near_free.solution.x[: None if loaded else 1])
+            self.guesses.append(near_free.solution.x[: None if loads.act else 1])
             assert step.pose is not None
             columns = [k for k in range(len(POSE_COLUMNS)) if k != _ANGLE or step.pose.bending_angle >= STRAIGHT]
             observed = _pose_observables(free)
@@ -121,10 +120,7 @@ class _Nlp:
                 continue
             assert wall is not None
             assert blocked is not None
-            step, found = blocked.solve(P, loads, wall, near)
-            if found is None and step.status.has_solution:
-                continue  # it does not press the wall, whatever the constants: the force is 0
-            near = found
+            step, near = blocked.solve(P, loads, wall, near)
             if near is None:
                 raise InputError(f"measurement {row + 1}: no blocked shape: {step.message}", key="measurements")
             lengths = free.outputs["chamber_lengths"]
@@ -204,13 +200,13 @@ def closed_fit(
         Where it finds others: they differ by more than a thousandth of their standard error, and by more than the
         accuracy asked for, relative to themselves.
     """
-    loaded = bool(np.any([loads.tip_force, loads.tip_moment, loads.gravity]))
-    rods = sum(int(np.sum(d.measured[:, -1])) + loaded * len(d.pressure) for d in found.data)
+    every = [_pressing(data, after) for data, after in zip(found.data, found.after, strict=True)]
+    rods = sum(int(np.sum(d.measured[:, -1])) + loads.act * len(d.pressure) for d in every)
     if rods > MOST_RODS:
         note = f"IPOPT did not close the constants: {rods} rods would be its unknowns, and it takes at most {MOST_RODS}"
         return replace(found, engine=numerics.engine, warnings=(*found.warnings, note))
     nlp = _Nlp(found.free, numerics)
-    for k, data in enumerate(found.data):
+    for k, data in enumerate(every):
         model = Model(data.robot, found.material, found.coefficients, conventions)
         try:
             nlp.add_robot(data, model, contact, loads, f"robot {k + 1}")
@@ -224,17 +220,16 @@ def closed_fit(
     close = np.fmax(_OF_ERROR * errors, numerics.accuracy * np.maximum(np.abs(found.constants), found.free.scale))
     if solution.holds(numerics.tolerance) and bool(np.all(np.abs(constants - found.constants) <= close)):
         return replace(found, engine=numerics.engine, ipopt=solution.ipopt)
-    units = [file_name(name, found.material) for name in found.free.names]
-    texts = (
-        ", ".join(f"{key} = {v / unit:.6g}" for (key, unit), v in zip(units, x, strict=True))
-        for x in (found.constants, constants)
-    )
-    said = "" if solution.ipopt is None else f" ({solution.ipopt.status})"
-    raise DisputedError(
-        "{}; the search found {} and IPOPT {}{}, whose largest residual is {:.2g}".format(
-            Status.DISPUTED.advice, *texts, said, solution.residual
-        )
-    )
+    keys = [file_name(name, found.material) for name in found.free.names]
+    here, there = (constants_text(keys, x, ".6g") for x in (found.constants, constants))
+    raise disputed(f"the search found {here} and IPOPT {there}", solution)
+
+
+def _pressing(data: Data, after: Array) -> Data:
+    """Return measurements without the forces of shapes that do not press the wall: no constant moves those."""
+    values = data.values.copy()
+    values[after[:, -1] == 0, -1] = np.nan
+    return replace(data, values=values)
 
 
 def identify_at_once(

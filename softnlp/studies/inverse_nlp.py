@@ -5,8 +5,9 @@ IPOPT with exact second derivatives closes what `softnlp.studies.inverse_solver`
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import casadi as ca
@@ -66,14 +67,12 @@ def inverse_problem(
     limits: Limits,
     *,
     meets: bool,
-    closing: bool = False,
-    options: Sequence[tuple[str, Any]] = (),
+    options: Mapping[str, Any] = MappingProxyType({}),
 ) -> InverseProblem:
     """Compile the problem for targets of the kind of `aim`.
 
     meets : the target is met, which takes as many sets that may move as it has conditions, with the smallest sum of
-    squares of the pressures where there are more. Otherwise the weighed misfit is made smallest. closing : for a start
-    that is a solution. options : of IPOPT.
+    squares of the pressures where there are more. Otherwise the weighed misfit is made smallest. options : of IPOPT.
 
     Raises
     ------
@@ -122,8 +121,7 @@ def inverse_problem(
     problem = compile_problem(
         [*declared.values(), *extra], [case], free=["pressure"], constraints=constraints, objective=objective
     )
-    chosen = {**(FROM_SOLUTION if closing else {}), **dict(options)}
-    return InverseProblem(Engine(problem, options=chosen), meets)
+    return InverseProblem(Engine(problem, options=options), meets)
 
 
 def moving_sets(limits: Limits) -> int:
@@ -147,14 +145,11 @@ class Programs:
         self._kept: dict[tuple[int, bool, bool, bool, bool], InverseProblem] = {}
 
     def of(self, aim: Aim, intervals: int, *, meets: bool, closing: bool = False) -> InverseProblem:
-        """Return the program of targets of a kind on a grid, see `inverse_problem`."""
+        """Return the program of targets of a kind on a grid, see `inverse_problem`; closing : from a solution."""
         kind = (intervals, aim.target.position is not None, aim.target.direction is not None, meets, closing)
         if kind not in self._kept:
-            options = tuple(dict(self._numerics.ipopt).items())
-            made = inverse_problem(
-                self._poses, intervals, aim, self._limits, meets=meets, closing=closing, options=options
-            )
-            self._kept[kind] = made
+            options = {**(FROM_SOLUTION if closing else {}), **dict(self._numerics.ipopt)}
+            self._kept[kind] = inverse_problem(self._poses, intervals, aim, self._limits, meets=meets, options=options)
         return self._kept[kind]
 
     def searched(self, aim: Aim, intervals: int, point: TipPoint, *, meets: bool) -> Array | None:

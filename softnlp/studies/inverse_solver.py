@@ -91,9 +91,8 @@ class InverseSolver:
         self._table: Table | None = None
         self._arcs: Table | None = None
         self._intervals: int | None = None
-        loaded = bool(np.any([loads.tip_force, loads.tip_moment, loads.gravity]))
         self._coarse: TipMap = ArcMap(self.poses)
-        if loaded:
+        if loads.act:
             self._coarse = self._map(numerics.intervals or self._coarse_intervals())
 
     def solve(self, target: Target, near: Reached | None) -> tuple[Step, Reached | None]:

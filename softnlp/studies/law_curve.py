@@ -16,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.errors import InputError
+from softnlp.base.quantity import quantity
 from softnlp.model.laws import LAWS, Law
-from softnlp.nlp.solver import FROM_SOLUTION, Ipopt
+from softnlp.nlp.problem import compile_problem
+from softnlp.nlp.solver import FROM_SOLUTION, Engine, Ipopt
 
 Array = NDArray[np.float64]
 
@@ -26,7 +28,6 @@ _LARGEST_EXPONENT, _AT_BOUND = 40.0, 1 - 1e-6
 _FACTORS = (1.0, 0.2, 5.0, -1.0, 0.04, 25.0)  # of a start for a person's law
 _MOST_GRID, _STARTS_A_SIGN = 1296, 3
 _EXACT = 1e-26  # half the mean square of a misfit that is round-off, relative to the largest stress
-_CLOSE = 1e-11  # tolerance of IPOPT
 _RANK = 1e-13  # relative size below which a direction of the linear constants is noise
 
 
@@ -158,23 +159,21 @@ def nearest_constants(curve: LawCurve, x: Array, y: Array, size: float, starts: 
 
 
 def confirmed_constants(
-    curve: LawCurve, x: Array, y: Array, size: float, c: Array, options: Any
-) -> tuple[Ipopt, float]:
+    curve: LawCurve, x: Array, y: Array, size: float, c: Array, options: Mapping[str, Any]
+) -> tuple[Ipopt | None, float]:
     """Return IPOPT's word on constants (file units), from which it starts, and the sum of squares that it ends at.
 
     options : of IPOPT, which have the last word.
     """
-    z, root = ca.MX.sym("z", c.size), np.where(c == 0, 1.0, np.abs(c))
-    stress = curve.symbolic(x, z * root)
-    squares = ca.sumsqr((stress - y) / size) / (2 * x.size)
-    given = {"print_level": 0, "sb": "yes", "tol": _CLOSE, **FROM_SOLUTION, **dict(options)}
-    solver = ca.nlpsol("law", "ipopt", {"x": z, "f": squares}, {"print_time": False, "ipopt": given})
-    reach = np.where(np.isfinite(curve.reach), curve.reach, np.inf) / root
-    found = solver(x0=c / root, lbx=-reach, ubx=reach)
-    stats = solver.stats()
-    bounds = float(np.max(np.abs(np.asarray(found["lam_x"])), initial=0.0))
-    stress_there, _ = curve.evaluate(x, np.asarray(found["x"]).ravel() * root)
-    return Ipopt(str(stats["return_status"]), int(stats["iter_count"]), bounds), float(np.sum((stress_there - y) ** 2))
+    free = [
+        quantity(constant.name, "1", value, scale=abs(value) or 1.0, lower=-reach, upper=reach)
+        for constant, value, reach in zip(curve.law.constants, c, curve.reach, strict=True)
+    ]
+    misfit = (curve.symbolic(x, ca.vertcat(*(q.symbol for q in free))) - y) / size
+    problem = compile_problem(free, [], free=[q.name for q in free], objective=ca.sumsqr(misfit) / (2 * x.size))
+    found = Engine(problem, options={**FROM_SOLUTION, **options}).solve(problem.pack({}), problem.pack_free({}))
+    there, _ = curve.evaluate(x, np.concatenate([*problem.free_values(found.x).values()]))
+    return found.ipopt, float(np.sum((there - y) ** 2))
 
 
 def _promising(sums: Sequence[float], starts: Sequence[Array]) -> list[int]:

@@ -26,11 +26,10 @@ class Predicted:
     ) -> None:
         self._data = data
         self._solver, self._loads = poses, loads
-        unloaded = not np.any([loads.tip_force, loads.tip_moment, loads.gravity])
         self._poses: FreePoses = (
-            ArcPoses(poses, data.pressure, free.quantities)
-            if unloaded
-            else LoadedPoses(poses, data.pressure, loads, free.quantities)
+            LoadedPoses(poses, data.pressure, loads, free.quantities)
+            if loads.act
+            else ArcPoses(poses, data.pressure, free.quantities)
         )
         self._rows = np.flatnonzero(data.measured[:, -1])
         self._forces: BlockedForces | None = None

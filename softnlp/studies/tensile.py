@@ -292,7 +292,7 @@ def _fit(
         warnings=(*known.warnings, *open_constants(keys, c, known.standard_errors, held)),
     )
     if numerics.engine != "newton":
-        said, better = confirmed_constants(curve, x, y, size, c, numerics.ipopt)
+        said, better = confirmed_constants(curve, x, y, size, c, dict(numerics.ipopt))
         fit = replace(fit, engine=numerics.engine, ipopt=said)
         least = float(residuals @ residuals)
         if better < least * (1 - _SAME_SUM) - (_SAME_SUM * size) ** 2:
