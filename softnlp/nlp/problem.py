@@ -98,8 +98,20 @@ class CompiledProblem:
     @cached_property
     def jacobian(self) -> ca.Function:
         """The Jacobian of the residual by x, as a function of (x, p); built at first use."""
-        x, p, g = (self.nlp[name] for name in "xpg")
-        return ca.Function("jacobian", [x, p], [ca.jacobian(g, x)])
+        x, p, _ = (self.nlp[name] for name in "xpg")
+        return ca.Function("jacobian", [x, p], [self.slope])
+
+    @cached_property
+    def slope(self) -> ca.MX:
+        """The Jacobian of g by x as an expression.
+
+        Those of the cases and of the constraints are made apart: a constraint may depend on every state of a rod, and
+        one such row would take the sparse directions from all the others.
+        """
+        x, _, g = (self.nlp[name] for name in "xpg")
+        own = sum(case.residuals.numel() for case in self.cases)
+        parts = [ca.jacobian(g[rows], x) for rows in (slice(0, own), slice(own, g.numel())) if rows.start < rows.stop]
+        return ca.vertcat(*parts) if parts else ca.jacobian(g, x)
 
     @cached_property
     def slopes(self) -> ca.Function:

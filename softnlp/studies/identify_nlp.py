@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.errors import InputError
-from softnlp.base.quantity import Quantity
+from softnlp.base.quantity import Quantity, quantity
 from softnlp.base.status import Status
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
@@ -22,7 +22,7 @@ from softnlp.model.materials import Material
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.rod import Loads
-from softnlp.nlp.problem import CompiledProblem, compile_problem
+from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
 from softnlp.nlp.solver import FROM_SOLUTION, Engine
 from softnlp.nlp.transcription import Transcription, method_named
 from softnlp.statics.blocked_grid import Blocked
@@ -41,13 +41,13 @@ from softnlp.studies.predicted_pose import STRAIGHT
 
 Array = NDArray[np.float64]
 
-MOST_RODS = 16
-"""Loaded and blocked shapes that IPOPT takes as unknowns at once; its second derivatives of more take minutes."""
+MOST_RODS = 200
+"""Loaded and blocked shapes that IPOPT takes as unknowns at once; half a second of each."""
 
 _TOLERANCE = 1e-10
 _ANGLE = POSE_COLUMNS.index("bending_angle")  # which has no derivative where a shape is straight
 _OF_ERROR = 1e-3  # of a constant's standard error: what IPOPT may move it by
-_OBJECTIVE = RELATIVE_NOISE**2  # what multiplies the cost, so that its gradient is about as large as the equations'
+_MISFITS = "misfits"  # residuals times the noise that is assumed, so that they are about as large as the equations
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ class _Nlp:
         self.cases: list[LoadCase] = []
         self.values: dict[str, Array] = {}
         self.guesses: list[Array] = []
-        self.squares: list[ca.MX] = []
+        self.misfits: list[ca.MX] = []
 
     def own(self, name: str, like: Quantity, value: Array | float) -> Quantity:
         """Return a quantity of one robot or measurement, with its value."""
@@ -152,7 +152,7 @@ class _Nlp:
         for value, column in zip(observed, columns, strict=True):
             if data.measured[row, column]:
                 error = (value - data.values[row, column]) / data.sigma[row, column]
-                self.squares.append((data.root_weight[row] * error) ** 2)
+                self.misfits.append(RELATIVE_NOISE * data.root_weight[row] * error)
 
     def compiled(self) -> CompiledProblem:
         """Return the problem with the constants free."""
@@ -164,11 +164,15 @@ class _Nlp:
             if name not in declared:
                 raise InputError(f"no measurement depends on {asked!r}; fix it", key="free")
             declared[name] = replace(declared[name], lower=float(lower), upper=float(upper), scale=float(scale))
+        # As unknowns of their own: the square of an angle, an integral along the rod, would couple all of its states.
+        misfits = quantity(_MISFITS, "1", np.zeros(len(self.misfits)))
+        given = Constraint(_MISFITS, ca.vertcat(*self.misfits) - misfits.symbol)
         return compile_problem(
-            list(declared.values()),
+            [*declared.values(), misfits],
             self.cases,
-            free=free.quantities,
-            objective=_OBJECTIVE * sum(self.squares[1:], self.squares[0]) / 2,
+            free=[*free.quantities, _MISFITS],
+            constraints=[given],
+            objective=ca.sumsqr(misfits.symbol) / 2,
         )
 
     def packed(self, problem: CompiledProblem) -> Array:
@@ -178,7 +182,10 @@ class _Nlp:
 
     def start(self, problem: CompiledProblem, constants: Array) -> Array:
         """Return the first guess of the compiled problem."""
-        return np.concatenate([problem.pack_free(self.free.values(constants)), *self.guesses])
+        values, count = self.free.values(constants), len(self.misfits)
+        x = np.concatenate([problem.pack_free(values), *self.guesses])
+        rows = np.asarray(problem.residual(x, self.packed(problem))).ravel()[-count:]
+        return np.concatenate([problem.pack_free({**values, _MISFITS: rows}), *self.guesses])
 
 
 def _pose_observables(case: LoadCase) -> list[ca.MX]:
@@ -215,7 +222,8 @@ def closed_fit(
     problem = nlp.compiled()
     engine = Engine(problem, tolerance=_TOLERANCE, options={**FROM_SOLUTION, **dict(numerics.ipopt)})
     solution = engine.solve(nlp.packed(problem), nlp.start(problem, found.constants))
-    constants = np.concatenate([np.zeros(0), *problem.free_values(solution.x).values()])
+    values = problem.free_values(solution.x)
+    constants = np.concatenate([values[name] for name in found.free.quantities])
     errors = found.uncertainty.standard_errors
     close = np.fmax(_OF_ERROR * errors, numerics.accuracy * np.maximum(np.abs(found.constants), found.free.scale))
     if solution.holds(numerics.tolerance) and bool(np.all(np.abs(constants - found.constants) <= close)):
@@ -265,7 +273,7 @@ def identify_at_once(
     p = nlp.packed(problem)
     solution = Engine(problem, tolerance=_TOLERANCE).solve(p, nlp.start(problem, chosen.start))
     cost = float(ca.Function("cost", [problem.nlp["x"], problem.nlp["p"]], [problem.nlp["f"]])(solution.x, p))
-    cost /= _OBJECTIVE
+    cost /= RELATIVE_NOISE**2
     holds = solution.holds(nlp.numerics.tolerance)
     solved = holds and solution.optimal
     found = problem.free_values(solution.x)
