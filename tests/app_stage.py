@@ -54,8 +54,10 @@ async def opened(
 
     async with user_simulation(page) as user:
         await user.open("/")
-        yield user, stages[-1]
-        stages[-1].session.close()
+        try:
+            yield user, stages[-1]
+        finally:
+            stages[-1].session.close()
 
 
 def field(user: User, marker: str) -> Any:

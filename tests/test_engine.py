@@ -281,6 +281,24 @@ def test_poses_that_ipopt_does_not_confirm_are_named(
     assert Lane.BATCH == 0
 
 
+def test_a_sweep_that_is_stopped_in_its_audit_goes_on_from_its_journal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = load_scenario(written(tmp_path, "", "workspace", GRID))
+    within: list[bool] = []
+    really = auditing.audit
+    monkeypatch.setattr("softnlp.sweep.run.audit", lambda *given: within.append(True) or really(*given))
+    stopped = run_sweep(asked, tmp_path / "out", stop=lambda: bool(within))
+    assert stopped.stopped
+    assert stopped.done == stopped.poses == 8
+    assert stopped.written == ()
+    ended = run_sweep(asked, tmp_path / "out", resume=True)
+    assert not ended.stopped
+    assert ended.already == 8
+    assert ended.audit.audited == 1
+    assert load_workspace(tmp_path / "out").pressure.shape[0] == 8
+
+
 def test_the_log_is_shown_on_standard_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = written(tmp_path, "")
     assert main(["run", str(path), "--json", "--ipopt-log"]) == 0

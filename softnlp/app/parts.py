@@ -98,6 +98,8 @@ class RunRow:
         self._timer.active = running
 
     def _look(self) -> None:
+        if not self.running:  # a look that was due as the work ended: what was said of its end stays
+            return
         begun = self.progress.fraction > 0
         self._bar.props(remove="indeterminate") if begun else self._bar.props("indeterminate")
         self._bar.set_value(self.progress.fraction)

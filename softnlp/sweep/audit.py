@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,8 +43,8 @@ class Audit:
         return {"audited": self.audited, "audit_largest_mm": self.largest / MILLIMETRE} if self.audited else {}
 
 
-def audit(plan: Plan, journal: Journal) -> Audit:
-    """Audit the poses that were solved together. Only with the engine "auto"."""
+def audit(plan: Plan, journal: Journal, stop: Callable[[], bool] | None = None) -> Audit | None:
+    """Audit the poses that were solved together, or return None where it was stopped. Only with the engine "auto"."""
     if plan.numerics.engine != "auto":
         return Audit()
     solver: Alone | None = None
@@ -52,6 +53,8 @@ def audit(plan: Plan, journal: Journal) -> Audit:
     for block in journal.blocks():
         rows = block.rows[(block.rows["lane"] == Lane.BATCH) & (block.rows["status"] == solved)]
         for row in rows[::EVERY]:
+            if stop is not None and stop():
+                return None
             solver = solver or Alone(plan, plan.numerics)
             number = int(row["pose"])
             column = plan.full_values(np.array([number]))[:, 0]

@@ -159,7 +159,10 @@ def sweep(
                 return summary(True)
             for left in folder.glob(f".{WORKSPACE_FILE[:-3]}.*.part"):  # of a process that was killed while writing
                 left.unlink(missing_ok=True)
-            sample = audit(plan, journal)
+            audited = audit(plan, journal, stop)
+            if audited is None:
+                return summary(True)
+            sample = audited
         written = [] if finished else [write_workspace(result, plan, journal, told | sample.attributes)]
         if (csv and not table.exists()) or (written and table.exists()):
             written.append(write_csv(table, plan, journal))
