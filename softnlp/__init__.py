@@ -19,11 +19,15 @@ if TYPE_CHECKING:
     from softnlp.base.errors import MaterialError as MaterialError
     from softnlp.base.errors import RobotError as RobotError
     from softnlp.base.errors import SoftnlpError as SoftnlpError
+    from softnlp.base.quantity import Quantity as Quantity
+    from softnlp.base.quantity import quantity as quantity
     from softnlp.base.status import Status as Status
     from softnlp.base.units import BAR as BAR
     from softnlp.base.units import DEGREE as DEGREE
     from softnlp.base.units import MILLIMETRE as MILLIMETRE
     from softnlp.base.units import NEWTON_MILLIMETRE as NEWTON_MILLIMETRE
+    from softnlp.model.body import Body as Body
+    from softnlp.model.body import Segment as Segment
     from softnlp.model.contact_settings import Closure as Closure
     from softnlp.model.contact_settings import ClosureWeights as ClosureWeights
     from softnlp.model.contact_settings import ContactSettings as ContactSettings
@@ -42,6 +46,9 @@ if TYPE_CHECKING:
     from softnlp.model.robot import Robot as Robot
     from softnlp.model.robot import robot as robot
     from softnlp.model.rod import Loads as Loads
+    from softnlp.nlp.problem import Constraint as Constraint
+    from softnlp.nlp.transcription import Collocation as Collocation
+    from softnlp.nlp.transcription import MultipleShooting as MultipleShooting
     from softnlp.results import save as save
     from softnlp.results import to_dataset as to_dataset
     from softnlp.results import to_json as to_json
@@ -49,6 +56,12 @@ if TYPE_CHECKING:
     from softnlp.scenario.run import run_scenario as run_scenario
     from softnlp.scenario.run_design import run_design as run_design
     from softnlp.scenario.run_workspace import run_sweep as run_sweep
+    from softnlp.statics.answer import Answer as Answer
+    from softnlp.statics.answer import follow as follow
+    from softnlp.statics.answer import solve as solve
+    from softnlp.statics.case import case as case
+    from softnlp.statics.posed import Problem as Problem
+    from softnlp.statics.posed import problem as problem
     from softnlp.statics.step import Run as Run
     from softnlp.statics.step import Step as Step
     from softnlp.studies.blocked_force import blocked_force as blocked_force
@@ -82,8 +95,10 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "base.errors": ("IllPosedError", "InputError", "MaterialError", "RobotError", "SoftnlpError"),
+    "base.quantity": ("Quantity", "quantity"),
     "base.status": ("Status",),
     "base.units": ("BAR", "DEGREE", "MILLIMETRE", "NEWTON_MILLIMETRE"),
+    "model.body": ("Body", "Segment"),
     "model.contact_settings": ("Closure", "ClosureWeights", "ContactSettings"),
     "model.conventions": ("AS_PRINTED", "COEFFICIENT_SETS", "REPRODUCTION", "Coefficients", "Conventions"),
     "model.laws": ("formula_law", "function_law"),
@@ -91,11 +106,16 @@ _HOMES = {
     "model.numerics": ("Numerics",),
     "model.robot": ("ROBOTS", "Robot", "robot"),
     "model.rod": ("Loads",),
+    "nlp.problem": ("Constraint",),
+    "nlp.transcription": ("Collocation", "MultipleShooting"),
     "results": ("save", "to_dataset", "to_json"),
     "scenario.read": ("load_scenario",),
     "scenario.run": ("run_scenario",),
     "scenario.run_design": ("run_design",),
     "scenario.run_workspace": ("run_sweep",),
+    "statics.answer": ("Answer", "follow", "solve"),
+    "statics.case": ("case",),
+    "statics.posed": ("Problem", "problem"),
     "statics.step": ("Run", "Step"),
     "studies.blocked_force": ("blocked_force", "constrained_pose", "force_against_offset"),
     "studies.compare": ("compare",),

@@ -36,6 +36,8 @@ ARRAY = re.compile(r"\bArray\b|NDArray|ndarray|\bVector\b|tuple\[float|Sequence\
 NUMBER = re.compile(r"\bfloat\b|\bAny\b|\bscalar\b")
 # Machinery that a result keeps for solving again, and a protocol of the scenario; no interface.
 INNER = {"Engine", "FreeConstants", "ImplicitDerivatives", "LinearPoint", "Solution", "Task"}
+# What posing a problem of one's own hands on; each says what it is made of in its own words.
+INNER |= {"Chain", "CompiledProblem", "LoadCase"}
 
 
 def sections(doc: str) -> dict[str, str]:

@@ -17,8 +17,20 @@ _INF = float("inf")
 class Quantity:
     """A named physical quantity.
 
-    symbol : MX column of `size` entries, SI. nominal : its value when fixed and its first guess when free.
-    scale : typical size, which makes the unknown of order one. lower, upper : bounds when free.
+    Attributes
+    ----------
+    name
+        One name of a problem.
+    unit
+        SI.
+    symbol
+        MX column of `size` entries.
+    nominal
+        (size,) value when fixed and first guess when free [SI].
+    scale
+        Typical size, which makes the unknown of order one [SI].
+    lower, upper
+        Bounds when free [SI].
     """
 
     name: str
@@ -38,6 +50,25 @@ class Quantity:
 def quantity(
     name: str, unit: str, nominal: Any, *, scale: float = 1.0, lower: float = -_INF, upper: float = _INF
 ) -> Quantity:
-    """Declare a quantity; `nominal` is a number or a flat sequence in SI units."""
+    """Declare a quantity.
+
+    Parameters
+    ----------
+    name
+        One name of a problem.
+    unit
+        SI.
+    nominal
+        Number or (size,) values when fixed, first guess when free [SI].
+    scale
+        Typical size [SI].
+    lower, upper
+        Bounds when free [SI].
+
+    Returns
+    -------
+    Quantity
+        With a symbol of its own.
+    """
     value = np.atleast_1d(np.asarray(nominal, dtype=float)).ravel()
     return Quantity(name, unit, ca.MX.sym(name, value.size), value, scale, lower, upper)

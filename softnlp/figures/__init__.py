@@ -9,6 +9,7 @@ from softnlp.figures.identify import identified_figure, tensile_figure
 from softnlp.figures.material import material_figure
 from softnlp.figures.run import run_figure
 from softnlp.figures.section import section_figure
+from softnlp.figures.sparsity import sparsity_figure
 from softnlp.figures.style import save_figure
 from softnlp.figures.workspace import workspace_figure
 
@@ -23,6 +24,7 @@ __all__ = [
     "run_figure",
     "save_figure",
     "section_figure",
+    "sparsity_figure",
     "tensile_figure",
     "tips_figure",
     "workspace_figure",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -23,8 +23,18 @@ Array = NDArray[np.float64]
 class Constraint:
     """A condition lower <= expression <= upper, entry by entry; equality where they agree.
 
-    Expression, bounds (one number, or one an entry) and scale are in `unit`. The scale, a number above 0 or a symbol,
-    only says what counts as large: it changes no bound.
+    Attributes
+    ----------
+    name
+        Of the equation in certificates and messages.
+    expression
+        Of quantities' symbols and outputs of cases, in `unit`.
+    lower, upper
+        A number, or (entries,) one an entry, in `unit` [SI].
+    unit
+        SI.
+    scale
+        A number above 0 or a symbol, in `unit` [SI]. It only says what counts as large: it changes no bound.
     """
 
     name: str
@@ -40,10 +50,17 @@ class Constraint:
         return bool(np.all(np.equal(self.lower, self.upper)))
 
     def scaled(self) -> tuple[ca.MX, Array, Array]:
-        """Return the rows, a column of as many entries, and their bounds, all over the scale.
+        """Return the rows and their bounds, all over the scale; a bound under a symbol is taken into the row.
 
-        Raises `IllPosedError` for bounds or a scale that cannot be meant. A bound under a scale that is a symbol is
-        taken into the row.
+        Returns
+        -------
+        tuple
+            A column, and its (entries,) lower and upper bounds [1].
+
+        Raises
+        ------
+        IllPosedError
+            For bounds or a scale that cannot be meant.
         """
         rows = ca.vec(self.expression)
         try:
@@ -73,7 +90,8 @@ class CompiledProblem:
     """A problem as functions of its unknowns x (scaled) and its fixed values p (SI).
 
     x stacks the free quantities, then each case's unknowns; p stacks the fixed quantities. residual(x, p) stacks each
-    case's equations, then the constraints over their scales. solver_arguments holds bounds and the NLP for IPOPT.
+    case's equations, then the constraints over their scales. nlp holds x, p, f, g as expressions. function(name,
+    expressions) makes a function of (x, p) of expressions in the symbols of quantities and cases.
     """
 
     cases: tuple[Case, ...]
@@ -94,6 +112,7 @@ class CompiledProblem:
     lower_g: Array
     upper_g: Array
     is_square: bool
+    function: Callable[..., ca.Function]
 
     @cached_property
     def jacobian(self) -> ca.Function:
@@ -261,6 +280,7 @@ def compile_problem(
         upper_x=np.concatenate([*(np.full(q.size, q.upper / q.scale) for q in freed), np.full(states, np.inf)]),
         lower_g=np.concatenate([none, *(lower for _, lower, _ in scaled)]),
         upper_g=np.concatenate([none, *(upper for _, _, upper in scaled)]),
+        function=function,
         is_square=objective is None and g.numel() == x.numel() and all(c.is_equality for c in constraints),
     )
     if freed or constraints:  # load cases alone are square and well posed

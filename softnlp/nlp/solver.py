@@ -6,7 +6,7 @@ import sys
 import threading
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, redirect_stdout
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -64,11 +64,17 @@ class Ipopt:
         That it took.
     multipliers
         Largest multiplier of any row or bound [1].
+    rows
+        (m,) multiplier of each row, scaled as it is; empty where IPOPT gave up [1].
+    bounds
+        (n,) of the bounds of each unknown [1].
     """
 
     status: str
     iterations: int
     multipliers: float
+    rows: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
+    bounds: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,7 +243,8 @@ class Engine:
         x, *lam = (np.asarray(result[key], dtype=float).ravel() for key in ("x", "lam_x", "lam_g"))
         kkt = kkt_error(problem.slopes, problem.bounds, p, x_start, x, *lam) if problem.has_objective else 0.0
         status, iterations = str(stats["return_status"]), int(stats["iter_count"])
-        said = Ipopt(status, iterations, float(max((np.max(np.abs(v), initial=0.0) for v in lam), default=0.0)))
+        largest = float(max(np.max(np.abs(v), initial=0.0) for v in lam))
+        said = Ipopt(status, iterations, largest, rows=lam[1], bounds=lam[0])
         return Solution(x, p, violation(problem, x, p), iterations, status, kkt, said)
 
 

@@ -26,7 +26,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Tableau:
-    """An explicit Runge-Kutta method: lower-triangular `a`, weights `b`, and its order."""
+    """An explicit Runge-Kutta method.
+
+    Attributes
+    ----------
+    a
+        (stages, stages) lower triangle, row by row [1].
+    b
+        (stages,) weights [1].
+    order
+        Of its error.
+    """
 
     a: tuple[tuple[float, ...], ...]
     b: tuple[float, ...]
@@ -104,7 +114,15 @@ def with_quadrature(field: ca.Function, quadrature: ca.Function) -> ca.Function:
 
 @dataclass(frozen=True)
 class MultipleShooting:
-    """Multiple shooting: each interval is one explicit Runge-Kutta step from its left node."""
+    """Multiple shooting: each interval is one explicit Runge-Kutta step from its left node.
+
+    Attributes
+    ----------
+    intervals
+        Of the length, equal.
+    tableau
+        The Runge-Kutta method.
+    """
 
     intervals: int = 20
     tableau: Tableau = RK4
@@ -115,11 +133,35 @@ class MultipleShooting:
         return self.tableau.order
 
     def with_intervals(self, intervals: int) -> MultipleShooting:
-        """Return the same method on another grid."""
+        """Return the same method on another grid.
+
+        Parameters
+        ----------
+        intervals
+            Their number.
+
+        Returns
+        -------
+        Transcription
+            Of the same class.
+        """
         return replace(self, intervals=intervals)
 
     def transcribe(self, field: ca.Function, constants: ca.MX) -> Transcribed:
-        """Pose the field on the grid, with unknowns [x_0 | x_1 | ... | x_K]."""
+        """Pose the field on the grid, with unknowns [x_0 | x_1 | ... | x_K].
+
+        Parameters
+        ----------
+        field
+            (x, c) -> dx/ds on s in 0..1.
+        constants
+            c, an MX column.
+
+        Returns
+        -------
+        Transcribed
+            Unknowns and as many residuals but one state.
+        """
         nx, K = field.size1_in(0), self.intervals
         unknowns = ca.MX.sym("states", nx * (K + 1))
         nodes = ca.reshape(unknowns, nx, K + 1)
@@ -153,6 +195,15 @@ class Collocation:
     """Orthogonal collocation: in each interval the state is a polynomial of `degree` that obeys the field at points.
 
     Legendre points give order 2 degree at the nodes, Radau points 2 degree - 1.
+
+    Attributes
+    ----------
+    intervals
+        Of the length, equal.
+    degree
+        Of the polynomials, and so many points in each interval.
+    points
+        "legendre" or "radau".
     """
 
     intervals: int = 10
@@ -165,7 +216,18 @@ class Collocation:
         return 2 * self.degree - (self.points == "radau")
 
     def with_intervals(self, intervals: int) -> Collocation:
-        """Return the same method on another grid."""
+        """Return the same method on another grid.
+
+        Parameters
+        ----------
+        intervals
+            Their number.
+
+        Returns
+        -------
+        Transcription
+            Of the same class.
+        """
         return replace(self, intervals=intervals)
 
     def _stage_residuals(self, field: ca.Function, start: Any, stages: Any, c: Any, h: Any) -> tuple[Any, Any]:
@@ -177,7 +239,20 @@ class Collocation:
         return h * rates - every @ C, every @ D
 
     def transcribe(self, field: ca.Function, constants: ca.MX) -> Transcribed:
-        """Pose the field on the grid, with unknowns [x_0 | stages, x_1 | ... | stages, x_K]."""
+        """Pose the field on the grid, with unknowns [x_0 | stages, x_1 | ... | stages, x_K].
+
+        Parameters
+        ----------
+        field
+            (x, c) -> dx/ds on s in 0..1.
+        constants
+            c, an MX column.
+
+        Returns
+        -------
+        Transcribed
+            Unknowns and as many residuals but one state.
+        """
         nx, K, d = field.size1_in(0), self.intervals, self.degree
         tau = ca.collocation_points(d, self.points)
         h = 1 / K

@@ -155,14 +155,16 @@ class LoadCase:
     residuals : as many equations.
     fine_residuals : the same at half the step. outputs : by name, SI and world frame: "stretch", "tip_position" (3),
     "tip_rotation" (3x3), "chamber_lengths" (N), "bending_angle", "backbone_length", and "tip_forces", those added.
-    constants : what the field takes beside the state. column : the quantities of `functions.declared()`, in order, as
-    they are given here. method : None for an arc in closed form. length_unit, force_unit : of the scaled states [m, N].
+    constants : what the field takes beside the state. given : the quantities by key. column : those of
+    `functions.declared()`, in order, as they are given here. method : None for an arc in closed form.
+    length_unit, force_unit : of the scaled states [m, N].
     """
 
     name: str
     method: Transcription | None
     transcribed: Transcribed
     functions: RodFunctions
+    given: Mapping[str, Quantity]
     symbols: tuple[ca.MX, ...]
     constants: ca.MX
     column: ca.MX
@@ -215,6 +217,7 @@ def load_case(name: str, functions: RodFunctions, given: Mapping[str, Quantity],
         method=method,
         transcribed=transcribed,
         functions=functions,
+        given=given,
         symbols=(stretch, transcribed.unknowns, y) if functions.tip_unknowns else (stretch, transcribed.unknowns),
         constants=constants,
         column=ca.vertcat(column, a),

@@ -42,6 +42,7 @@ def unloaded_case(name: str, functions: RodFunctions, given: Mapping[str, Quanti
         method=None,
         transcribed=Transcribed(none, np.zeros(0), np.zeros(0, np.intp), STATE_SIZE, none, (), none, integral),
         functions=functions,
+        given=given,
         symbols=(stretch,),
         constants=constants,
         column=column,
