@@ -19,7 +19,13 @@ from softnlp.scenario.read import scenario_from_text
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-PAGES = ["index", "tutorial", "extending", "problem", *(f"how-to/{page.stem}" for page in sorted((DOCS / "how-to").glob("*.md")))]
+PAGES = [
+    "index",
+    "tutorial",
+    "extending",
+    "problem",
+    *(f"how-to/{page.stem}" for page in sorted((DOCS / "how-to").glob("*.md"))),
+]
 SCRIPTS = sorted((DOCS / "figures").glob("[!_]*.py"))
 LONGEST_EXTENSION = 30
 _BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<code>.*?)^```$", re.MULTILINE | re.DOTALL)
