@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 import numpy as np
+from nicegui import background_tasks
 from nicegui.testing import User
 from nicegui.testing.user_simulation import user_simulation
 
@@ -101,3 +102,5 @@ def done(visit: Coroutine[Any, Any, None]) -> None:
     finally:
         loop.run_until_complete(loop.shutdown_default_executor())
         loop.close()
+        background_tasks.running_tasks.clear()  # of a visit that failed, which else fail the next one
+        background_tasks.lazy_tasks_running.clear()

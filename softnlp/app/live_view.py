@@ -36,6 +36,7 @@ class LiveView:
         self._stage = stage
         self._shown = shown
         self._say = say
+        self._words = ""
         self._wanted = False
         self._working = False
         self._last: tuple[Scenario, Array] | None = None
@@ -71,25 +72,30 @@ class LiveView:
                 self._say(_SOLVING)
             await asyncio.wait({task})
             with self._client:
-                self._say("")
+                self._say(self._words)
         try:
             run, ghost = await task
         except InputError as error:
             with self._client:
-                self._say(str(error))
+                self._said(str(error))
             return
         with self._client:
             step = run.steps[0]
             if not step.status.has_solution and self._stays(scenario, pressure):
                 assert self._last is not None
-                self._say(f"{step.message}. The sliders stay at {_listed(self._last[1])} bar.")
+                self._said(f"{step.message}. The sliders stay at {_listed(self._last[1])} bar.")
                 session.set_pressure(self._last[1])
                 return
             if step.pose is not None and step.status.has_solution:
                 self._show(scenario, pressure, step, step.pose, ghost)
             else:
-                self._say(f"{step.message}. The picture is of the last pose that was solved.")
+                self._said(f"{step.message}. The picture is of the last pose that was solved.")
         self._tell(run)
+
+    def _said(self, words: str) -> None:
+        """Say words that stay when a later pose takes long."""
+        self._words = words
+        self._say(words)
 
     def _tell(self, run: Run) -> None:
         """Give the panels the numbers a moment after the picture, which they would hold up in the browser."""
@@ -106,7 +112,7 @@ class LiveView:
 
     def _show(self, scenario: Scenario, pressure: Array, step: Step, pose: Pose, ghost: Pose | None) -> None:
         if self._last is None or not np.array_equal(self._last[1], pressure) or self._last[0] is not scenario:
-            self._say("")
+            self._said("")
         self._last = (scenario, pressure)
         self._stage.view.show(
             frame_of(
