@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from softnlp.batch.arrays import joined, some, spread
 from softnlp.batch.bodies import self_intersecting
 from softnlp.batch.contact_newton import PATH, BlockedShot, ContactBatch, Stage
-from softnlp.batch.csource import Kernels
+from softnlp.batch.kernels import Kernels
 from softnlp.batch.plan import LOADS, Plan
 from softnlp.batch.pose_lane import WORTH_COMPILING, PoseLane, Poses, Sections, entries
 from softnlp.batch.reduced import POSITION

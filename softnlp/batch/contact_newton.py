@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.batch.arrays import replaced, some
-from softnlp.batch.csource import WIDTH
 from softnlp.batch.grids import MOST_INTERVALS, grid_level, whole_groups
+from softnlp.batch.kernels import WIDTH
 from softnlp.batch.reduced import MOMENT, POSITION, ROTATION, STATE
 from softnlp.batch.reduced_contact import UNKNOWN
 from softnlp.batch.shooting import Shooting

@@ -1,7 +1,7 @@
-"""The kernels of a sweep where there is no compiler: each instruction of a step as one NumPy operation on many poses.
+"""The kernels of a sweep without machine code: each instruction of a step as one NumPy operation on many poses.
 
 A step of arithmetic alone is the same to the last bit as when it is compiled; maps, which may hold powers and
-logarithms, are run by CasADi, whose mathematical library is the compiler's.
+logarithms, are run by CasADi, whose mathematical library is the one that is called then.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.batch.csource import WIDTH, Kernels
+from softnlp.batch.kernels import B_ENDS, B_MIDDLE, WIDTH, Kernels, Step
 
 Array = NDArray[np.float64]
 
@@ -39,26 +39,27 @@ _OPERATIONS: dict[int, tuple[Callable[..., Any], tuple[int, ...]]] = {
 
 
 class Program:
-    """A step (state, data, s, h) -> state as NumPy operations on registers of (registers, poses)."""
+    """A function of scalars as NumPy operations on registers of (registers, poses)."""
 
-    def __init__(self, step: ca.Function) -> None:
-        self._registers = step.sz_w()
+    def __init__(self, function: ca.Function) -> None:
+        self._registers = function.sz_w()
+        self.rows = int(function.size1_out(0))
         self._work: list[tuple[str, Any]] = []
-        for k in range(step.n_instructions()):
-            kind = step.instruction_id(k)
-            takes, gives = step.instruction_input(k), step.instruction_output(k)
+        for k in range(function.n_instructions()):
+            kind = function.instruction_id(k)
+            takes, gives = function.instruction_input(k), function.instruction_output(k)
             if kind == ca.OP_INPUT:
                 self._work.append(("input", (gives[0], takes[0], takes[1])))
             elif kind == ca.OP_OUTPUT:
                 self._work.append(("output", (gives[1], takes[0])))
             elif kind == ca.OP_CONST:
-                self._work.append(("constant", (gives[0], step.instruction_constant(k))))
+                self._work.append(("constant", (gives[0], function.instruction_constant(k))))
             else:
-                function, operands = _OPERATIONS[kind]
-                self._work.append(("operation", (function, [takes[i] for i in operands], gives[0])))
+                operation, operands = _OPERATIONS[kind]
+                self._work.append(("operation", (operation, [takes[i] for i in operands], gives[0])))
 
     def bound(self, inputs: list[Array], out: Array) -> Callable[[], None]:
-        """Return a call that runs the step on arrays of (fields, poses), which are read and written in place."""
+        """Return a call that runs the function on arrays of (fields, poses), which are read and written in place."""
         w = np.empty((self._registers, out.shape[1]))
         calls: list[tuple[Callable[..., Any], tuple[Any, ...]]] = []
         for kind, what in self._work:
@@ -72,21 +73,60 @@ class Program:
                 register, value = what
                 calls.append((np.copyto, (w[register], value)))
             else:
-                function, operands, register = what
-                calls.append((function, (*(w[i] for i in operands), w[register])))
+                operation, operands, register = what
+                calls.append((operation, (*(w[i] for i in operands), w[register])))
 
         def run() -> None:
-            for function, arguments in calls:
-                function(*arguments)
+            for operation, arguments in calls:
+                operation(*arguments)
+
+        return run
+
+
+class StepProgram:
+    """A step of RK4 as NumPy operations, in the order of the compiled one."""
+
+    def __init__(self, step: Step) -> None:
+        self._step = step
+        self._parts = {name: Program(function) for name, function in step.functions.items()}
+
+    def bound(self, here: Array, data: Array, s: Array, h: Array) -> Callable[[], None]:
+        """Return a call that moves the states `here` (rows, poses) from s a step h further, in place."""
+        step, parts, width = self._step, self._parts, here.shape[1]
+        after, at = np.empty_like(here), np.empty((1, width))
+        x, stage, reached, *k = (np.empty((step.integrated, width)) for _ in range(7))
+        first = parts["rates"].bound([x, data, at], k[0])
+        others = [parts["rates"].bound([stage, data, at], k[j]) for j in (1, 2, 3)]
+        begin = parts["begin"].bound([here, data, at], x) if step.begin is not None else None
+        end = parts["end"].bound([here, reached, data, s, h], after) if step.end is not None else None
+
+        def run() -> None:
+            half = 0.5 * h
+            at[:] = s
+            if begin is None:
+                x[:] = here
+            else:
+                begin()
+            first()
+            for j, (by, places) in enumerate(((half, s + half), (half, s + half), (h, s + h))):
+                np.add(x, by * k[j], out=stage)
+                at[:] = places
+                others[j]()
+            reached[:] = x + h * (((B_ENDS * k[0] + B_MIDDLE * k[1]) + B_MIDDLE * k[2]) + B_ENDS * k[3])
+            if end is None:
+                here[:] = reached
+            else:
+                end()
+                here[:] = after
 
         return run
 
 
 class Interpreted:
-    """Runs kernels without a compiler."""
+    """Runs kernels without machine code."""
 
     def __init__(self, kernels: Kernels) -> None:
-        self._programs = {name: Program(step) for name, step in kernels.steps.items()}
+        self._programs = {name: StepProgram(step) for name, step in kernels.steps.items()}
         self._maps = {name: function.map(_COLUMNS) for name, function in kernels.maps.items()}
 
     def run(self, step: str, intervals: NDArray[np.int64], data: Array, state: Array) -> Array:
@@ -100,12 +140,11 @@ class Interpreted:
             while (under_way := int(np.sum(counts > k))) > 0:
                 if run is None or under_way < _WORTH_NARROWING * width:
                     width = under_way
-                    now, after = here[:, :width].copy(), np.empty((here.shape[0], width))
+                    now = here[:, :width].copy()
                     s, h = np.empty((1, width)), (1.0 / counts[:width])[None, :]
-                    run = self._programs[step].bound([now, given[:, :width], s, h], after)
+                    run = self._programs[step].bound(now, given[:, :width], s, h)
                 s[:] = k * h
                 run()
-                now[:] = after
                 here[:, :under_way] = now[:, :under_way]
                 k += 1
         reached[:, order] = here

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from softnlp.batch.arrays import some
 from softnlp.batch.bodies import self_intersecting
-from softnlp.batch.csource import Kernels
+from softnlp.batch.kernels import Kernels
 from softnlp.batch.newton import Batch, BatchSolver, Shot, base_state
 from softnlp.batch.plan import LOADS, Plan
 from softnlp.batch.reduced import STATE, reduced_rod

@@ -4,8 +4,8 @@ Without contact the force of wall and fluid is known in closed form, N(s) = F_e 
 it into an identity. A Runge-Kutta step is linear in the rates, so it keeps the identity to round-off: nodes found
 with three unknowns solve the multiple-shooting equations of all eighteen states. They are judged by those.
 
-States are in the units of `softnlp.statics.loadcase`. A step is a function (state, data, s, h) -> state a step h
-further, where data stacks the constants c of the load case and the scaled tip force and moment.
+States are in the units of `softnlp.statics.loadcase`; data stacks the constants c of the load case and the scaled tip
+force and moment.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from typing import Any
 
 import casadi as ca
 
+from softnlp.batch.kernels import Step
 from softnlp.model import rod
-from softnlp.nlp.transcription import RK4, rk_step
+from softnlp.nlp.transcription import RK4
 from softnlp.statics.loadcase import RodFunctions, unpack_section
 
 POSITION, ROTATION, MOMENT = slice(0, 3), slice(3, 12), slice(12, 15)
@@ -36,9 +37,9 @@ class ReducedRod:
     ends : [state, data] -> [the state p, R, N, M at the tip (18), its six residuals].
     """
 
-    value: ca.Function
-    directions: ca.Function
-    check: ca.Function
+    value: Step
+    directions: Step
+    check: Step
     onward: ca.Function
     ends: ca.Function
 
@@ -49,54 +50,86 @@ def reduced_rod(functions: RodFunctions) -> ReducedRod:
     data, s, h = ca.SX.sym("data", nc + 6), ca.SX.sym("s"), ca.SX.sym("h")
     c, force, moment = data[:nc], data[nc : nc + 3], data[nc + 3 :]
     section = unpack_section(c)
-    L = c[len(rod.RodSection._fields)]
-    weight = L * ca.vertcat(section.load_x, section.load_y, section.load_z)
+    weight = c[len(rod.RodSection._fields)] * ca.vertcat(section.load_x, section.load_y, section.load_z)
 
     def full(state: Any, at: Any) -> Any:
         """Return [p, R, N, M] with the force in closed form."""
         return ca.vertcat(state[:12], force + weight * (1 - at), state[MOMENT])
 
-    def rates(state: Any, at: Any) -> Any:
-        every = functions.field(full(state, at), c)
-        return ca.vertcat(every[:12], every[15:18])
-
-    def advance(state: Any) -> Any:
-        k: list[Any] = []
-        for row in RK4.a:
-            moved = state + h * sum((a * k_j for a, k_j in zip(row, k, strict=True) if a), ca.SX.zeros(STATE))
-            k.append(rates(moved, s + h * sum(row)))
-        return state + h * sum((b * k_j for b, k_j in zip(RK4.b, k, strict=True)), ca.SX.zeros(STATE))
-
     state = ca.SX.sym("state", STATE)
-    reached = advance(state)
+    every = functions.field(full(state, s), c)
+    rates = ca.vertcat(every[:12], every[15:])
+    value = Step(function("rates", [state, data, s], rates))
     return ReducedRod(
-        value=ca.Function("value", [state, data, s, h], [reached], {"cse": True}),
-        directions=_directions(state, reached, [data, s, h]),
-        check=_check(functions, full, state, reached, [data, s, h]),
-        onward=ca.Function("onward", [ca.vertcat(state, data, s, h)], [reached], {"cse": True}),
-        ends=ca.Function(
+        value=value,
+        directions=_directions(state, rates, [data, s, h]),
+        check=checked(functions, full, state, rates, [data, s, h], 0),
+        onward=function("onward", [ca.vertcat(state, data, s, h)], advanced(value, state, data, s, h)),
+        ends=function(
             "ends",
             [ca.vertcat(state, data)],
-            [ca.vertcat(full(state, 1), rod.tip_balance(full(state, 1), force, moment))],
-            {"cse": True},
+            ca.vertcat(full(state, 1), rod.tip_balance(full(state, 1), force, moment)),
         ),
     )
 
 
-def _directions(state: Any, reached: Any, given: list[Any]) -> ca.Function:
+def function(name: str, given: list[Any], result: Any) -> ca.Function:
+    """Return a function of scalar operations."""
+    return ca.Function(name, given, [ca.densify(result)], {"cse": True})
+
+
+def advanced(step: Step, state: Any, data: Any, s: Any, h: Any) -> Any:
+    """Return the state a step h further as one expression, of a step that integrates the state itself."""
+    k: list[Any] = []
+    for row in RK4.a:
+        moved = state + h * sum((a * k_j for a, k_j in zip(row, k, strict=True) if a), ca.SX.zeros(step.state))
+        k.append(step.rates(moved, data, s + h * sum(row)))
+    return state + h * sum((b * k_j for b, k_j in zip(RK4.b, k, strict=True)), ca.SX.zeros(step.state))
+
+
+def _directions(state: Any, rates: Any, given: list[Any]) -> Step:
     """Return the step with the derivatives by M(0) beside the state."""
+    data, s, h = given
     V, worst = ca.SX.sym("V", STATE, 3), ca.SX.sym("certainty")
-    moved = ca.jtimes(reached, state, V)
-    R = ca.reshape(reached[ROTATION], 3, 3)
+    x = ca.vertcat(state, ca.vec(V))
+    R = ca.reshape(state[ROTATION], 3, 3)
     turns = []
     for j in range(3):
-        W = ca.reshape(moved[ROTATION, j], 3, 3) @ R.T
+        W = ca.reshape(V[ROTATION, j], 3, 3) @ R.T
         turns.append(ca.vertcat(W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]))
     U = ca.horzcat(*turns)
-    certainty = ca.fmin(worst, smallest_minor(U + U.T))
-    before = ca.vertcat(state, ca.vec(V), worst)
-    after = ca.vertcat(reached, ca.vec(moved), certainty)
-    return ca.Function("directions", [before, *given], [after], {"cse": True})
+    before = ca.vertcat(ca.SX.sym("before", 4 * STATE), worst)
+    return Step(
+        rates=function("rates", [x, data, s], ca.vertcat(rates, ca.vec(ca.jtimes(rates, state, V)))),
+        begin=function("begin", [before, data, s], before[: 4 * STATE]),
+        end=function("end", [before, x, data, s, h], ca.vertcat(x, ca.fmin(worst, smallest_minor(U + U.T)))),
+    )
+
+
+def checked(functions: RodFunctions, full: Any, state: Any, rates: Any, given: list[Any], kept: int) -> Step:
+    """Return the step with the gap of the full equations, integrals along the rod and the curvature beside the state.
+
+    full : (state, s) -> the state of the load case. kept : how many chamber lengths the state has already.
+    """
+    data, s, h = given
+    n, c = state.numel(), data[: functions.field.size1_in(1)]
+    y = ca.SX.sym("y", functions.field.size1_in(0))
+    gained = functions.lengths(y, c)[kept:]
+    worst, integrals, sharpest = ca.SX.sym("gap"), ca.SX.sym("integrals", gained.numel()), ca.SX.sym("curvature")
+    before = ca.vertcat(state, worst, integrals, sharpest)
+    old = ca.SX.sym("old", before.numel())
+    x = ca.vertcat(state, y, integrals)
+    gap, curvature, there = old[n], old[before.numel() - 1], full(state, s + h)
+    sharper = larger_curvature(curvature, [full(old[:n], s), there], c)
+    return Step(
+        rates=function("rates", [x, data, s], ca.vertcat(rates, functions.field(y, c), gained)),
+        begin=function("begin", [before, data, s], ca.vertcat(state, full(state, s), integrals)),
+        end=function(
+            "end",
+            [old, x, data, s, h],
+            ca.vertcat(state, ca.fmax(gap, ca.norm_inf(y - there)), integrals, sharper),
+        ),
+    )
 
 
 def smallest_minor(S: Any) -> Any:
@@ -110,34 +143,9 @@ def smallest_minor(S: Any) -> Any:
     return ca.fmin(S[0, 0], ca.fmin(second, third))
 
 
-def _check(functions: RodFunctions, full: Any, state: Any, reached: Any, given: list[Any]) -> ca.Function:
-    """Return the step with the full equations' gap and the integrals along the rod beside the state."""
-    data, s, h = given
-    c = data[: functions.field.size1_in(1)]
-    x = full(state, s)
-    gap = ca.norm_inf(rk_step(functions.field, RK4)(x, c, h) - full(reached, s + h))
-    gained = rk_integral(functions, x, c, h)
-    worst, integrals, sharpest = ca.SX.sym("gap"), ca.SX.sym("integrals", gained.numel()), ca.SX.sym("curvature")
-    before = ca.vertcat(state, worst, integrals, sharpest)
-    sharper = larger_curvature(sharpest, [x, full(reached, s + h)], c)
-    after = ca.vertcat(reached, ca.fmax(worst, gap), integrals + gained, sharper)
-    return ca.Function("check", [before, *given], [after], {"cse": True})
-
-
 def larger_curvature(known: Any, states: list[Any], c: Any) -> Any:
     """Return the largest of a curvature and those of the axis at states, per its deformed length."""
     for x in states:
         v, u = rod.strains(x, unpack_section(c))
         known = ca.fmax(known, ca.sqrt(u[0] ** 2 + u[1] ** 2) / v[2])
     return known
-
-
-def rk_integral(functions: RodFunctions, x: Any, c: Any, h: Any) -> Any:
-    """Return what the chamber lengths, the bending angle and the backbone gain in a step, by the step's own stages."""
-    k: list[Any] = []
-    rates: list[Any] = []
-    for row in RK4.a:
-        stage = x + h * sum((a * k_j for a, k_j in zip(row, k, strict=True) if a), ca.SX.zeros(x.numel()))
-        k.append(functions.field(stage, c))
-        rates.append(functions.lengths(stage, c))
-    return h * sum((b * r for b, r in zip(RK4.b, rates, strict=True)), ca.SX.zeros(rates[0].numel()))

@@ -12,9 +12,9 @@ from typing import Any
 
 import casadi as ca
 
-from softnlp.batch.reduced import MOMENT, STATE, larger_curvature, rk_integral
+from softnlp.batch.kernels import Step
+from softnlp.batch.reduced import MOMENT, STATE, advanced, checked, function
 from softnlp.model import rod
-from softnlp.nlp.transcription import RK4, rk_step
 from softnlp.statics.loadcase import RodFunctions, unpack_section
 
 UNKNOWN = 6
@@ -32,9 +32,9 @@ class ReducedContact:
     arc : [quantities, stretch] -> the unloaded state.
     """
 
-    value: ca.Function
-    directions: ca.Function
-    check: ca.Function
+    value: Step
+    directions: Step
+    check: Step
     onward: ca.Function
     tip: ca.Function
     arc: ca.Function
@@ -53,55 +53,27 @@ def reduced_contact(functions: RodFunctions) -> ReducedContact:
         """Return [p, R, N, M, lengths] with the force in closed form."""
         return ca.vertcat(state[:12], force - weight * at, state[MOMENT], state[STATE:])
 
-    def advance(state: Any, force: Any) -> Any:
-        k: list[Any] = []
-        for row in RK4.a:
-            moved = state + h * sum((a * k_j for a, k_j in zip(row, k, strict=True) if a), ca.SX.zeros(size))
-            every = functions.field(full(moved, force, s + h * sum(row)), c)
-            k.append(ca.vertcat(every[:12], every[15:]))
-        return state + h * sum((b * k_j for b, k_j in zip(RK4.b, k, strict=True)), ca.SX.zeros(size))
-
     state, V = ca.SX.sym("state", size), ca.SX.sym("V", size, UNKNOWN)
     along_force = ca.horzcat(ca.SX.eye(3), ca.SX.zeros(3, 3))
-    reached = advance(state, N_0)
-    moved = ca.jtimes(reached, ca.vertcat(state, N_0), ca.vertcat(V, along_force))
-
-    x, worst, integrals = full(state, N_0, s), ca.SX.sym("gap"), ca.SX.sym("integrals", 2)
-    sharpest = ca.SX.sym("curvature")
-    sharper = larger_curvature(sharpest, [x, full(reached, N_0, s + h)], c)
-    gap = ca.norm_inf(rk_step(functions.field, RK4)(x, c, h) - full(reached, N_0, s + h))
-    gained = rk_integral(functions, x, c, h)[N:]
+    every = functions.field(full(state, N_0, s), c)
+    rates = ca.vertcat(every[:12], every[15:])
+    moved = ca.jtimes(rates, ca.vertcat(state, N_0), ca.vertcat(V, along_force))
+    value = Step(function("rates", [state, data, s], rates))
 
     a, y, units = ca.SX.sym("a", functions.tip.size1_in(5)), ca.SX.sym("y", ny), ca.SX.sym("units", 2)
     force, moment = ca.SX.sym("force", 3), ca.SX.sym("moment", 3)
     at_tip = full(state, N_0, 1)
     residual = functions.tip(at_tip, c, force, moment, y, a, units)
     slopes = ca.jtimes(residual, ca.vertcat(state, N_0), ca.vertcat(V, along_force))
-    every = ca.vertcat(residual, ca.vec(slopes), ca.vec(ca.densify(ca.jacobian(residual, y))))
+    judged = ca.vertcat(residual, ca.vec(slopes), ca.vec(ca.densify(ca.jacobian(residual, y))))
 
     column, stretch = ca.SX.sym("column", functions.section.size1_in(0)), ca.SX.sym("stretch")
     arc = functions.arc(column, stretch, 1.0)
-    options = {"cse": True}
     return ReducedContact(
-        value=ca.Function("contact_value", [state, data, s, h], [reached], options),
-        directions=ca.Function(
-            "contact_directions",
-            [ca.vertcat(state, ca.vec(V)), data, s, h],
-            [ca.vertcat(reached, ca.vec(moved))],
-            options,
-        ),
-        check=ca.Function(
-            "contact_check",
-            [ca.vertcat(state, worst, integrals, sharpest), data, s, h],
-            [ca.vertcat(reached, ca.fmax(worst, gap), integrals + gained, sharper)],
-            options,
-        ),
-        onward=ca.Function("contact_onward", [ca.vertcat(state, data, s, h)], [reached], options),
-        tip=ca.Function(
-            "contact_tip",
-            [ca.vertcat(state, ca.vec(V), data, force, moment, y, a, units)],
-            [ca.densify(every)],
-            options,
-        ),
-        arc=ca.Function("arc", [ca.vertcat(column, stretch)], [ca.densify(arc)], options),
+        value=value,
+        directions=Step(function("rates", [ca.vertcat(state, ca.vec(V)), data, s], ca.vertcat(rates, ca.vec(moved)))),
+        check=checked(functions, lambda state, at: full(state, N_0, at), state, rates, [data, s, h], N),
+        onward=function("onward", [ca.vertcat(state, data, s, h)], advanced(value, state, data, s, h)),
+        tip=function("tip", [ca.vertcat(state, ca.vec(V), data, force, moment, y, a, units)], judged),
+        arc=function("arc", [ca.vertcat(column, stretch)], arc),
     )

@@ -1,23 +1,23 @@
-"""Shooting over many poses: the same kernels compiled, or interpreted where there is no compiler."""
+"""Shooting over many poses: the same kernels as machine code, or interpreted where there is none."""
 
 from __future__ import annotations
 
-import ctypes
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.batch.compiled import library
-from softnlp.batch.csource import WIDTH, Kernels, c_source
 from softnlp.batch.interpreted import Interpreted, padded
+from softnlp.batch.ir import LIBRARY, llvm_text
+from softnlp.batch.jit import Machine, can_compile, compiled
+from softnlp.batch.kernels import WIDTH, Kernels
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 
 class Shooting(Protocol):
-    """Runs `softnlp.batch.csource.Kernels`."""
+    """Runs `softnlp.batch.kernels.Kernels`."""
 
     def run(self, step: str, intervals: Counts, data: Array, state: Array) -> Array:
         """Return the states at the tip.
@@ -32,19 +32,18 @@ class Shooting(Protocol):
 
 
 class Compiled:
-    """Kernels in a library of `softnlp.batch.compiled`."""
+    """Kernels as machine code."""
 
-    def __init__(self, code: ctypes.CDLL, kernels: Kernels) -> None:
+    def __init__(self, code: Machine, kernels: Kernels) -> None:
         self._code = code
         self._rows = {name: function.size1_out(0) for name, function in kernels.maps.items()}
 
     def run(self, step: str, intervals: Counts, data: Array, state: Array) -> Array:
         """Return the states at the tip, see `Shooting`."""
         reached = np.array(state, order="C")
-        given = np.ascontiguousarray(data)
         counts = np.ascontiguousarray(intervals, dtype=np.int64)
-        pointers = [ctypes.c_void_p(array.ctypes.data) for array in (counts, given, reached)]
-        getattr(self._code, f"shoot_{step}")(ctypes.c_longlong(state.shape[1]), *pointers)
+        if state.shape[1]:
+            self._code.call(f"shoot_{step}", state.shape[1], counts, np.ascontiguousarray(data), reached)
         return reached
 
     def apply(self, name: str, given: Array) -> Array:
@@ -52,16 +51,15 @@ class Compiled:
         poses = given.shape[1]
         whole = np.ascontiguousarray(padded(given, -poses % WIDTH))
         found = np.empty((self._rows[name], whole.shape[1]))
-        pointers = [ctypes.c_void_p(array.ctypes.data) for array in (whole, found)]
-        getattr(self._code, f"apply_{name}")(ctypes.c_longlong(whole.shape[1]), *pointers)
+        if poses:
+            self._code.call(f"apply_{name}", whole.shape[1], whole, found)
         return found[:, :poses]
 
 
 def shooting(kernels: Kernels, *, build: bool) -> Shooting:
-    """Return the compiled kernels where they are to be had, else the interpreted ones; their numbers are the same.
+    """Return the kernels as machine code where it is to be had, else interpreted ones; their numbers are the same.
 
-    build : whether compiling is worth the second that it takes; what was compiled before is used in any case.
+    build : whether compiling is worth the time that it takes.
     """
-    source = c_source(kernels)
-    code = None if source is None else library(source, build=build)
-    return Interpreted(kernels) if code is None else Compiled(code, kernels)
+    text = llvm_text(kernels) if build and can_compile() else None
+    return Interpreted(kernels) if text is None else Compiled(compiled(text, LIBRARY), kernels)
