@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -74,6 +74,7 @@ class CompiledProblem:
 
     x stacks the free quantities, then each case's unknowns; p stacks the fixed quantities. residual(x, p) stacks each
     case's equations, then the constraints over their scales. solver_arguments holds bounds and the NLP for IPOPT.
+    own_slope : makes the Jacobian where it is that of a case alone.
     """
 
     cases: tuple[Case, ...]
@@ -94,6 +95,7 @@ class CompiledProblem:
     lower_g: Array
     upper_g: Array
     is_square: bool
+    own_slope: Callable[[], ca.MX] | None
 
     @cached_property
     def jacobian(self) -> ca.Function:
@@ -109,6 +111,8 @@ class CompiledProblem:
         one such row would take the sparse directions from all the others.
         """
         x, _, g = (self.nlp[name] for name in "xpg")
+        if self.own_slope is not None:
+            return self.own_slope()
         own = sum(case.residuals.numel() for case in self.cases)
         parts = [ca.jacobian(g[rows], x) for rows in (slice(0, own), slice(own, g.numel())) if rows.start < rows.stop]
         return ca.vertcat(*parts) if parts else ca.jacobian(g, x)
@@ -233,6 +237,10 @@ def compile_problem(
             ca.Function(name, [x, p], results, ["x", "p"], list(names)) if names else ca.Function(name, [x, p], results)
         )
 
+    def slope() -> ca.MX:
+        found: ca.MX = ca.Function("slope", originals, [cases[0].slope]).call(pieces, True, False)[0]
+        return found
+
     scaled = [c.scaled() for c in constraints]
     rows = [row for row, _, _ in scaled]
     residual = function("residual", [ca.vertcat(*(case.residuals for case in cases), *rows)])
@@ -262,6 +270,7 @@ def compile_problem(
         lower_g=np.concatenate([none, *(lower for _, lower, _ in scaled)]),
         upper_g=np.concatenate([none, *(upper for _, _, upper in scaled)]),
         is_square=objective is None and g.numel() == x.numel() and all(c.is_equality for c in constraints),
+        own_slope=slope if len(cases) == 1 and not (freed or constraints) else None,
     )
     if freed or constraints:  # load cases alone are square and well posed
         _refuse_ill_posed(compiled, objective is not None)
