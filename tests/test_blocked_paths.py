@@ -205,13 +205,13 @@ def test_a_step_that_went_another_way_is_followed_instead(monkeypatch: pytest.Mo
     near = found_at(0.5)
     direct, arrived = solve(shared(), 0.55, near)
     assert arrived is not None
-    same_way, asked = BlockedGrid.same_way, list[bool]()
+    strayed, asked = BlockedGrid.strayed, list[bool]()
 
-    def not_at_first(self: BlockedGrid, predicted: Any, change: Any) -> bool:
-        asked.append(same_way(self, predicted, change))
-        return asked[-1] and len(asked) > 1
+    def at_first(self: BlockedGrid, predicted: Any, change: Any) -> float:
+        asked.append(strayed(self, predicted, change) <= 1)
+        return 0.0 if asked[-1] and len(asked) > 1 else 2.0
 
-    monkeypatch.setattr(BlockedGrid, "same_way", not_at_first)
+    monkeypatch.setattr(BlockedGrid, "strayed", at_first)
     step, found = solve(shared(), 0.55, near)
     assert found is not None
     assert len(asked) > 1

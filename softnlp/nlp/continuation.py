@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 Path = Callable[[float], Array]
 
 _CORRECTIONS = 8
+_CONTRACTION = 0.1  # of a correction by the next ones, below which Newton's method is on the branch it began at
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,14 +47,14 @@ def follow(
     most_iterations: int | None = None,
     same_branch: Callable[[float, Solution], bool] | None = None,
     predict: Callable[[Array, Array], Array] | None = None,
-    same_way: Callable[[Array, Array], bool] | None = None,
+    strayed: Callable[[Array, Array], float] | None = None,
 ) -> Followed:
     """Follow a solution along p = path(t) from t = 0, where `start` is a solution or close to one, to t = 1.
 
     The step is halved when a solve fails or lands further than `largest_jump` (scaled) from its prediction, which is
     how another branch shows, and grows again after success. The predictor is the secant, or
-    predict(x, p) of a solution x and the values p of the next one; same_way(predicted change, change) may refuse a step
-    that went another way.
+    predict(x, p) of a solution x and the values p of the next one, and what that missed in the last step, squared with
+    the step; strayed(predicted change, change) refuses a step above 1, and tells the length of the next.
     `distance` measures a change of x. A solve counts when it meets ten times the engine's own tolerance, so an engine
     for a path may be a loose one. `most_iterations` bounds what is spent.
     `same_branch(t, solution)` may refuse a solution that the distance does not tell from the branch.
@@ -66,32 +67,49 @@ def follow(
         return Followed(current, 0.0, iterations)
     done, step = 0.0, first_step
     previous: tuple[float, Array] | None = None
+    missed: tuple[float, Array] | None = None
+    refused = False
     for _ in range(most_solves):
         if most_iterations is not None and iterations >= most_iterations:
             break
         if most_iterations is not None:
             left["most_steps"] = most_iterations - iterations
         target = min(1.0, done + step)
-        guess = current.x
+        step, p, guess = target - done, path(target), current.x
         predicted = predict is not None or previous is not None
+        corrected = guess
         if predict is not None:
-            guess = predict(current.x, path(target))
+            guess = tangent = predict(current.x, p)
+            if missed is not None:
+                guess = tangent + missed[1] * (step / missed[0]) ** 2
+            corrected = predict(guess, p)
+            iterations += 1
         elif previous is not None:
-            guess = guess + (guess - previous[1]) * ((target - done) / (done - previous[0]))
-        trial = engine.solve(path(target), guess, **left)
+            guess = corrected = guess + (guess - previous[1]) * (step / (done - previous[0]))
+        trial = engine.solve(p, corrected, **left)
         iterations += max(trial.iterations, 1)
         found = trial.holds(tolerance) and distance(trial.x - guess) <= largest_jump
-        if found and predicted and same_way is not None:
-            found = same_way(guess - current.x, trial.x - current.x)
+        change = 1.6 if trial.iterations <= 4 else 1.0
+        if found and predicted and strayed is not None:
+            off = strayed(guess - current.x, trial.x - current.x)
+            if predict is not None:
+                left_over = distance(trial.x - corrected) / max(distance(trial.x - guess), 1e-300)
+                off = min(off, left_over / _CONTRACTION)
+                change = min(2.0 if trial.iterations <= 3 else 1.0, max(0.1, float(np.sqrt(0.5 / max(off, 0.01)))))
+            found = off <= 1.0
         if found and (same_branch is None or same_branch(target, trial)):
+            if predict is not None:
+                missed = step, trial.x - tangent
             previous, current, done = (done, current.x), trial, target
             if done >= 1.0:
                 break
-            step *= 1.6 if trial.iterations <= 4 else 1.0
+            step *= change if not refused else min(change, 1.0)
+            refused = False
         else:
-            step /= 2
-            if step < smallest_step:
+            refused = True
+            if step <= smallest_step:
                 break
+            step = max(step * min(change, 0.5), smallest_step)
     return Followed(current, done, iterations)
 
 

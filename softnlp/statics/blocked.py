@@ -156,12 +156,11 @@ class BlockedSolver:
         usable = near is not None and self._leads_to(near, situation, pressed, plane)
         if near is not None and usable:
             found = self._continued(self.grid(intervals, plane), situation, pressed, free, plane, near)
-            if found is None:
-                found = self._followed(self.grid(intervals, plane), situation, pressed, free, plane, near)
-            spent += found.solution.iterations if isinstance(found, Blocked) else found.iterations
-        if not isinstance(found, Blocked):
-            found, more = self._searched(situation, pressed, free, plane, intervals)
-            spent += more
+            spent += found.solution.iterations if found is not None else 0
+        for start in [near, None] if usable else [None]:
+            if not isinstance(found, Blocked):
+                found, more = self._searched(situation, pressed, free, plane, intervals, start)
+                spent += more
         target = self.poses.numerics.accuracy / 3
         while isinstance(found, Blocked):
             intervals = found.grid.intervals
@@ -177,16 +176,16 @@ class BlockedSolver:
         return found, spent
 
     def _searched(
-        self, situation: Situation, pressed: Array, free: Free, plane: Array | None, first: int
+        self, situation: Situation, pressed: Array, free: Free, plane: Array | None, first: int, near: Blocked | None
     ) -> tuple[Blocked | _Ended, int]:
-        """Follow the branch from zero pressure, on a coarse grid where its word is good; the answer is on `first`.
+        """Follow the branch from `near` or zero pressure, on a coarse grid where its word is good, to one of `first`.
 
         A fold costs many steps that all fail, so it is worth finding where a step is cheap.
         """
         spent = 0
-        sizes = [first] if self.numerics.intervals is not None else [first, 2 * first]
+        sizes = [first] if self.numerics.intervals is not None or near is not None else [first, 2 * first]
         for size in sizes if first <= _SEARCHED_ON or self.numerics.intervals else [_SEARCHED_ON, *sizes]:
-            found = self._followed(self.grid(size, plane), situation, pressed, free, plane, None)
+            found = self._followed(self.grid(size, plane), situation, pressed, free, plane, near)
             spent += found.solution.iterations if isinstance(found, Blocked) else found.iterations
             if isinstance(found, _Ended) and found.folded and (size >= first or found.error <= _SURE):
                 break
@@ -239,7 +238,7 @@ class BlockedSolver:
         rough = grid.stepper.solve(p, guess)
         if not rough.holds(10 * grid.stepper.tolerance) or not grid.distance(rough.x - x) <= _LARGEST_JUMP:
             return None
-        if grid.has_tangent and not grid.same_way(guess - x, rough.x - x):
+        if grid.has_tangent and grid.strayed(guess - x, rough.x - x) > 1:
             return None
         determinants = grid.determinants(rough, plane)
         if not grid.is_minimum and determinants[0] * near.determinants[0] <= 0:
@@ -327,7 +326,7 @@ class BlockedSolver:
             largest_jump=_LARGEST_JUMP,
             same_branch=same_branch,
             predict=grid.predicted if grid.has_tangent else None,
-            same_way=grid.same_way,
+            strayed=grid.strayed,
         )
         spent = begun.iterations + followed.iterations
         if followed.arrived:

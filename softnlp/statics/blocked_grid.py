@@ -92,8 +92,8 @@ class BlockedGrid:
         except np.linalg.LinAlgError:
             return x
 
-    def same_way(self, predicted: Array, change: Array) -> bool:
-        """Whether a step went where it was predicted to; small steps do.
+    def strayed(self, predicted: Array, change: Array) -> float:
+        """Return how far a step went from where it was predicted to, of what is allowed: more is another branch.
 
         Past a fold another part of the curve may be so near that its distance alone does not tell it, also with the
         same sign of the determinant; its forces are others.
@@ -103,7 +103,7 @@ class BlockedGrid:
             forces = float(np.max(np.abs(self.tip_forces(move)), initial=0.0))
             return max(self.distance(move), _FORCE_SHARE * forces)
 
-        return size(change - predicted) <= max(_LARGEST_MISS * size(change), _SMALL)
+        return size(change - predicted) / max(_LARGEST_MISS * size(change), _SMALL)
 
     def distance(self, change: Array) -> float:
         """Return the largest change of a scaled position or of a direction cosine."""
