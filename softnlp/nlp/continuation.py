@@ -45,22 +45,23 @@ def follow(
     largest_jump: float = 0.6,
     most_solves: int = 400,
     most_iterations: int | None = None,
+    most_steps: int = 12,
     same_branch: Callable[[float, Solution], bool] | None = None,
     predict: Callable[[Array, Array], Array] | None = None,
     strayed: Callable[[Array, Array], float] | None = None,
 ) -> Followed:
     """Follow a solution along p = path(t) from t = 0, where `start` is a solution or close to one, to t = 1.
 
-    The step is halved when a solve fails or lands further than `largest_jump` (scaled) from its prediction, which is
-    how another branch shows, and grows again after success. The predictor is the secant, or
-    predict(x, p) of a solution x and the values p of the next one, and what that missed in the last step, squared with
-    the step; strayed(predicted change, change) refuses a step above 1, and tells the length of the next.
+    The step is cut when a solve fails or lands further than `largest_jump` (scaled) from its prediction, which is
+    how another branch shows, and grows again after success. The predictor is the secant, or predict(x, p) of a solution
+    x and the values p of the next one. strayed(predicted change, change) refuses a step above 1 unless Newton's method
+    contracted from a prediction; with it what the predictor missed in the last step is added to the next.
     `distance` measures a change of x. A solve counts when it meets ten times the engine's own tolerance, so an engine
-    for a path may be a loose one. `most_iterations` bounds what is spent.
+    for a path may be a loose one. `most_iterations` bounds what is spent, `most_steps` one solve.
     `same_branch(t, solution)` may refuse a solution that the distance does not tell from the branch.
     """
     tolerance = 10 * engine.tolerance
-    left = {} if most_iterations is None else {"most_steps": max(most_iterations, 1)}
+    left = {"most_steps": most_steps if most_iterations is None else min(max(most_iterations, 1), most_steps)}
     current = engine.solve(path(0.0), start, **left)
     iterations = current.iterations
     if not current.holds(tolerance):
@@ -73,19 +74,21 @@ def follow(
         if most_iterations is not None and iterations >= most_iterations:
             break
         if most_iterations is not None:
-            left["most_steps"] = most_iterations - iterations
+            left["most_steps"] = min(most_iterations - iterations, most_steps)
         target = min(1.0, done + step)
         step, p, guess = target - done, path(target), current.x
         predicted = predict is not None or previous is not None
+        base, scale = guess, step
+        if predict is not None:
+            base, scale = predict(current.x, p), step**2
+        elif previous is not None:
+            before = done - previous[0]
+            base, scale = guess + (guess - previous[1]) * (step / before), step * (step + before)
+        guess = base if missed is None else base + missed[1] * (scale / missed[0])
         corrected = guess
         if predict is not None:
-            guess = tangent = predict(current.x, p)
-            if missed is not None:
-                guess = tangent + missed[1] * (step / missed[0]) ** 2
             corrected = predict(guess, p)
             iterations += 1
-        elif previous is not None:
-            guess = corrected = guess + (guess - previous[1]) * (step / (done - previous[0]))
         trial = engine.solve(p, corrected, **left)
         iterations += max(trial.iterations, 1)
         found = trial.holds(tolerance) and distance(trial.x - guess) <= largest_jump
@@ -93,13 +96,11 @@ def follow(
         if found and predicted and strayed is not None:
             off = strayed(guess - current.x, trial.x - current.x)
             if predict is not None:
-                left_over = distance(trial.x - corrected) / max(distance(trial.x - guess), 1e-300)
-                off = min(off, left_over / _CONTRACTION)
-                change = min(2.0 if trial.iterations <= 3 else 1.0, max(0.1, float(np.sqrt(0.5 / max(off, 0.01)))))
-            found = off <= 1.0
+                off = min(off, distance(trial.x - corrected) / max(_CONTRACTION * distance(trial.x - guess), 1e-300))
+            found, change = off <= 1.0, float(np.clip(np.sqrt(0.5 / max(off, 1e-3)), 0.1, 2.0))
         if found and (same_branch is None or same_branch(target, trial)):
-            if predict is not None:
-                missed = step, trial.x - tangent
+            if predicted and strayed is not None:
+                missed = scale, trial.x - base
             previous, current, done = (done, current.x), trial, target
             if done >= 1.0:
                 break

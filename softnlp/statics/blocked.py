@@ -14,7 +14,7 @@ from softnlp.base.status import Status
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
-from softnlp.model.rod import STATE_SIZE, Loads
+from softnlp.model.rod import Loads
 from softnlp.model.tip import tip_conditions
 from softnlp.nlp.continuation import follow
 from softnlp.nlp.solver import Solution
@@ -37,6 +37,7 @@ _NEAR_FOLD = 0.2  # of the largest in-plane determinant on the way: below it a b
 _LARGEST_JUMP = 0.3
 _FINEST_FIRST = 55  # intervals of a first grid, however far the free shape curls: the wall keeps the rod from that
 _SEARCHED_ON = 20  # intervals, at most, of the grid on which a branch is followed first
+_MOST_STEPS, _MOST_STEPS_MINIMUM = 5, 24  # to a point of a path; what takes more leads off it
 _SURE = 1e-3  # estimated error of a shape on that grid below which the end of the branch after it is believed
 
 
@@ -48,6 +49,15 @@ class _Ended:
     folded: bool
     iterations: int
     error: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Route:
+    """Where a branch is begun, and the free shapes on the way from there; start : of these, see `FreeShapes.begin`."""
+
+    begin: Situation
+    shapes: FreeShapes
+    start: tuple[float, Array | None]
 
 
 class BlockedSolver:
@@ -183,9 +193,10 @@ class BlockedSolver:
         A fold costs many steps that all fail, so it is worth finding where a step is cheap.
         """
         spent = 0
+        route = self._route(situation, free, near)
         sizes = [first] if self.numerics.intervals is not None or near is not None else [first, 2 * first]
         for size in sizes if first <= _SEARCHED_ON or self.numerics.intervals else [_SEARCHED_ON, *sizes]:
-            found = self._followed(self.grid(size, plane), situation, pressed, free, plane, near)
+            found = self._followed(self.grid(size, plane), route, situation, pressed, free, plane, near)
             spent += found.solution.iterations if isinstance(found, Blocked) else found.iterations
             if isinstance(found, _Ended) and found.folded and (size >= first or found.error <= _SURE):
                 break
@@ -271,39 +282,44 @@ class BlockedSolver:
             slips = slipping_pressure(begin, end, [(u, aside) for u, (_, aside) in trace])
         return self._examined(grid, final, end, pressed, (slips, trace[-1][1]), free)
 
+    def _route(self, end: Situation, free: Free, near: Blocked | None) -> _Route:
+        """Return the way to `end` from `near`, or from where contact begins on the way from zero pressure."""
+        intervals = self.poses.first_intervals(free.column, free.stretch)
+        if free.solved is not None:  # the lengths on the way lead, only those at its end count
+            intervals = min(intervals, free.solved.intervals)
+        shapes = FreeShapes(self.poses, self.functions, intervals, self.contact.tip_cap)
+        if near is None:
+            begin, t_0 = from_zero(end, shapes, TOUCHING * float(self.model.robot.length))
+            return _Route(begin.towards(end, t_0), shapes, shapes.last)
+        solved = near.free.solved
+        on_grid = solved is not None and solved.intervals == intervals
+        return _Route(near.situation, shapes, (near.free.stretch, solved.solution.x if solved and on_grid else None))
+
     def _followed(
         self,
         grid: BlockedGrid,
+        route: _Route,
         end: Situation,
         pressed: Array,
         free: Free,
         plane: Array | None,
         near: Blocked | None,
     ) -> Blocked | _Ended:
-        """Follow the branch to `end` from `near`, or from where contact begins on the way from zero pressure."""
-        intervals = self._free_intervals(free, grid)
-        shapes = FreeShapes(self.poses, self.functions, intervals, self.contact.tip_cap)
-        unloaded = not self.has_wall
-        if near is not None:
-            begin, t_0 = near.situation, 0.0
-            solved = near.free.solved
-            on_grid = solved is not None and solved.intervals == intervals
-            shapes.begin(near.free.stretch, solved.solution.x if solved is not None and on_grid else None)
-        else:
-            begin, t_0 = from_zero(end, shapes, TOUCHING * float(self.model.robot.length))
-
-        def free_situation(situation: Situation) -> Situation:
-            return Situation(situation.pressure, Loads(), None) if unloaded else situation
+        """Follow the branch along a route to `end`."""
+        begin, shapes = route.begin, route.shapes
+        shapes.begin(*route.start)
 
         def path(u: float) -> Array:
-            situation = begin.towards(end, t_0 + u * (1 - t_0))
-            lengths = free.lengths if u >= 1.0 else shapes.tip(free_situation(situation))[0]
+            situation = begin.towards(end, u)
+            alone = situation if self.has_wall else Situation(situation.pressure, Loads(), None)
+            lengths = free.lengths if u >= 1.0 else shapes.tip(alone)[0]
             return grid.problem.pack(self.values(situation, pressed, lengths))
 
         if near is not None:
             x = self._transferred(near, grid)
         else:
-            x = self._free_guess(grid, begin.towards(end, t_0), shapes)
+            free_x = shapes.guess(begin, grid.case.transcribed.points)
+            x = np.concatenate([free_x, np.zeros(self.functions.tip_unknowns)])
         trace: list[tuple[float, tuple[float, float]]] = []
 
         def same_branch(u: float, solution: Solution) -> bool:
@@ -326,40 +342,20 @@ class BlockedSolver:
             largest_jump=_LARGEST_JUMP,
             same_branch=same_branch,
             predict=grid.predicted if grid.has_tangent else None,
+            most_steps=_MOST_STEPS_MINIMUM if grid.is_minimum else _MOST_STEPS,
             strayed=grid.strayed,
         )
         spent = begun.iterations + followed.iterations
         if followed.arrived:
             rough = replace(followed.solution, iterations=spent)
-            first = begin.towards(end, t_0)
-            found = self._arrived(grid, rough, first, end, pressed, free, trace, near)
+            found = self._arrived(grid, rough, begin, end, pressed, free, trace, near)
             if found is not None:
                 return found
-        reached = begin.towards(end, t_0 + followed.fraction * (1 - t_0))
+        reached = begin.towards(end, followed.fraction)
         sizes = [abs(size) for _, (size, _) in trace]
         folded = len(sizes) > 1 and (grid.is_minimum or sizes[-1] < _NEAR_FOLD * max(sizes))
         error = max(grid.refinement(followed.solution, self._order)) if folded else 0.0
         return _Ended(reached, folded, spent, error)
-
-    def _free_intervals(self, free: Free, grid: BlockedGrid) -> int:
-        """Return the grid of the free shapes on the way: their lengths lead, only those at its end count."""
-        if free.solved is None:
-            return grid.intervals
-        return min(free.solved.intervals, self.poses.first_intervals(free.column, free.stretch))
-
-    def _free_guess(self, grid: BlockedGrid, situation: Situation, shapes: FreeShapes) -> Array:
-        """Return x of the free shape without force: exact without loads, else its solution moved to this grid."""
-        column = self.poses.column(self.poses.values(situation.pressure, situation.loads))
-        stretch = shapes.stretch(column)
-        s = grid.case.transcribed.points
-        states = np.asarray(self.functions.arc(column, stretch, s[None, :]))
-        if situation.loads.act and self.has_wall:
-            _, solved = self.poses.solve(situation.pressure, situation.loads)
-            if solved is not None:
-                nodes = np.vstack([solved.nodes, np.zeros((states.shape[0] - STATE_SIZE, solved.nodes.shape[1]))])
-                moved = between_nodes(self.equations.shape, nodes, solved.constants, s)[: states.shape[0]]
-                states = np.vstack([moved[:STATE_SIZE], states[STATE_SIZE:]])
-        return np.concatenate([[stretch], states.T.ravel(), np.zeros(self.functions.tip_unknowns)])
 
     def _transferred(self, found: Blocked, grid: BlockedGrid) -> Array:
         """Return a solution on another grid."""

@@ -11,6 +11,7 @@ from softnlp.base.status import Status
 from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.statics.arc import Arc, arc_pose, unloaded_arc
 from softnlp.statics.loadcase import RodFunctions, stretch_imbalance
+from softnlp.statics.pose import between_nodes
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Pose, Step
@@ -20,6 +21,7 @@ Array = NDArray[np.float64]
 
 _NEWTON_STEPS = 30
 _SCAN = 17
+_HALVINGS, _HALVINGS_LOADED = 40, 18  # of a part of the scan, to the round-off of an arc and of a loose solution
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,24 +84,28 @@ class FreeShapes:
         self._functions = functions
         self._intervals = intervals
         self._tip_cap = tip_cap
-        self._last_x: Array | None = None
-        self._last_stretch = 1.0
+        self._last: tuple[float, Array | None] = (1.0, None)
         self._balance = stretch_imbalance(functions)
+
+    @property
+    def last(self) -> tuple[float, Array | None]:
+        """The stretch and the pose problem's solution that were found last, from which the next are found."""
+        return self._last
 
     def begin(self, stretch: float, x: Array | None) -> None:
         """Start again from a known stretch, and from the pose problem's solution x there if it is known."""
-        self._last_stretch, self._last_x = stretch, x
+        self._last = stretch, x
 
     def stretch(self, column: Array) -> float:
         """Return the root of the stretch balance next to the last one."""
-        found = self._last_stretch
+        found, x = self._last
         for _ in range(_NEWTON_STEPS):
             balance, slope = self._balance(column, found)
             change = -float(balance) / float(slope)
             found += change
             if not abs(change) > 1e-13:
                 break
-        self._last_stretch = found
+        self._last = found, x
         return found
 
     def tip(self, situation: Situation) -> tuple[Array, Array]:
@@ -113,16 +119,31 @@ class FreeShapes:
             return state[STATE_SIZE:] * L_0, (state[:3] + self._tip_cap / L_0 * state[9:12]) * L_0
         grid = self._poses.grid(self._intervals)
         p = grid.problem.pack(values)
-        guess = self._last_x if self._last_x is not None else self._poses.arc_guess(grid, p, stretch)
+        last = self._last[1]
+        guess = last if last is not None else self._poses.arc_guess(grid, p, stretch)
         solution = grid.stepper.solve(p, guess)
         if not solution.holds(10 * grid.stepper.tolerance):
             N = self._poses.model.robot.chambers
             return np.full(N, np.nan), np.full(3, np.nan)
-        self._last_x = solution.x
+        self._last = stretch, solution.x
         found = grid.problem.outputs(x=solution.x, p=p)
         axis = np.asarray(found["tip_rotation"])[:, 2]
         point = np.asarray(found["tip_position"]).ravel() + self._tip_cap * axis
         return np.asarray(found["chamber_lengths"]).ravel(), point
+
+    def guess(self, situation: Situation, s: Array) -> Array:
+        """Return the stretch and then the states at s of a free shape; of the arc where it is not found."""
+        poses = self._poses
+        values = poses.values(situation.pressure, situation.loads)
+        column = poses.column(values)
+        stretch = self.stretch(column)
+        states = np.asarray(self._functions.arc(column, stretch, s[None, :]))
+        if situation.loads.act and np.all(np.isfinite(self.tip(situation)[1])):
+            grid, x = poses.grid(self._intervals), self._last[1]
+            assert x is not None
+            constants = np.asarray(grid.problem.case_constants(x, grid.problem.pack(values))).ravel()
+            states[:STATE_SIZE] = between_nodes(poses.shape, grid.nodes(x), constants, s)[:STATE_SIZE]
+        return np.concatenate([[stretch], states.T.ravel()])
 
 
 def from_zero(end: Situation, shapes: FreeShapes, touch: float) -> tuple[Situation, float]:
@@ -157,7 +178,7 @@ def from_zero(end: Situation, shapes: FreeShapes, touch: float) -> tuple[Situati
         shapes.begin(1.0, None)
         return rest, 0.0
     low, high = float(grid[apart[-1]]), float(grid[apart[-1] + 1])
-    for _ in range(40):
+    for _ in range(_HALVINGS_LOADED if end.loads.act else _HALVINGS):
         middle = (low + high) / 2
         low, high = (middle, high) if gap_at(middle) > 0 else (low, middle)
     return rest, high

@@ -82,6 +82,7 @@ class PoseSolver:
         self.model = model
         self.quantities = self.equations.quantities_of(model)
         self._numbers = {name: q.nominal for name, q in self.quantities.items()}
+        self._last: tuple[Array, tuple[Step, Solved | None]] | None = None
 
     @property
     def branch(self) -> ca.Function:
@@ -130,8 +131,18 @@ class PoseSolver:
     def solve(self, pressure: Array, loads: Loads, warm: Solved | None = None) -> tuple[Step, Solved | None]:
         """Solve one pose, from a neighbouring solution where there is one; the step says how it ended.
 
-        pressure : (sets,) [Pa], not negative. Never raises for a pose that cannot be solved.
+        pressure : (sets,) [Pa], not negative. Never raises for a pose that cannot be solved. The last one that was
+        solved without a neighbour is kept: a wall that stands where the free shape goes asks for it too.
         """
+        if warm is not None:
+            return self._solved(pressure, loads, warm)
+        asked = self.column(self.values(pressure, loads))
+        if self._last is None or not np.array_equal(self._last[0], asked):
+            self._last = asked, self._solved(pressure, loads, None)
+        return self._last[1]
+
+    def _solved(self, pressure: Array, loads: Loads, warm: Solved | None) -> tuple[Step, Solved | None]:
+        """Solve one pose, see `solve`."""
         began = time.perf_counter()
         pressure = np.asarray(pressure, dtype=float)
         values = self.values(pressure, loads)
