@@ -86,7 +86,7 @@ class Instead:
         return getattr(self._engine, name)
 
 
-def fails(p: Any, x: Any) -> Solution:
+def fails(p: Any, x: Any, **_: Any) -> Solution:
     return Solution(np.asarray(x), p, np.inf, 2, "gave up")
 
 

@@ -45,7 +45,7 @@ def follow(
     largest_jump: float = 0.6,
     most_solves: int = 400,
     most_iterations: int | None = None,
-    most_steps: int = 12,
+    most_steps: int | None = None,
     same_branch: Callable[[float, Solution], bool] | None = None,
     predict: Callable[[Array, Array], Array] | None = None,
     strayed: Callable[[Array, Array], float] | None = None,
@@ -61,7 +61,9 @@ def follow(
     `same_branch(t, solution)` may refuse a solution that the distance does not tell from the branch.
     """
     tolerance = 10 * engine.tolerance
-    left = {"most_steps": most_steps if most_iterations is None else min(max(most_iterations, 1), most_steps)}
+    left: dict[str, int] = {} if most_steps is None else {"most_steps": most_steps}
+    if most_iterations is not None and most_steps is None:
+        left["most_steps"] = max(most_iterations, 1)
     current = engine.solve(path(0.0), start, **left)
     iterations = current.iterations
     if not current.holds(tolerance):
@@ -73,8 +75,8 @@ def follow(
     for _ in range(most_solves):
         if most_iterations is not None and iterations >= most_iterations:
             break
-        if most_iterations is not None:
-            left["most_steps"] = min(most_iterations - iterations, most_steps)
+        if most_iterations is not None and most_steps is None:
+            left["most_steps"] = most_iterations - iterations
         target = min(1.0, done + step)
         step, p, guess = target - done, path(target), current.x
         predicted = predict is not None or previous is not None

@@ -13,7 +13,7 @@ from softnlp.statics.arc import Arc, arc_pose, unloaded_arc
 from softnlp.statics.loadcase import RodFunctions, stretch_imbalance
 from softnlp.statics.pose import between_nodes
 from softnlp.statics.pose_grid import Solved
-from softnlp.statics.solver import PoseSolver
+from softnlp.statics.solver import SEARCHED_BY, PoseSolver
 from softnlp.statics.step import Pose, Step
 from softnlp.statics.wall import Situation, Wall
 
@@ -68,7 +68,11 @@ def free_shape(poses: PoseSolver, pressure: Array, loads: Loads, tip_cap: float,
         if branch.status is not Status.SOLVED:
             return Step(pressure, branch.status, branch.message)
         return Free(arc.column, arc.stretch, arc.lengths, arc.position + tip_cap * arc.axis, arc=arc)
-    step, solved = poses.solve(pressure, loads, near.solved if near else None)
+    ahead, poses.ahead = poses.ahead, None
+    if ahead is not None and near is None and np.array_equal(ahead[0], poses.column(poses.values(pressure, loads))):
+        step, solved = ahead[1]
+    else:
+        step, solved = poses.solve(pressure, loads, near.solved if near else None)
     if solved is None or step.pose is None:
         return step
     pose, x = step.pose, solved.solution.x
@@ -77,7 +81,10 @@ def free_shape(poses: PoseSolver, pressure: Array, loads: Loads, tip_cap: float,
 
 
 class FreeShapes:
-    """Free shapes of one model, each found from the last: an arc in closed form, or Newton where loads act."""
+    """Free shapes of one model, each found from the last: an arc in closed form, or Newton where loads act.
+
+    intervals : of shooting, where an iteration costs the least.
+    """
 
     def __init__(self, poses: PoseSolver, functions: RodFunctions, intervals: int, tip_cap: float) -> None:
         self._poses = poses
@@ -117,7 +124,7 @@ class FreeShapes:
         if not situation.loads.act:
             state = np.asarray(self._functions.arc(column, stretch, 1.0)).ravel()
             return state[STATE_SIZE:] * L_0, (state[:3] + self._tip_cap / L_0 * state[9:12]) * L_0
-        grid = self._poses.grid(self._intervals)
+        grid = self._poses.grid(self._intervals, SEARCHED_BY)
         p = grid.problem.pack(values)
         last = self._last[1]
         guess = last if last is not None else self._poses.arc_guess(grid, p, stretch)
@@ -139,7 +146,7 @@ class FreeShapes:
         stretch = self.stretch(column)
         states = np.asarray(self._functions.arc(column, stretch, s[None, :]))
         if situation.loads.act and np.all(np.isfinite(self.tip(situation)[1])):
-            grid, x = poses.grid(self._intervals), self._last[1]
+            grid, x = poses.grid(self._intervals, SEARCHED_BY), self._last[1]
             assert x is not None
             constants = np.asarray(grid.problem.case_constants(x, grid.problem.pack(values))).ravel()
             states[:STATE_SIZE] = between_nodes(poses.shape, grid.nodes(x), constants, s)[:STATE_SIZE]

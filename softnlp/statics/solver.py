@@ -47,7 +47,7 @@ FIRST_INTERVALS = {"multiple-shooting": 10, "collocation": 5}
 MOST_INTERVALS = 1810
 _MOST_COLLOCATION = 320  # as many points; order 8 needs no more
 _TURN = 0.25  # largest angle [rad] of the unloaded arc within one RK4 interval of a first grid
-_SEARCHED_BY: Transcribing = "multiple-shooting"
+SEARCHED_BY: Transcribing = "multiple-shooting"
 _DEARER = 3  # an iteration on a neighbour's grid than on a coarse one, where the neighbour's is still tried first
 _FINER = 4  # how much finer a grid is tried where a coarse one finds no solution
 # Work is counted in Runge-Kutta intervals of Newton iterations, some 0.07 ms each.
@@ -82,7 +82,7 @@ class PoseSolver:
         self.model = model
         self.quantities = self.equations.quantities_of(model)
         self._numbers = {name: q.nominal for name, q in self.quantities.items()}
-        self._last: tuple[Array, tuple[Step, Solved | None]] | None = None
+        self.ahead: tuple[Array, tuple[Step, Solved | None]] | None = None  # what a wall's place has asked for already
 
     @property
     def branch(self) -> ca.Function:
@@ -131,18 +131,8 @@ class PoseSolver:
     def solve(self, pressure: Array, loads: Loads, warm: Solved | None = None) -> tuple[Step, Solved | None]:
         """Solve one pose, from a neighbouring solution where there is one; the step says how it ended.
 
-        pressure : (sets,) [Pa], not negative. Never raises for a pose that cannot be solved. The last one that was
-        solved without a neighbour is kept: a wall that stands where the free shape goes asks for it too.
+        pressure : (sets,) [Pa], not negative. Never raises for a pose that cannot be solved.
         """
-        if warm is not None:
-            return self._solved(pressure, loads, warm)
-        asked = self.column(self.values(pressure, loads))
-        if self._last is None or not np.array_equal(self._last[0], asked):
-            self._last = asked, self._solved(pressure, loads, None)
-        return self._last[1]
-
-    def _solved(self, pressure: Array, loads: Loads, warm: Solved | None) -> tuple[Step, Solved | None]:
-        """Solve one pose, see `solve`."""
         began = time.perf_counter()
         pressure = np.asarray(pressure, dtype=float)
         values = self.values(pressure, loads)
@@ -193,7 +183,7 @@ class PoseSolver:
         given, size, spent = self.numerics.intervals, first, 0
         name: Transcribing | None = None
         if loaded:
-            name = _SEARCHED_BY
+            name = SEARCHED_BY
             quick = self.first_intervals(self.column(values), branch.stretch, transcription=name)
             size = min(quick, given or quick)
         coarse = self.grid(size, name)

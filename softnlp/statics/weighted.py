@@ -131,10 +131,10 @@ class Weighted:
         """The linearised minimum."""
         return self._step
 
-    def solve(self, p: Array, x_start: Array, most_steps: int = _STEPS) -> Solution:
+    def solve(self, p: Array, x_start: Array, most_steps: int | None = None) -> Solution:
         """Return the minimum next to a first guess; its residual is infinite when the minimum was not found."""
         if self._step is not None:
-            return self._gauss_newton(self._step, p, x_start, most_steps)
+            return self._gauss_newton(self._step, p, x_start, most_steps or _STEPS)
         problem = self.problem
         L_0, F_0 = (float(v) for v in np.asarray(problem.units(x_start, p)).ravel())
         units = np.array([F_0] * 3 + [F_0 * L_0] * 3 + [L_0])
@@ -151,7 +151,7 @@ class Weighted:
         history: list[tuple[Array, Array]] = []
         # beyond this rounding of the square problem's solution decides
         enough = max(self.tolerance, 1e-10)
-        for _ in range(most_steps):
+        for _ in range(most_steps or _STEPS):
             solution = self._engine.solve(with_errors(s), x)
             spent += solution.iterations
             if not solution.holds(100 * self.tolerance):
