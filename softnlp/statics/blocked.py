@@ -199,7 +199,7 @@ class BlockedSolver:
         tried = [(first, own)] if given or near is not None else [(first, own), (2 * first, own)]
         if own != SEARCHED_BY:
             tried = [(_SEARCHED_ON, SEARCHED_BY), (max(like, 2 * _SEARCHED_ON), SEARCHED_BY), (first, own)]
-        elif first > _SEARCHED_ON and not given:
+        elif first > _SEARCHED_ON:
             tried.insert(0, (_SEARCHED_ON, own))
         for size, name in tried:
             cost, shown = iteration_cost(size, name), name == own and size >= first
