@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 _NEWTON_STEPS = 30
 _SCAN = 17
+_FURTHEST, _APART = 2.0, 1e-7  # of the change of stretch before: how far it is extrapolated; between two shapes
 _HALVINGS, _HALVINGS_LOADED = 40, 18  # of a part of the scan, to the round-off of an arc and of a loose solution
 
 
@@ -92,6 +93,7 @@ class FreeShapes:
         self._intervals = intervals
         self._tip_cap = tip_cap
         self._last: tuple[float, Array | None] = (1.0, None)
+        self._before: tuple[float, Array] | None = None  # the one found before the last
         self._balance = stretch_imbalance(functions)
 
     @property
@@ -101,7 +103,7 @@ class FreeShapes:
 
     def begin(self, stretch: float, x: Array | None) -> None:
         """Start again from a known stretch, and from the pose problem's solution x there if it is known."""
-        self._last = stretch, x
+        self._last, self._before = (stretch, x), None
 
     def stretch(self, column: Array) -> float:
         """Return the root of the stretch balance next to the last one."""
@@ -119,6 +121,7 @@ class FreeShapes:
         """Return the free chamber lengths (N,) and the contact point (3,) [m]; nan where it is not found."""
         values = self._poses.values(situation.pressure, situation.loads)
         column = self._poses.column(values)
+        last_stretch, last = self._last
         stretch = self.stretch(column)
         L_0 = float(self._poses.model.robot.length)
         if not situation.loads.act:
@@ -126,12 +129,19 @@ class FreeShapes:
             return state[STATE_SIZE:] * L_0, (state[:3] + self._tip_cap / L_0 * state[9:12]) * L_0
         grid = self._poses.grid(self._intervals, SEARCHED_BY)
         p = grid.problem.pack(values)
-        last = self._last[1]
         guess = last if last is not None else self._poses.arc_guess(grid, p, stretch)
+        if last is not None and self._before is not None:  # pressure and stretch rise together: a secant in the stretch
+            run = last_stretch - self._before[0]
+            if abs(stretch - last_stretch) <= _FURTHEST * abs(run):
+                guess = last + (last - self._before[1]) * ((stretch - last_stretch) / run) if run else last
         solution = grid.stepper.solve(p, guess)
+        if last is not None and not solution.holds(10 * grid.stepper.tolerance):
+            solution = grid.stepper.solve(p, last)
         if not solution.holds(10 * grid.stepper.tolerance):
             N = self._poses.model.robot.chambers
             return np.full(N, np.nan), np.full(3, np.nan)
+        if last is not None and abs(stretch - last_stretch) > _APART:
+            self._before = last_stretch, last
         self._last = stretch, solution.x
         found = grid.problem.outputs(x=solution.x, p=p)
         axis = np.asarray(found["tip_rotation"])[:, 2]
