@@ -4,8 +4,8 @@
 
 A problem has a robot and a silicone of the library, random pressures, and either random dead loads, a wall with one of
 the closures, or the tip of a random pose as a target. Each is solved from nothing by "auto" and by "ipopt". Of those
-that "auto" solves at least 99 % have to be solved by "ipopt" too, else the exit status is 1; where both solve, their tips
-or forces are held against each other.
+that "auto" solves at least 99 % have to be solved by "ipopt" too, else the exit status is 1; where both solve, their
+tips or forces are held against each other.
 """
 
 from __future__ import annotations
