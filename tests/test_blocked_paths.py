@@ -24,7 +24,6 @@ from softnlp.statics.blocked_grid import Blocked, BlockedGrid
 from softnlp.statics.blocked_step import solved_step
 from softnlp.statics.free_shape import FreeShapes
 from softnlp.statics.multistart import other_equilibria
-from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
 from softnlp.statics.wall import Situation, Wall, standing_wall
 from softnlp.statics.weighted import Weighted
@@ -87,7 +86,7 @@ class Instead:
         return getattr(self._engine, name)
 
 
-def fails(p: Any, x: Any) -> Solution:
+def fails(p: Any, x: Any, **_: Any) -> Solution:
     return Solution(np.asarray(x), p, np.inf, 2, "gave up")
 
 
@@ -131,11 +130,11 @@ def test_a_path_that_is_lost_is_followed_once_more_on_a_finer_grid(lost: int, mo
     assert exact is not None
     followed, sizes = BlockedSolver._followed, list[int]()
 
-    def watched(self: BlockedSolver, grid: BlockedGrid, end: Situation, *rest: Any) -> Blocked | _Ended:
+    def watched(self: BlockedSolver, grid: BlockedGrid, route: Any, end: Situation, *rest: Any) -> Blocked | _Ended:
         sizes.append(grid.intervals)
         if len(sizes) <= lost:
             return _Ended(Situation(0.25 * end.pressure, Loads(), WALL), folded=False, iterations=7)
-        return followed(self, grid, end, *rest)
+        return followed(self, grid, route, end, *rest)
 
     monkeypatch.setattr(BlockedSolver, "_followed", watched)
     step, found = solve(solver, 0.3)
@@ -205,13 +204,13 @@ def test_a_step_that_went_another_way_is_followed_instead(monkeypatch: pytest.Mo
     near = found_at(0.5)
     direct, arrived = solve(shared(), 0.55, near)
     assert arrived is not None
-    same_way, asked = BlockedGrid.same_way, list[bool]()
+    strayed, asked = BlockedGrid.strayed, list[bool]()
 
-    def not_at_first(self: BlockedGrid, predicted: Any, change: Any) -> bool:
-        asked.append(same_way(self, predicted, change))
-        return asked[-1] and len(asked) > 1
+    def at_first(self: BlockedGrid, predicted: Any, change: Any) -> float:
+        asked.append(strayed(self, predicted, change) <= 1)
+        return 0.0 if asked[-1] and len(asked) > 1 else 2.0
 
-    monkeypatch.setattr(BlockedGrid, "same_way", not_at_first)
+    monkeypatch.setattr(BlockedGrid, "strayed", at_first)
     step, found = solve(shared(), 0.55, near)
     assert found is not None
     assert len(asked) > 1
@@ -266,13 +265,12 @@ def test_a_free_shape_that_is_not_found_is_guessed_as_the_arc(monkeypatch: pytes
     situation = Situation(0.5 * BAR * FIRST, Loads(tip_force=(0.02, 0.0, 0.0)), WALL)
     shapes = FreeShapes(solver.poses, solver.functions, 8, 0.0)
     with monkeypatch.context() as lost:
-        lost.setattr(PoseSolver, "solve", lambda _, P, loads: (Step(P, Status.DIVERGED, "lost"), None))
-        guess = solver._free_guess(grid, situation, shapes)
-    loaded = solver._free_guess(grid, situation, shapes)
+        lost.setattr(FreeShapes, "tip", lambda *_: (np.full(6, np.nan), np.full(3, np.nan)))
+        guess = shapes.guess(situation, grid.case.transcribed.points)
+    loaded = shapes.guess(situation, grid.case.transcribed.points)
     assert np.abs(grid.nodes(guess) - grid.nodes(loaded)).max() > 0.01
-    unloaded = solver._free_guess(grid, replace(situation, loads=Loads()), shapes)
+    unloaded = shapes.guess(replace(situation, loads=Loads()), grid.case.transcribed.points)
     np.testing.assert_array_equal(grid.nodes(guess), grid.nodes(unloaded))
-    np.testing.assert_array_equal(grid.tip_forces(guess), 0.0)
     # the arc is the free shape: its tip is that of the unloaded pose
     pose = solver.poses.solve(situation.pressure, Loads())[0].pose
     assert pose is not None

@@ -47,7 +47,7 @@ def last_pressure(point: BranchPoint) -> np.ndarray:
     stretch=st.floats(1.001, 2.3),
     factor=st.sampled_from([1.0, 3.0]),
 )
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=40, deadline=None)
 def test_the_branch_is_the_witness_s(
     seed: int, k_e: float, conventions: Conventions, stretch: float, factor: float
 ) -> None:

@@ -7,6 +7,7 @@ import csv
 import io
 import re
 from collections.abc import Iterator
+from functools import cache
 from math import degrees
 from pathlib import Path
 
@@ -153,25 +154,30 @@ def test_numbers_are_written_without_a_negative_zero(value: float, form: str, te
 # --- homes ------------------------------------------------------------------------------------------------------------
 
 
-def literals(file: Path) -> Iterator[str]:
+def literals(nodes: list[ast.AST]) -> Iterator[str]:
     """Yield the texts of a module, those in formatted strings as well, without what documents it."""
-    tree = ast.parse(file.read_text())
     told = {
         id(node.body[0].value)
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and isinstance(node.body[0], ast.Expr)
     }
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in told:
             yield node.value
 
 
-TEXTS = {file: "\n".join(literals(file)) for file in sorted(PACKAGE.rglob("*.py"))}
-FIELDS = {
-    file: {node.target.id for node in ast.walk(ast.parse(file.read_text()))
-           if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)}
-    for file in TEXTS
-}  # fmt: skip
+@cache
+def modules() -> dict[Path, tuple[str, str, set[str]]]:
+    """Return the source, the texts and the fields of every module of the package."""
+    found = {}
+    for file in sorted(PACKAGE.rglob("*.py")):
+        source = file.read_text()
+        nodes = list(ast.walk(ast.parse(source)))
+        fields = {n.target.id for n in nodes if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)}
+        found[file] = source, "\n".join(literals(nodes)), fields
+    return found
+
+
 # What is given as well as found has a key in the tables of a scenario; `t_s` is a column of pressures there.
 GIVEN = {"pressure", "t", "tip_position", "tip_cap", "wall_point", "force", "moment", "position", "wall"}
 GIVEN |= {output.name for output in columns.outputs("robot")}
@@ -188,8 +194,8 @@ def homes(key: str) -> set[str]:
     converted = re.compile(rf"\b{output.name}\b[^,]*[*/] *(DEGREE|MILLIMETRE)\b" if own_word else "$^")
     return {
         str(file.relative_to(PACKAGE))
-        for file, text in TEXTS.items()
-        if file != HOME and (key in FIELDS[file] or said.search(text) or converted.search(file.read_text()))
+        for file, (source, texts, fields) in modules().items()
+        if file != HOME and (key in fields or said.search(texts) or converted.search(source))
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -315,6 +316,7 @@ def test_the_log_is_shown_on_standard_error(tmp_path: Path, capsys: pytest.Captu
 PRESSED = ContactSettings(closure="compliant")
 
 
+@cache
 def measured() -> Measurements:
     """Return angles of two pressures that no constants meet, and a force."""
     P = BAR * np.array([[0.6, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # the last one is straight
@@ -331,7 +333,7 @@ def measured() -> Measurements:
 def test_identified_constants_are_those_of_the_whole_program(loads: Loads) -> None:
     found = {
         e: identify(
-            measured(), ECOFLEX, ["k_b", "k_c"], loads=loads, contact=PRESSED, numerics=Numerics(intervals=6, engine=e)
+            measured(), ECOFLEX, ["k_b", "k_c"], loads=loads, contact=PRESSED, numerics=Numerics(intervals=3, engine=e)
         )  # type: ignore[arg-type]
         for e in ENGINES
     }
@@ -354,7 +356,7 @@ def test_constants_that_ipopt_can_better_are_disputed(monkeypatch: pytest.Monkey
         return replace(found, x=found.x + (1e-3 if self.problem.free else 0.0))
 
     monkeypatch.setattr(Engine, "solve", elsewhere)
-    result = identify(measured(), ECOFLEX, ["k_b", "k_c"], contact=PRESSED, numerics=Numerics(intervals=6))
+    result = identify(measured(), ECOFLEX, ["k_b", "k_c"], contact=PRESSED, numerics=Numerics(intervals=3))
     assert result.status is Status.DISPUTED
     assert np.all(np.isnan(result.constants))
     assert "k_b = " in result.message
@@ -363,7 +365,7 @@ def test_constants_that_ipopt_can_better_are_disputed(monkeypatch: pytest.Monkey
 
 def test_more_rods_than_ipopt_takes_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(identify_nlp, "MOST_RODS", 0)
-    result = identify(measured(), ECOFLEX, ["k_b", "k_c"], contact=PRESSED, numerics=Numerics(intervals=6))
+    result = identify(measured(), ECOFLEX, ["k_b", "k_c"], contact=PRESSED, numerics=Numerics(intervals=3))
     assert (result.status, result.engine, result.ipopt) == (Status.SOLVED, "auto", None)
     assert "IPOPT did not close the constants: 1 rods would be" in result.warnings[-1]
 

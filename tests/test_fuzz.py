@@ -8,7 +8,7 @@ import pytest
 from fuzz import Case, cases, outcome, small_scenarios, wrong_with
 
 SEED, COUNT = 20261128, 2000
-QUICK = 150
+QUICK = 80
 
 
 def all_cases() -> list[Case]:

@@ -493,7 +493,7 @@ def test_what_cannot_be_identified_is_refused(free: list[str], measured: dict[st
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", ["measured_angles", "measured_forces"])
+@pytest.mark.parametrize("name", [pytest.param("measured_angles", marks=pytest.mark.slow), "measured_forces"])
 def test_a_shipped_identification_runs(name: str, tmp_path: Path) -> None:
     assert main(["run", str(SCENARIOS / f"{name}.toml"), "--out", str(tmp_path)]) == 0
     files = {path.name for path in tmp_path.iterdir()}

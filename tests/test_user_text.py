@@ -48,7 +48,7 @@ chambers_per_set = 2
 chamber_angle_deg = 50
 """
 RUBBER = f'[material]\nfile = "own $m_{{.toml"\nname = {quoted(SILICONE)}\nmodel = {quoted(LAW)}\n'
-QUICK = "[solver]\nintervals = 10\naccuracy = 1e-3\n"
+QUICK = '[solver]\nengine = "newton"\nintervals = 10\naccuracy = 1e-3\n'
 
 
 def scenario(study: str, more: str, body: str = OWN + RUBBER + QUICK) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import shutil
 from collections.abc import Callable, Iterable
+from fcntl import LOCK_EX, flock
 from functools import cache
 from pathlib import Path
 
@@ -35,10 +36,13 @@ def kept(name: str, sources: Iterable[Path]) -> Path:
 
 def make(folder: Path, build: Callable[[Path], None]) -> None:
     """Build into a folder that appears whole, in place of those of older sources."""
-    if folder.is_dir():
-        return
-    partial = folder.with_name(f"{folder.name}.partial")
-    shutil.rmtree(folder.parent, ignore_errors=True)
-    partial.mkdir(parents=True)
-    build(partial)
-    partial.rename(folder)
+    partial, lock = folder.with_name(f"{folder.name}.partial"), folder.parent.with_suffix(".lock")
+    lock.parent.mkdir(parents=True, exist_ok=True)
+    with lock.open("w") as held:
+        flock(held, LOCK_EX)  # another process that makes it is waited for
+        if folder.is_dir():
+            return
+        shutil.rmtree(folder.parent, ignore_errors=True)
+        partial.mkdir(parents=True)
+        build(partial)
+        partial.rename(folder)

@@ -24,8 +24,9 @@ class Equation:
 class Case(Protocol):
     """Equations of one state of loading, in scaled units.
 
-    symbols : its unknowns. residuals : as many equations. fine_residuals : the same at half the step. equations : names
-    of the rows. outputs : by name, SI. constants : what the equations take of the quantities, for warm starts.
+    symbols : its unknowns. residuals : as many equations. slope : their Jacobian by the unknowns. fine_residuals : the
+    same at half the step. equations : names of the rows. outputs : by name, SI. constants : what the equations take of
+    the quantities, for warm starts.
     column : the values that the case takes of a problem, in its own order, SI.
     length_unit, force_unit : of the scaled unknowns [m, N].
     """
@@ -36,6 +37,8 @@ class Case(Protocol):
     def symbols(self) -> tuple[ca.MX, ...]: ...  # noqa: D102
     @property
     def residuals(self) -> ca.MX: ...  # noqa: D102
+    @property
+    def slope(self) -> ca.MX: ...  # noqa: D102
     @property
     def fine_residuals(self) -> ca.MX: ...  # noqa: D102
     @property

@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 Path = Callable[[float], Array]
 
 _CORRECTIONS = 8
+_CONTRACTION = 0.1  # of a correction by the next ones, below which Newton's method is on the branch it began at
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,54 +45,74 @@ def follow(
     largest_jump: float = 0.6,
     most_solves: int = 400,
     most_iterations: int | None = None,
+    most_steps: int | None = None,
     same_branch: Callable[[float, Solution], bool] | None = None,
     predict: Callable[[Array, Array], Array] | None = None,
-    same_way: Callable[[Array, Array], bool] | None = None,
+    strayed: Callable[[Array, Array], float] | None = None,
 ) -> Followed:
     """Follow a solution along p = path(t) from t = 0, where `start` is a solution or close to one, to t = 1.
 
-    The step is halved when a solve fails or lands further than `largest_jump` (scaled) from its prediction, which is
-    how another branch shows, and grows again after success. The predictor is the secant, or
-    predict(x, p) of a solution x and the values p of the next one; same_way(predicted change, change) may refuse a step
-    that went another way.
+    The step is cut when a solve fails or lands further than `largest_jump` (scaled) from its prediction, which is
+    how another branch shows, and grows again after success. The predictor is the secant, or predict(x, p) of a solution
+    x and the values p of the next one. strayed(predicted change, change) refuses a step above 1 unless Newton's method
+    contracted from a prediction; with it what the predictor missed in the last step is added to the next.
     `distance` measures a change of x. A solve counts when it meets ten times the engine's own tolerance, so an engine
-    for a path may be a loose one. `most_iterations` bounds what is spent.
+    for a path may be a loose one. `most_iterations` bounds what is spent, `most_steps` one solve.
     `same_branch(t, solution)` may refuse a solution that the distance does not tell from the branch.
     """
     tolerance = 10 * engine.tolerance
-    left = {} if most_iterations is None else {"most_steps": max(most_iterations, 1)}
+    left: dict[str, int] = {} if most_steps is None else {"most_steps": most_steps}
+    if most_iterations is not None and most_steps is None:
+        left["most_steps"] = max(most_iterations, 1)
     current = engine.solve(path(0.0), start, **left)
     iterations = current.iterations
     if not current.holds(tolerance):
         return Followed(current, 0.0, iterations)
     done, step = 0.0, first_step
     previous: tuple[float, Array] | None = None
+    missed: tuple[float, Array] | None = None
+    refused = False
     for _ in range(most_solves):
         if most_iterations is not None and iterations >= most_iterations:
             break
-        if most_iterations is not None:
+        if most_iterations is not None and most_steps is None:
             left["most_steps"] = most_iterations - iterations
         target = min(1.0, done + step)
-        guess = current.x
+        step, p, guess = target - done, path(target), current.x
         predicted = predict is not None or previous is not None
+        base, scale = guess, step
         if predict is not None:
-            guess = predict(current.x, path(target))
+            base, scale = predict(current.x, p), step**2
         elif previous is not None:
-            guess = guess + (guess - previous[1]) * ((target - done) / (done - previous[0]))
-        trial = engine.solve(path(target), guess, **left)
+            before = done - previous[0]
+            base, scale = guess + (guess - previous[1]) * (step / before), step * (step + before)
+        guess = base if missed is None else base + missed[1] * (scale / missed[0])
+        corrected = guess
+        if predict is not None:
+            corrected = predict(guess, p)
+            iterations += 1
+        trial = engine.solve(p, corrected, **left)
         iterations += max(trial.iterations, 1)
         found = trial.holds(tolerance) and distance(trial.x - guess) <= largest_jump
-        if found and predicted and same_way is not None:
-            found = same_way(guess - current.x, trial.x - current.x)
+        change = 1.6 if trial.iterations <= 4 else 1.0
+        if found and predicted and strayed is not None:
+            off = strayed(guess - current.x, trial.x - current.x)
+            if predict is not None:
+                off = min(off, distance(trial.x - corrected) / max(_CONTRACTION * distance(trial.x - guess), 1e-300))
+            found, change = off <= 1.0, float(np.clip(np.sqrt(0.5 / max(off, 1e-3)), 0.1, 2.0))
         if found and (same_branch is None or same_branch(target, trial)):
+            if predicted and strayed is not None:
+                missed = scale, trial.x - base
             previous, current, done = (done, current.x), trial, target
             if done >= 1.0:
                 break
-            step *= 1.6 if trial.iterations <= 4 else 1.0
+            step *= change if not refused else min(change, 1.0)
+            refused = False
         else:
-            step /= 2
-            if step < smallest_step:
+            refused = True
+            if step <= smallest_step:
                 break
+            step = max(step * min(change, 0.5), smallest_step)
     return Followed(current, done, iterations)
 
 

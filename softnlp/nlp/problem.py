@@ -91,7 +91,8 @@ class CompiledProblem:
 
     x stacks the free quantities, then each case's unknowns; p stacks the fixed quantities. residual(x, p) stacks each
     case's equations, then the constraints over their scales. nlp holds x, p, f, g as expressions. function(name,
-    expressions) makes a function of (x, p) of expressions in the symbols of quantities and cases.
+    expressions) makes a function of (x, p) of expressions in the symbols of quantities and cases. own_slope : makes the
+    Jacobian where it is that of a case alone.
     """
 
     cases: tuple[Case, ...]
@@ -113,6 +114,7 @@ class CompiledProblem:
     upper_g: Array
     is_square: bool
     function: Callable[..., ca.Function]
+    own_slope: Callable[[], ca.MX] | None
 
     @cached_property
     def jacobian(self) -> ca.Function:
@@ -128,6 +130,8 @@ class CompiledProblem:
         one such row would take the sparse directions from all the others.
         """
         x, _, g = (self.nlp[name] for name in "xpg")
+        if self.own_slope is not None:
+            return self.own_slope()
         own = sum(case.residuals.numel() for case in self.cases)
         parts = [ca.jacobian(g[rows], x) for rows in (slice(0, own), slice(own, g.numel())) if rows.start < rows.stop]
         return ca.vertcat(*parts) if parts else ca.jacobian(g, x)
@@ -252,6 +256,10 @@ def compile_problem(
             ca.Function(name, [x, p], results, ["x", "p"], list(names)) if names else ca.Function(name, [x, p], results)
         )
 
+    def slope() -> ca.MX:
+        found: ca.MX = ca.Function("slope", originals, [cases[0].slope]).call(pieces, True, False)[0]
+        return found
+
     scaled = [c.scaled() for c in constraints]
     rows = [row for row, _, _ in scaled]
     residual = function("residual", [ca.vertcat(*(case.residuals for case in cases), *rows)])
@@ -282,6 +290,7 @@ def compile_problem(
         upper_g=np.concatenate([none, *(upper for _, _, upper in scaled)]),
         function=function,
         is_square=objective is None and g.numel() == x.numel() and all(c.is_equality for c in constraints),
+        own_slope=slope if len(cases) == 1 and not (freed or constraints) else None,
     )
     if freed or constraints:  # load cases alone are square and well posed
         _refuse_ill_posed(compiled, objective is not None)

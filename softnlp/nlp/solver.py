@@ -159,7 +159,7 @@ class Engine:
                 **self._options,
             },
         }
-        if self.problem.cases and self.problem.constraints:
+        if self.problem.cases:
             options["jac_g"] = ca.Function("jac_g", [nlp["x"], nlp["p"]], [nlp["g"], self.problem.slope])
         if self.problem.is_square:
             x, p = nlp["x"], nlp["p"]

@@ -12,9 +12,9 @@ boundary conditions is the caller's.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Literal, Protocol
 
 import casadi as ca
@@ -54,7 +54,8 @@ class Transcribed:
     node_index : which of those states are the nodes x_0..x_K. residuals : stage and continuity equations, nx each.
     kinds : for each residual block of nx, "stage" or "gap".
     fine_residuals : the same at half the step for the same nodes, which is what the error estimate measures.
-    integrate : given a function (x, c) -> q, its integral over s by the method's own quadrature.
+    integrate : given a function (x, c) -> q, its integral over s by the method's own quadrature. slopes : given how the
+    constants move, the Jacobian of the residuals by the unknowns and how the residuals move with the constants.
     """
 
     unknowns: ca.MX
@@ -65,6 +66,7 @@ class Transcribed:
     kinds: tuple[str, ...]
     fine_residuals: ca.MX
     integrate: Callable[[ca.Function], ca.MX]
+    slopes: Callable[[ca.MX], tuple[ca.MX, ca.MX]]
 
     @cached_property
     def nodes(self) -> ca.MX:
@@ -72,7 +74,7 @@ class Transcribed:
         return ca.reshape(self.unknowns, self.state_size, -1)[:, self.node_index.tolist()]
 
 
-class Transcription(Protocol):
+class Transcription(Hashable, Protocol):
     """What the problem asks of a method."""
 
     @property
@@ -93,6 +95,10 @@ class Transcription(Protocol):
         """Return the same method on another grid."""
         ...
 
+    def interval(self, field: ca.Function) -> ca.Function:
+        """Return (states of one interval from node to node, c, h) -> its residuals."""
+        ...
+
 
 def rk_step(field: ca.Function, tableau: Tableau) -> ca.Function:
     """Return one explicit Runge-Kutta step as a function (x, c, h) -> x_next."""
@@ -110,6 +116,35 @@ def with_quadrature(field: ca.Function, quadrature: ca.Function) -> ca.Function:
     nx = field.size1_in(0)
     x, c = ca.SX.sym("x", nx + quadrature.size1_out(0)), ca.SX.sym("c", field.size1_in(1))
     return ca.Function("augmented", [x, c], [ca.vertcat(field(x[:nx], c), quadrature(x[:nx], c))])
+
+
+@lru_cache(maxsize=16)
+def _interval_slopes(field: ca.Function, method: Transcription) -> ca.Function:
+    """Return (states of one interval, c, h, dc) -> Jacobian by all but the last node, by that, and change along dc."""
+    interval = method.interval(field)
+    m, nc = interval.size1_out(0), interval.size1_in(1)
+    w, c, h, dc = ca.SX.sym("w", interval.size1_in(0)), ca.SX.sym("c", nc), ca.SX.sym("h"), ca.SX.sym("dc", nc)
+    residual = interval(w, c, h)
+    J = ca.jacobian(residual, w)
+    moved = ca.densify(ca.jtimes(residual, c, dc))
+    return ca.Function("interval_slopes", [w, c, h, dc], [J[:, :m], J[:, m:], moved], {"cse": True})
+
+
+def _slopes(field: ca.Function, method: Transcription, unknowns: ca.MX, c: ca.MX, dc: ca.MX) -> tuple[ca.MX, ca.MX]:
+    """Return the Jacobian of the residuals on a grid by the unknowns, and how they move with c along dc.
+
+    Made of the blocks of one interval, since automatic differentiation of the whole takes some times as long.
+    """
+    K, block = method.intervals, _interval_slopes(field, method.with_intervals(1))
+    m, nx = block.size1_out(0), field.size1_in(0)
+    windows = unknowns[(np.arange(m + nx)[:, None] + m * np.arange(K)).T.ravel().tolist()]
+    own, following, moved = block.map(K)(ca.reshape(windows, m + nx, K), c, 1 / K, dc)
+    own, following = (
+        ca.sparsity_cast(part, ca.diagcat(*[block.sparsity_out(k)] * K)) for k, part in enumerate((own, following))
+    )
+    next_node = (np.arange(nx) + m * np.arange(1, K + 1)[:, None]).ravel().tolist()
+    to_next = ca.DM(ca.Sparsity.triplet(nx * K, unknowns.numel(), list(range(nx * K)), next_node), 1)
+    return ca.horzcat(own, ca.MX(m * K, nx)) + following @ to_next, ca.vec(moved)
 
 
 @dataclass(frozen=True)
@@ -146,6 +181,23 @@ class MultipleShooting:
             Of the same class.
         """
         return replace(self, intervals=intervals)
+
+    def interval(self, field: ca.Function) -> ca.Function:
+        """Return (states of one interval from node to node, c, h) -> its residuals.
+
+        Parameters
+        ----------
+        field
+            (x, c) -> dx/ds on s in 0..1.
+
+        Returns
+        -------
+        Function
+            As said.
+        """
+        nx = field.size1_in(0)
+        w, c, h = ca.SX.sym("w", 2 * nx), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("h")
+        return ca.Function("interval", [w, c, h], [rk_step(field, self.tableau)(w[:nx], c, h) - w[nx:]])
 
     def transcribe(self, field: ca.Function, constants: ca.MX) -> Transcribed:
         """Pose the field on the grid, with unknowns [x_0 | x_1 | ... | x_K].
@@ -187,6 +239,7 @@ class MultipleShooting:
             kinds=("gap",) * K,
             fine_residuals=ca.vec(fine),
             integrate=integrate,
+            slopes=lambda moved: _slopes(field, self, unknowns, constants, moved),
         )
 
 
@@ -238,6 +291,25 @@ class Collocation:
         rates = ca.horzcat(*(field(stages[:, j], c) for j in range(self.degree)))
         return h * rates - every @ C, every @ D
 
+    def interval(self, field: ca.Function) -> ca.Function:
+        """Return (states of one interval from node to node, c, h) -> its residuals.
+
+        Parameters
+        ----------
+        field
+            (x, c) -> dx/ds on s in 0..1.
+
+        Returns
+        -------
+        Function
+            As said.
+        """
+        nx, d = field.size1_in(0), self.degree
+        w, c, h = ca.SX.sym("w", nx * (d + 2)), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("h")
+        x, z, end = ca.vertsplit(w, [0, nx, nx * (d + 1), nx * (d + 2)])
+        stage, reached = self._stage_residuals(field, x, ca.reshape(z, nx, d), c, h)
+        return ca.Function("interval", [w, c, h], [ca.vertcat(ca.vec(stage), reached - end)])
+
     def transcribe(self, field: ca.Function, constants: ca.MX) -> Transcribed:
         """Pose the field on the grid, with unknowns [x_0 | stages, x_1 | ... | stages, x_K].
 
@@ -260,16 +332,11 @@ class Collocation:
         states = ca.reshape(unknowns, nx, 1 + K * (d + 1))
         node_index = np.arange(K + 1) * (d + 1)
 
-        x, c = ca.SX.sym("x", nx), ca.SX.sym("c", field.size1_in(1))
-        z, end = ca.SX.sym("z", nx * d), ca.SX.sym("end", nx)
-        stage, reached = self._stage_residuals(field, x, ca.reshape(z, nx, d), c, h)
-        interval = ca.Function("interval", [x, z, end, c], [ca.vertcat(ca.vec(stage), reached - end)])
-
         left = states[:, node_index[:-1].tolist()]
         right = states[:, node_index[1:].tolist()]
         inner = [j for j in range(states.shape[1]) if j % (d + 1)]
-        stages = ca.reshape(states[:, inner], nx * d, K)
-        residuals = interval.map(K)(left, stages, right, constants)
+        windows = ca.vertcat(left, ca.reshape(states[:, inner], nx * d, K), right)
+        residuals = self.interval(field).map(K)(windows, constants, h)
 
         flow = self._flow(field, h / 2).map(K)
         fine_gap = flow(flow(left, constants), constants) - right
@@ -291,6 +358,7 @@ class Collocation:
             kinds=(*("stage",) * d, "gap") * K,
             fine_residuals=ca.vec(fine),
             integrate=integrate,
+            slopes=lambda moved: _slopes(field, self, unknowns, constants, moved),
         )
 
     def _flow(self, field: ca.Function, h: float) -> ca.Function:

@@ -12,21 +12,20 @@ from numpy.typing import NDArray
 
 from softnlp.base.status import Status
 from softnlp.model.contact_settings import ContactSettings
-from softnlp.model.numerics import Numerics
+from softnlp.model.numerics import Numerics, Transcribing
 from softnlp.model.quantities import Model
-from softnlp.model.rod import STATE_SIZE, Loads
+from softnlp.model.rod import Loads
 from softnlp.model.tip import tip_conditions
 from softnlp.nlp.continuation import follow
 from softnlp.nlp.solver import Solution
-from softnlp.nlp.transcription import method_named
-from softnlp.statics.blocked_grid import Blocked, BlockedGrid, kept_grid
+from softnlp.statics.blocked_grid import Blocked, BlockedGrid, kept_grid, transferred
 from softnlp.statics.blocked_step import failed_step, solved_step, touching_step
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.compiled import RodEquations, rod_equations
 from softnlp.statics.free_shape import Free, FreeShapes, free_shape, from_zero
 from softnlp.statics.loadcase import RodFunctions
-from softnlp.statics.pose import between_nodes
-from softnlp.statics.solver import MOST_INTERVALS, PoseSolver
+from softnlp.statics.pose_grid import iteration_cost
+from softnlp.statics.solver import MOST_INTERVALS, SEARCHED_BY, PoseSolver
 from softnlp.statics.step import Step
 from softnlp.statics.wall import Situation, Wall, keeps_plane, slipping_pressure
 
@@ -37,17 +36,31 @@ _NEAR_FOLD = 0.2  # of the largest in-plane determinant on the way: below it a b
 _LARGEST_JUMP = 0.3
 _FINEST_FIRST = 55  # intervals of a first grid, however far the free shape curls: the wall keeps the rod from that
 _SEARCHED_ON = 20  # intervals, at most, of the grid on which a branch is followed first
+_MOST_STEPS, _MOST_STEPS_MINIMUM = 5, 24  # to a point of a path; what takes more leads off it
+_MOST_WORK, _LEAST = 20_000, 100  # to follow a branch, in intervals of Newton's iterations; iterations on any grid
+_SOUND = 0.5  # of the largest determinant: nearer to a fold an error is that of the place of the fold
+_NEAR_END = 0.98  # of a path: a fold that a coarse grid finds beyond it may lie behind the end
 _SURE = 1e-3  # estimated error of a shape on that grid below which the end of the branch after it is believed
 
 
 @dataclass(frozen=True, eq=False)
 class _Ended:
-    """Where a branch was lost: the situation reached, whether it had turned, iterations spent, the error there."""
+    """Where a branch was lost, whether it had turned, the iterations, the error there and whether work ran out."""
 
     situation: Situation
     folded: bool
     iterations: int
     error: float = 0.0
+    stopped: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class _Route:
+    """Where a branch is begun, and the free shapes on the way from there; start : of these, see `FreeShapes.begin`."""
+
+    begin: Situation
+    shapes: FreeShapes
+    start: tuple[float, Array | None]
 
 
 class BlockedSolver:
@@ -88,21 +101,17 @@ class BlockedSolver:
         """The rod under the closure, see `RodFunctions`."""
         return self.equations.functions
 
-    @property
-    def _order(self) -> int:
-        """The order of the transcription's error."""
-        return method_named(self.numerics.transcription, 1).order
-
     def with_model(self, model: Model) -> BlockedSolver:
         """Return a solver for other numbers that shares what is compiled; `ValueError` for another `Model.kind`."""
         other = copy(self)
         other.model, other.poses = model, self.poses.with_model(model)
         return other
 
-    def grid(self, intervals: int, plane: Array | None) -> BlockedGrid:
-        """Return the compiled problem on a grid and in a plane (None: in space), building it at first use."""
+    def grid(self, intervals: int, plane: Array | None, name: Transcribing | None = None) -> BlockedGrid:
+        """Return what is compiled on a grid and in a plane (None: in space), transcribed as the numerics say, or so."""
         weights = self.contact.weights if self.contact.closure == "weighted" else None
-        return kept_grid(self.equations, self.numerics, weights, intervals, plane)
+        numerics = replace(self.numerics, transcription=name) if name else self.numerics
+        return kept_grid(self.equations, numerics, weights, intervals, plane)
 
     def solve(
         self, pressure: Array, loads: Loads, wall: Wall | None, near: Blocked | None = None
@@ -129,7 +138,9 @@ class BlockedSolver:
         found, spent = self._settle(situation, free, near)
         spent += free.iterations
         if isinstance(found, _Ended):
-            return failed_step(situation.pressure, found.situation.pressure, found.folded, spent, began), None
+            return failed_step(
+                situation.pressure, found.situation.pressure, found.folded, found.stopped, spent, began
+            ), None
         try:
             found = self._closed(found)
         except DisputedError as error:
@@ -156,12 +167,11 @@ class BlockedSolver:
         usable = near is not None and self._leads_to(near, situation, pressed, plane)
         if near is not None and usable:
             found = self._continued(self.grid(intervals, plane), situation, pressed, free, plane, near)
-            if found is None:
-                found = self._followed(self.grid(intervals, plane), situation, pressed, free, plane, near)
-            spent += found.solution.iterations if isinstance(found, Blocked) else found.iterations
-        if not isinstance(found, Blocked):
-            found, more = self._searched(situation, pressed, free, plane, intervals)
-            spent += more
+            spent += found.solution.iterations if found is not None else 0
+        for start in [near, None] if usable else [None]:
+            if not isinstance(found, Blocked):
+                found, more = self._searched(situation, pressed, free, plane, intervals, start)
+                spent += more
         target = self.poses.numerics.accuracy / 3
         while isinstance(found, Blocked):
             intervals = found.grid.intervals
@@ -177,21 +187,30 @@ class BlockedSolver:
         return found, spent
 
     def _searched(
-        self, situation: Situation, pressed: Array, free: Free, plane: Array | None, first: int
+        self, situation: Situation, pressed: Array, free: Free, plane: Array | None, first: int, near: Blocked | None
     ) -> tuple[Blocked | _Ended, int]:
-        """Follow the branch from zero pressure, on a coarse grid where its word is good; the answer is on `first`.
+        """Follow the branch from `near` or zero pressure, on a coarse grid where its word is good, to one of `first`.
 
         A fold costs many steps that all fail, so it is worth finding where a step is cheap.
         """
-        spent = 0
-        sizes = [first] if self.numerics.intervals is not None else [first, 2 * first]
-        for size in sizes if first <= _SEARCHED_ON or self.numerics.intervals else [_SEARCHED_ON, *sizes]:
-            found = self._followed(self.grid(size, plane), situation, pressed, free, plane, None)
-            spent += found.solution.iterations if isinstance(found, Blocked) else found.iterations
-            if isinstance(found, _Ended) and found.folded and (size >= first or found.error <= _SURE):
+        spent, route = 0, self._route(situation, free, near)
+        own, given, left = self.numerics.transcription, self.numerics.intervals is not None, _MOST_WORK
+        like = first if own == SEARCHED_BY else 2 * first  # intervals of shooting that show as much
+        tried = [(first, own)] if given or near is not None else [(first, own), (2 * first, own)]
+        if own != SEARCHED_BY:
+            tried = [(_SEARCHED_ON, SEARCHED_BY), (max(like, 2 * _SEARCHED_ON), SEARCHED_BY), (first, own)]
+        elif first > _SEARCHED_ON:
+            tried.insert(0, (_SEARCHED_ON, own))
+        for size, name in tried:
+            cost, shown = iteration_cost(size, name), name == own and size >= first
+            grid = self.grid(size, plane, name)
+            found = self._followed(grid, route, situation, pressed, free, plane, near, max(left // cost, _LEAST))
+            more = found.solution.iterations if isinstance(found, Blocked) else found.iterations
+            spent, left = spent + more, left - more * cost
+            if isinstance(found, _Ended) and found.folded and (shown or size >= like or found.error <= _SURE):
                 break
             if isinstance(found, Blocked):
-                finer = found if size >= first else self._refined(found, self.grid(first, plane))
+                finer = found if shown else self._refined(found, self.grid(first, plane))
                 if finer is not None:
                     return finer, spent + (0 if finer is found else finer.solution.iterations)
         return found, spent
@@ -239,7 +258,7 @@ class BlockedSolver:
         rough = grid.stepper.solve(p, guess)
         if not rough.holds(10 * grid.stepper.tolerance) or not grid.distance(rough.x - x) <= _LARGEST_JUMP:
             return None
-        if grid.has_tangent and not grid.same_way(guess - x, rough.x - x):
+        if grid.has_tangent and grid.strayed(guess - x, rough.x - x) > 1:
             return None
         determinants = grid.determinants(rough, plane)
         if not grid.is_minimum and determinants[0] * near.determinants[0] <= 0:
@@ -272,46 +291,56 @@ class BlockedSolver:
             slips = slipping_pressure(begin, end, [(u, aside) for u, (_, aside) in trace])
         return self._examined(grid, final, end, pressed, (slips, trace[-1][1]), free)
 
+    def _route(self, end: Situation, free: Free, near: Blocked | None) -> _Route:
+        """Return the way to `end` from `near`, or from where contact begins on the way from zero pressure."""
+        intervals = self.poses.first_intervals(free.column, free.stretch, transcription=SEARCHED_BY)
+        solved = free.solved  # the lengths on the way lead, only those at its end count
+        if solved is not None and solved.grid.transcription == SEARCHED_BY:
+            intervals = min(intervals, solved.intervals)
+        shapes = FreeShapes(self.poses, self.functions, intervals, self.contact.tip_cap)
+        if near is None:
+            begin, t_0 = from_zero(end, shapes, TOUCHING * float(self.model.robot.length))
+            return _Route(begin.towards(end, t_0), shapes, shapes.last)
+        solved = near.free.solved
+        on_grid = solved is not None and solved.grid is self.poses.grid(intervals, SEARCHED_BY)
+        return _Route(near.situation, shapes, (near.free.stretch, solved.solution.x if solved and on_grid else None))
+
     def _followed(
         self,
         grid: BlockedGrid,
+        route: _Route,
         end: Situation,
         pressed: Array,
         free: Free,
         plane: Array | None,
         near: Blocked | None,
+        most: int,
     ) -> Blocked | _Ended:
-        """Follow the branch to `end` from `near`, or from where contact begins on the way from zero pressure."""
-        intervals = self._free_intervals(free, grid)
-        shapes = FreeShapes(self.poses, self.functions, intervals, self.contact.tip_cap)
-        unloaded = not self.has_wall
-        if near is not None:
-            begin, t_0 = near.situation, 0.0
-            solved = near.free.solved
-            on_grid = solved is not None and solved.intervals == intervals
-            shapes.begin(near.free.stretch, solved.solution.x if solved is not None and on_grid else None)
-        else:
-            begin, t_0 = from_zero(end, shapes, TOUCHING * float(self.model.robot.length))
-
-        def free_situation(situation: Situation) -> Situation:
-            return Situation(situation.pressure, Loads(), None) if unloaded else situation
+        """Follow the branch along a route to `end`, in so many iterations at most."""
+        begin, shapes = route.begin, route.shapes
+        shapes.begin(*route.start)
 
         def path(u: float) -> Array:
-            situation = begin.towards(end, t_0 + u * (1 - t_0))
-            lengths = free.lengths if u >= 1.0 else shapes.tip(free_situation(situation))[0]
+            situation = begin.towards(end, u)
+            alone = situation if self.has_wall else Situation(situation.pressure, Loads(), None)
+            lengths = free.lengths if u >= 1.0 else shapes.tip(alone)[0]
             return grid.problem.pack(self.values(situation, pressed, lengths))
 
         if near is not None:
-            x = self._transferred(near, grid)
+            x = transferred(near, grid, self.equations.shape)
         else:
-            x = self._free_guess(grid, begin.towards(end, t_0), shapes)
+            free_x = shapes.guess(begin, grid.case.transcribed.points)
+            x = np.concatenate([free_x, np.zeros(self.functions.tip_unknowns)])
         trace: list[tuple[float, tuple[float, float]]] = []
+        sound: list[Solution] = []
 
         def same_branch(u: float, solution: Solution) -> bool:
             determinants = grid.determinants(solution, plane)
             if trace and not grid.is_minimum and determinants[0] * trace[0][1][0] <= 0:
                 return False
             trace.append((u, determinants))
+            if abs(determinants[0]) >= _SOUND * max(abs(size) for _, (size, _) in trace):
+                sound.append(solution)
             return True
 
         begun = grid.stepper.solve(path(0.0), x)
@@ -327,55 +356,27 @@ class BlockedSolver:
             largest_jump=_LARGEST_JUMP,
             same_branch=same_branch,
             predict=grid.predicted if grid.has_tangent else None,
-            same_way=grid.same_way,
+            most_iterations=most,
+            most_steps=_MOST_STEPS_MINIMUM if grid.is_minimum else _MOST_STEPS,
+            strayed=grid.strayed,
         )
         spent = begun.iterations + followed.iterations
         if followed.arrived:
             rough = replace(followed.solution, iterations=spent)
-            first = begin.towards(end, t_0)
-            found = self._arrived(grid, rough, first, end, pressed, free, trace, near)
+            found = self._arrived(grid, rough, begin, end, pressed, free, trace, near)
             if found is not None:
                 return found
-        reached = begin.towards(end, t_0 + followed.fraction * (1 - t_0))
+        reached = begin.towards(end, followed.fraction)
         sizes = [abs(size) for _, (size, _) in trace]
-        folded = len(sizes) > 1 and (grid.is_minimum or sizes[-1] < _NEAR_FOLD * max(sizes))
-        error = max(grid.refinement(followed.solution, self._order)) if folded else 0.0
-        return _Ended(reached, folded, spent, error)
-
-    def _free_intervals(self, free: Free, grid: BlockedGrid) -> int:
-        """Return the grid of the free shapes on the way: their lengths lead, only those at its end count."""
-        if free.solved is None:
-            return grid.intervals
-        return min(free.solved.intervals, self.poses.first_intervals(free.column, free.stretch))
-
-    def _free_guess(self, grid: BlockedGrid, situation: Situation, shapes: FreeShapes) -> Array:
-        """Return x of the free shape without force: exact without loads, else its solution moved to this grid."""
-        column = self.poses.column(self.poses.values(situation.pressure, situation.loads))
-        stretch = shapes.stretch(column)
-        s = grid.case.transcribed.points
-        states = np.asarray(self.functions.arc(column, stretch, s[None, :]))
-        if situation.loads.act and self.has_wall:
-            _, solved = self.poses.solve(situation.pressure, situation.loads)
-            if solved is not None:
-                nodes = np.vstack([solved.nodes, np.zeros((states.shape[0] - STATE_SIZE, solved.nodes.shape[1]))])
-                moved = between_nodes(self.equations.shape, nodes, solved.constants, s)[: states.shape[0]]
-                states = np.vstack([moved[:STATE_SIZE], states[STATE_SIZE:]])
-        return np.concatenate([[stretch], states.T.ravel(), np.zeros(self.functions.tip_unknowns)])
-
-    def _transferred(self, found: Blocked, grid: BlockedGrid) -> Array:
-        """Return a solution on another grid."""
-        if found.grid.intervals == grid.intervals:
-            return found.solution.x
-        s = grid.case.transcribed.points
-        states = between_nodes(self.equations.shape, found.grid.nodes(found.solution.x), found.constants, s)[
-            : grid.state_size
-        ]
-        return np.concatenate([found.solution.x[:1], states.T.ravel(), found.grid.tip_forces(found.solution.x)])
+        stopped = followed.iterations >= most
+        folded = not stopped and len(sizes) > 1 and (grid.is_minimum or sizes[-1] < _NEAR_FOLD * max(sizes))
+        error = max(grid.refinement(sound[-1])) if folded and followed.fraction < _NEAR_END else 1.0
+        return _Ended(reached, folded, spent, error, stopped)
 
     def _refined(self, found: Blocked, grid: BlockedGrid) -> Blocked | None:
         """Return a solution solved again on a finer grid, or None where that leads elsewhere."""
         p = grid.problem.pack(self.values(found.situation, found.pressed, found.free.lengths))
-        guess = self._transferred(found, grid)
+        guess = transferred(found, grid, self.equations.shape)
         solution = grid.engine.solve(p, guess)
         if not solution.holds(self.numerics.tolerance) or grid.distance(solution.x - guess) > 0.05:
             return None
@@ -393,7 +394,7 @@ class BlockedSolver:
         free: Free,
     ) -> Blocked:
         """Return a solution with its discretisation error."""
-        position, rotation, force = grid.refinement(solution, self._order)
+        position, rotation, force = grid.refinement(solution)
         constants = np.asarray(grid.problem.case_constants(solution.x, solution.p)).ravel()
         worst = max(position, rotation / 5, force / 5)
         return Blocked(situation, pressed, grid, solution, constants, position, worst, *aside, free)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +19,7 @@ from softnlp.statics.compiled import RodEquations
 from softnlp.statics.condensed import CondensedSolver, plane_directions
 from softnlp.statics.free_shape import Free
 from softnlp.statics.loadcase import LoadCase, load_case
+from softnlp.statics.pose import between_nodes
 from softnlp.statics.wall import Situation
 from softnlp.statics.weighted import Weighted
 
@@ -50,6 +52,7 @@ class BlockedGrid:
     judge: CondensedSolver
     intervals: int
     state_size: int
+    transcription: str
 
     @property
     def problem(self) -> CompiledProblem:
@@ -92,8 +95,8 @@ class BlockedGrid:
         except np.linalg.LinAlgError:
             return x
 
-    def same_way(self, predicted: Array, change: Array) -> bool:
-        """Whether a step went where it was predicted to; small steps do.
+    def strayed(self, predicted: Array, change: Array) -> float:
+        """Return how far a step went from where it was predicted to, of what is allowed: more is another branch.
 
         Past a fold another part of the curve may be so near that its distance alone does not tell it, also with the
         same sign of the determinant; its forces are others.
@@ -103,7 +106,7 @@ class BlockedGrid:
             forces = float(np.max(np.abs(self.tip_forces(move)), initial=0.0))
             return max(self.distance(move), _FORCE_SHARE * forces)
 
-        return size(change - predicted) <= max(_LARGEST_MISS * size(change), _SMALL)
+        return size(change - predicted) / max(_LARGEST_MISS * size(change), _SMALL)
 
     def distance(self, change: Array) -> float:
         """Return the largest change of a scaled position or of a direction cosine."""
@@ -117,11 +120,12 @@ class BlockedGrid:
         inside, outside = (float(np.linalg.det(V.T @ matrix @ V)) for V in plane_directions(plane, len(matrix)))
         return inside, outside
 
-    def refinement(self, solution: Solution, order: int) -> tuple[float, float, float]:
+    def refinement(self, solution: Solution) -> tuple[float, float, float]:
         """Return how far the tip's position [L_0], its rotation [rad] and the forces are from those of finer grids.
 
-        Of forces relative to those above one; of a transcription that converges with this order.
+        Of forces relative to those above one.
         """
+        order = method_named(self.transcription, 1).order
         correction = discretisation_correction(self.problem, solution, self.engine.linear)
         change = correction * 2**order / (2**order - 1)
         tip = self.nodes(change)[:, -1]
@@ -155,6 +159,15 @@ class Blocked:
     free: Free
 
 
+def transferred(found: Blocked, grid: BlockedGrid, shape: ca.Function) -> Array:
+    """Return the unknowns of a solution on another grid, see `between_nodes`."""
+    x = found.solution.x
+    if found.grid is grid:
+        return x
+    states = between_nodes(shape, found.grid.nodes(x), found.constants, grid.case.transcribed.points)
+    return np.concatenate([x[:1], states[: grid.state_size].T.ravel(), found.grid.tip_forces(x)])
+
+
 def kept_grid(
     equations: RodEquations, numerics: Numerics, weights: ClosureWeights | None, intervals: int, plane: Array | None
 ) -> BlockedGrid:
@@ -184,14 +197,14 @@ def _compiled(
     stepper: Engine | Weighted = loose
     if weights is not None:
         engine, stepper = (Weighted(e, functions, case, condensed, plane, weights) for e in (exact, loose))
-    return BlockedGrid(case, engine, stepper, exact, condensed, judge, intervals, functions.state_size)
+    return BlockedGrid(case, engine, stepper, exact, condensed, judge, intervals, functions.state_size, name)
 
 
 def _engines(problem: CompiledProblem, condensed: CondensedSolver, numerics: Numerics) -> tuple[Engine, Engine]:
     """Return what solves a blocked problem to full tolerance, and loosely for points of a path."""
     shooting = numerics.transcription == "multiple-shooting"
     linear: LinearSolver | None = condensed if shooting else None
-    if numerics.engine == "newton" and not shooting:
+    if numerics.engine != "ipopt" and not shooting:
         linear = SparseSolver(problem)
     common: dict[str, Any] = {"linear": linear, "options": numerics.ipopt, "ipopt_only": numerics.engine == "ipopt"}
     quick = linear is not None and numerics.engine != "ipopt"

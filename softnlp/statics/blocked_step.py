@@ -49,14 +49,15 @@ def touching_step(free: Step, contact: ContactSettings, wall: Wall, gap: float, 
     )
 
 
-def failed_step(pressure: Array, reached: Array, folded: bool, iterations: int, began: float) -> Step:
+def failed_step(pressure: Array, reached: Array, folded: bool, stopped: bool, iterations: int, began: float) -> Step:
     """Return the step of a branch that was lost on the way, with the last pressures at which it was held."""
     status = Status.FOLD if folded else Status.DIVERGED
     last = ", ".join(f"{P / BAR:.4g}" for P in reached)
     return Step(
         pressure,
         status,
-        f"{status.advice}; the last blocked shape on it is at {last} bar",
+        f"{status.advice}; the last blocked shape on it is at {last} bar"
+        + "; stopped, since it took too long" * stopped,
         iterations=iterations,
         solve_time=time.perf_counter() - began,
     )

@@ -49,6 +49,11 @@ class Chain:
     length_unit: ca.MX
     force_unit: ca.MX
 
+    @property
+    def slope(self) -> ca.MX:
+        """The Jacobian of the residuals by the unknowns."""
+        return ca.horzcat(*(ca.jacobian(self.residuals, symbol) for symbol in self.symbols))
+
     def first_guess(self, values: Mapping[str, Array]) -> Array:
         """Return x of the shape without loads at values of `given` by key, SI: arcs, one behind the other."""
         parts: list[Array] = []

@@ -11,8 +11,9 @@ from softnlp.base.status import Status
 from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.statics.arc import Arc, arc_pose, unloaded_arc
 from softnlp.statics.loadcase import RodFunctions, stretch_imbalance
+from softnlp.statics.pose import between_nodes
 from softnlp.statics.pose_grid import Solved
-from softnlp.statics.solver import PoseSolver
+from softnlp.statics.solver import SEARCHED_BY, PoseSolver
 from softnlp.statics.step import Pose, Step
 from softnlp.statics.wall import Situation, Wall
 
@@ -20,6 +21,8 @@ Array = NDArray[np.float64]
 
 _NEWTON_STEPS = 30
 _SCAN = 17
+_FURTHEST, _APART = 2.0, 1e-7  # of the change of stretch before: how far it is extrapolated; between two shapes
+_HALVINGS, _HALVINGS_LOADED = 40, 18  # of a part of the scan, to the round-off of an arc and of a loose solution
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +69,11 @@ def free_shape(poses: PoseSolver, pressure: Array, loads: Loads, tip_cap: float,
         if branch.status is not Status.SOLVED:
             return Step(pressure, branch.status, branch.message)
         return Free(arc.column, arc.stretch, arc.lengths, arc.position + tip_cap * arc.axis, arc=arc)
-    step, solved = poses.solve(pressure, loads, near.solved if near else None)
+    ahead, poses.ahead = poses.ahead, None
+    if ahead is not None and near is None and np.array_equal(ahead[0], poses.column(poses.values(pressure, loads))):
+        step, solved = ahead[1]
+    else:
+        step, solved = poses.solve(pressure, loads, near.solved if near else None)
     if solved is None or step.pose is None:
         return step
     pose, x = step.pose, solved.solution.x
@@ -75,54 +82,85 @@ def free_shape(poses: PoseSolver, pressure: Array, loads: Loads, tip_cap: float,
 
 
 class FreeShapes:
-    """Free shapes of one model, each found from the last: an arc in closed form, or Newton where loads act."""
+    """Free shapes of one model, each found from the last: an arc in closed form, or Newton where loads act.
+
+    intervals : of shooting, where an iteration costs the least.
+    """
 
     def __init__(self, poses: PoseSolver, functions: RodFunctions, intervals: int, tip_cap: float) -> None:
         self._poses = poses
         self._functions = functions
         self._intervals = intervals
         self._tip_cap = tip_cap
-        self._last_x: Array | None = None
-        self._last_stretch = 1.0
+        self._last: tuple[float, Array | None] = (1.0, None)
+        self._before: tuple[float, Array] | None = None  # the one found before the last
         self._balance = stretch_imbalance(functions)
+
+    @property
+    def last(self) -> tuple[float, Array | None]:
+        """The stretch and the pose problem's solution that were found last, from which the next are found."""
+        return self._last
 
     def begin(self, stretch: float, x: Array | None) -> None:
         """Start again from a known stretch, and from the pose problem's solution x there if it is known."""
-        self._last_stretch, self._last_x = stretch, x
+        self._last, self._before = (stretch, x), None
 
     def stretch(self, column: Array) -> float:
         """Return the root of the stretch balance next to the last one."""
-        found = self._last_stretch
+        found, x = self._last
         for _ in range(_NEWTON_STEPS):
             balance, slope = self._balance(column, found)
             change = -float(balance) / float(slope)
             found += change
             if not abs(change) > 1e-13:
                 break
-        self._last_stretch = found
+        self._last = found, x
         return found
 
     def tip(self, situation: Situation) -> tuple[Array, Array]:
         """Return the free chamber lengths (N,) and the contact point (3,) [m]; nan where it is not found."""
         values = self._poses.values(situation.pressure, situation.loads)
         column = self._poses.column(values)
+        last_stretch, last = self._last
         stretch = self.stretch(column)
         L_0 = float(self._poses.model.robot.length)
         if not situation.loads.act:
             state = np.asarray(self._functions.arc(column, stretch, 1.0)).ravel()
             return state[STATE_SIZE:] * L_0, (state[:3] + self._tip_cap / L_0 * state[9:12]) * L_0
-        grid = self._poses.grid(self._intervals)
+        grid = self._poses.grid(self._intervals, SEARCHED_BY)
         p = grid.problem.pack(values)
-        guess = self._last_x if self._last_x is not None else self._poses.arc_guess(grid, p, stretch)
+        guess = last if last is not None else self._poses.arc_guess(grid, p, stretch)
+        if last is not None and self._before is not None:  # pressure and stretch rise together: a secant in the stretch
+            run = last_stretch - self._before[0]
+            if abs(stretch - last_stretch) <= _FURTHEST * abs(run):
+                guess = last + (last - self._before[1]) * ((stretch - last_stretch) / run) if run else last
         solution = grid.stepper.solve(p, guess)
+        if last is not None and not solution.holds(10 * grid.stepper.tolerance):
+            solution = grid.stepper.solve(p, last)
         if not solution.holds(10 * grid.stepper.tolerance):
             N = self._poses.model.robot.chambers
             return np.full(N, np.nan), np.full(3, np.nan)
-        self._last_x = solution.x
+        if last is not None and abs(stretch - last_stretch) > _APART:
+            self._before = last_stretch, last
+        self._last = stretch, solution.x
         found = grid.problem.outputs(x=solution.x, p=p)
         axis = np.asarray(found["tip_rotation"])[:, 2]
         point = np.asarray(found["tip_position"]).ravel() + self._tip_cap * axis
         return np.asarray(found["chamber_lengths"]).ravel(), point
+
+    def guess(self, situation: Situation, s: Array) -> Array:
+        """Return the stretch and then the states at s of a free shape; of the arc where it is not found."""
+        poses = self._poses
+        values = poses.values(situation.pressure, situation.loads)
+        column = poses.column(values)
+        stretch = self.stretch(column)
+        states = np.asarray(self._functions.arc(column, stretch, s[None, :]))
+        if situation.loads.act and np.all(np.isfinite(self.tip(situation)[1])):
+            grid, x = poses.grid(self._intervals, SEARCHED_BY), self._last[1]
+            assert x is not None
+            constants = np.asarray(grid.problem.case_constants(x, grid.problem.pack(values))).ravel()
+            states[:STATE_SIZE] = between_nodes(poses.shape, grid.nodes(x), constants, s)[:STATE_SIZE]
+        return np.concatenate([[stretch], states.T.ravel()])
 
 
 def from_zero(end: Situation, shapes: FreeShapes, touch: float) -> tuple[Situation, float]:
@@ -157,7 +195,7 @@ def from_zero(end: Situation, shapes: FreeShapes, touch: float) -> tuple[Situati
         shapes.begin(1.0, None)
         return rest, 0.0
     low, high = float(grid[apart[-1]]), float(grid[apart[-1] + 1])
-    for _ in range(40):
+    for _ in range(_HALVINGS_LOADED if end.loads.act else _HALVINGS):
         middle = (low + high) / 2
         low, high = (middle, high) if gap_at(middle) > 0 else (low, middle)
     return rest, high

@@ -152,7 +152,7 @@ class LoadCase:
     """One robot in one state of loading, as equations in scaled units.
 
     symbols : its unknowns, the stretch, the column of all states, and the forces that the tip conditions add, if any.
-    residuals : as many equations.
+    residuals : as many equations. ends : those of them before and behind the intervals.
     fine_residuals : the same at half the step. outputs : by name, SI and world frame: "stretch", "tip_position" (3),
     "tip_rotation" (3x3), "chamber_lengths" (N), "bending_angle", "backbone_length", and "tip_forces", those added.
     constants : what the field takes beside the state. given : the quantities by key. column : those of
@@ -169,11 +169,20 @@ class LoadCase:
     constants: ca.MX
     column: ca.MX
     residuals: ca.MX
+    ends: tuple[ca.MX, ca.MX]
     fine_residuals: ca.MX
     equations: tuple[Equation, ...]
     outputs: Mapping[str, ca.MX]
     length_unit: ca.MX
     force_unit: ca.MX
+
+    @property
+    def slope(self) -> ca.MX:
+        """The Jacobian of the residuals by the unknowns."""
+        first, last = (ca.horzcat(*(ca.jacobian(rows, symbol) for symbol in self.symbols)) for rows in self.ends)
+        by_states, by_stretch = self.transcribed.slopes(ca.jacobian(self.constants, self.symbols[0]))
+        others = [ca.MX(by_states.shape[0], symbol.numel()) for symbol in self.symbols[2:]]
+        return ca.vertcat(first, ca.horzcat(by_stretch, by_states, *others), last)
 
 
 def load_case(name: str, functions: RodFunctions, given: Mapping[str, Quantity], method: Transcription) -> LoadCase:
@@ -195,11 +204,8 @@ def load_case(name: str, functions: RodFunctions, given: Mapping[str, Quantity],
     y = ca.MX.sym("tip_forces", functions.tip_unknowns)
     taken = [q.symbol for name, q in given.items() if name in contact_quantities(model)]
     a = ca.vertcat(*taken) if functions.conditions.has_contact else ca.MX(0, 1)
-    base = ca.vertcat(rod.base_balance(first), first[rod.STATE_SIZE :])
+    base = ca.vertcat(balance, rod.base_balance(first), first[rod.STATE_SIZE :])
     tip = functions.tip(last, constants, force, moment, y, a, units)
-
-    def residuals(interior: ca.MX) -> ca.MX:
-        return ca.vertcat(balance, base, interior, tip)
 
     N = model.robot.chambers
     outputs = {
@@ -221,8 +227,9 @@ def load_case(name: str, functions: RodFunctions, given: Mapping[str, Quantity],
         symbols=(stretch, transcribed.unknowns, y) if functions.tip_unknowns else (stretch, transcribed.unknowns),
         constants=constants,
         column=ca.vertcat(column, a),
-        residuals=residuals(transcribed.residuals),
-        fine_residuals=residuals(transcribed.fine_residuals),
+        residuals=ca.vertcat(base, transcribed.residuals, tip),
+        ends=(base, tip),
+        fine_residuals=ca.vertcat(base, transcribed.fine_residuals, tip),
         equations=_equations(transcribed, functions.conditions, L_0, F_0),
         outputs=outputs,
         length_unit=L_0,

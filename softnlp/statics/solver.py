@@ -47,7 +47,7 @@ FIRST_INTERVALS = {"multiple-shooting": 10, "collocation": 5}
 MOST_INTERVALS = 1810
 _MOST_COLLOCATION = 320  # as many points; order 8 needs no more
 _TURN = 0.25  # largest angle [rad] of the unloaded arc within one RK4 interval of a first grid
-_SEARCHED_BY: Transcribing = "multiple-shooting"
+SEARCHED_BY: Transcribing = "multiple-shooting"
 _DEARER = 3  # an iteration on a neighbour's grid than on a coarse one, where the neighbour's is still tried first
 _FINER = 4  # how much finer a grid is tried where a coarse one finds no solution
 # Work is counted in Runge-Kutta intervals of Newton iterations, some 0.07 ms each.
@@ -82,6 +82,7 @@ class PoseSolver:
         self.model = model
         self.quantities = self.equations.quantities_of(model)
         self._numbers = {name: q.nominal for name, q in self.quantities.items()}
+        self.ahead: tuple[Array, tuple[Step, Solved | None]] | None = None  # what a wall's place has asked for already
 
     @property
     def branch(self) -> ca.Function:
@@ -182,7 +183,7 @@ class PoseSolver:
         given, size, spent = self.numerics.intervals, first, 0
         name: Transcribing | None = None
         if loaded:
-            name = _SEARCHED_BY
+            name = SEARCHED_BY
             quick = self.first_intervals(self.column(values), branch.stretch, transcription=name)
             size = min(quick, given or quick)
         coarse = self.grid(size, name)

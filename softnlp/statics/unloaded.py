@@ -37,16 +37,18 @@ def unloaded_case(name: str, functions: RodFunctions, given: Mapping[str, Quanti
 
     along = integral(functions.lengths)
     none = ca.MX(0, 1)
+    states = none, np.zeros(0), np.zeros(0, np.intp), STATE_SIZE, none, (), none, integral
     return LoadCase(
         name=name,
         method=None,
-        transcribed=Transcribed(none, np.zeros(0), np.zeros(0, np.intp), STATE_SIZE, none, (), none, integral),
+        transcribed=Transcribed(*states, slopes=lambda moved: (ca.MX(0, 0), none)),
         functions=functions,
         given=given,
         symbols=(stretch,),
         constants=constants,
         column=column,
         residuals=balance,
+        ends=(balance, none),
         fine_residuals=balance,
         equations=(Equation("stretch balance", np.array([0]), "N", F_0),),
         outputs={

@@ -132,7 +132,8 @@ def standing_wall(poses: PoseSolver, contact: ContactSettings, pressures: Array,
     largest = pressures[int(np.argmax(np.sum(pressures, axis=1)))]
     rest = np.array([0.0, 0.0, float(poses.model.robot.length) + contact.tip_cap])
     if loads.act:
-        pose = poses.solve(largest, loads)[0].pose
+        found = poses.solve(largest, loads)
+        poses.ahead, pose = (poses.column(poses.values(largest, loads)), found), found[0].pose
         if pose is not None:
             return _wall_at(contact.offset, rest, pose.tip_position + contact.tip_cap * pose.tip_rotation[:, 2])
     for pressure in (largest, 1e-3 * largest):

@@ -131,10 +131,10 @@ class Weighted:
         """The linearised minimum."""
         return self._step
 
-    def solve(self, p: Array, x_start: Array) -> Solution:
+    def solve(self, p: Array, x_start: Array, most_steps: int | None = None) -> Solution:
         """Return the minimum next to a first guess; its residual is infinite when the minimum was not found."""
         if self._step is not None:
-            return self._gauss_newton(self._step, p, x_start)
+            return self._gauss_newton(self._step, p, x_start, most_steps or _STEPS)
         problem = self.problem
         L_0, F_0 = (float(v) for v in np.asarray(problem.units(x_start, p)).ravel())
         units = np.array([F_0] * 3 + [F_0 * L_0] * 3 + [L_0])
@@ -151,7 +151,7 @@ class Weighted:
         history: list[tuple[Array, Array]] = []
         # beyond this rounding of the square problem's solution decides
         enough = max(self.tolerance, 1e-10)
-        for _ in range(_STEPS):
+        for _ in range(most_steps or _STEPS):
             solution = self._engine.solve(with_errors(s), x)
             spent += solution.iterations
             if not solution.holds(100 * self.tolerance):
@@ -167,7 +167,7 @@ class Weighted:
             s = _accelerated(history[-_MEMORY:])
         return replace(solution, residual=float("inf"), iterations=spent)
 
-    def _gauss_newton(self, step: MinimumStep, p: Array, x_start: Array) -> Solution:
+    def _gauss_newton(self, step: MinimumStep, p: Array, x_start: Array, most_steps: int) -> Solution:
         """Return the minimum next to a first guess."""
         problem, rows = self.problem, self._rows
         units = np.asarray(problem.units(x_start, p)).ravel()
@@ -184,7 +184,7 @@ class Weighted:
             return given, np.asarray(problem.residual(x, given)).ravel()
 
         x, history = x_start, list[tuple[Array, Array]]()
-        for k in range(_STEPS):
+        for k in range(most_steps):
             given, g = judged(x)
             if not float(np.max(np.abs(g))) < _DIVERGED:
                 return Solution(x, given, float("inf"), k, "Gauss-Newton diverged")
@@ -198,7 +198,7 @@ class Weighted:
                 return Solution(x + dx, given, float(np.max(np.abs(g))), k + 1, "minimum of the weighted squares", left)
             history.append((x, x + dx))
             x = _accelerated(history[-_MEMORY:])
-        return Solution(x, given, float("inf"), _STEPS, "Gauss-Newton reached its iteration limit")
+        return Solution(x, given, float("inf"), most_steps, "Gauss-Newton reached its iteration limit")
 
     def _flat(self, s: Array) -> Array:
         """Return errors without what leaves the plane."""
