@@ -1,9 +1,8 @@
-"""C made from CasADi functions, the compiler's cache, and the predictor."""
+"""Machine code made from CasADi functions, the same interpreted, and the predictor."""
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
+import sys
 
 import casadi as ca
 import numpy as np
@@ -11,19 +10,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softnlp.batch.compiled import cache_folder, compiler, library
-from softnlp.batch.csource import WIDTH, Kernels, c_source
 from softnlp.batch.grids import grid_level, whole_groups
 from softnlp.batch.interpreted import Interpreted
+from softnlp.batch.ir import LIBRARY, llvm_text
+from softnlp.batch.jit import can_compile, compiled
+from softnlp.batch.kernels import WIDTH, Kernels, Step
 from softnlp.batch.predictor import predicted
 from softnlp.batch.shooting import Compiled, shooting
 
-needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
-
-
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+needs_compiler = pytest.mark.skipif(not can_compile(), reason="no llvmlite")
 
 
 def every_operation() -> ca.Function:
@@ -37,25 +32,28 @@ def every_operation() -> ca.Function:
     return ca.Function("every", [x], [ca.vertcat(*rows)])
 
 
-def decay() -> ca.Function:
-    """Return a Runge-Kutta step of y' = -k y + s."""
-    y, k, s, h = (ca.SX.sym(name) for name in "yksh")
+def decay() -> Step:
+    """Return a step of y' = -k y + s."""
+    y, k, s = (ca.SX.sym(name) for name in "yks")
+    return Step(ca.Function("decay", [y, k, s], [-k * y + s]))
 
-    def rate(y: ca.SX, s: ca.SX) -> ca.SX:
-        return -k * y + s
 
-    k1 = rate(y, s)
-    k2 = rate(y + h / 2 * k1, s + h / 2)
-    k3 = rate(y + h / 2 * k2, s + h / 2)
-    k4 = rate(y + h * k3, s + h)
-    return ca.Function("decay", [y, k, s, h], [y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)])
+def counted() -> Step:
+    """Return the same step of a state that counts its steps, sums their lengths and has y first."""
+    y, k, s, h, n, far = (ca.SX.sym(name) for name in ("y", "k", "s", "h", "n", "far"))
+    before, x = ca.vertcat(y, n, far), ca.SX.sym("x", 2)
+    return Step(
+        rates=ca.Function("rates", [x, k, s], [ca.vertcat(-k * x[0] + s, 1.0)]),
+        begin=ca.Function("begin", [before, k, s], [ca.vertcat(y, 0.0)]),
+        end=ca.Function("end", [before, x, k, s, h], [ca.vertcat(x[0], n + 1, ca.fmax(far, s + x[1]))]),
+    )
 
 
 @needs_compiler
 def test_every_operation_is_casadis_to_the_last_bit() -> None:
     every = every_operation()
     kernels = Kernels({}, {"every": every})
-    made = shooting(kernels, build=True)
+    made = shooting(kernels)
     assert isinstance(made, Compiled)
     x = np.random.default_rng(0).uniform(0.1, 0.9, (2, 11))
     expected = np.hstack([np.asarray(every(x[:, k])) for k in range(11)])
@@ -67,7 +65,7 @@ def test_every_operation_is_casadis_to_the_last_bit() -> None:
 def test_shooting_integrates_every_pose_on_its_own_grid(interpreted: bool) -> None:
     """Y' = -k y + s has a closed form; groups with more intervals are nearer to it by the method's order."""
     kernels = Kernels({"decay": decay()}, {})
-    made = Interpreted(kernels) if interpreted else shooting(kernels, build=True)
+    made = Interpreted(kernels) if interpreted else shooting(kernels)
     k = np.linspace(0.5, 2.0, 3 * WIDTH)[None, :]
     exact = np.exp(-k) * (1 + 1 / k**2) + 1 / k - 1 / k**2
     errors = []
@@ -78,65 +76,51 @@ def test_shooting_integrates_every_pose_on_its_own_grid(interpreted: bool) -> No
     assert groups == pytest.approx(np.full((3, WIDTH), 16.0), rel=0.35)
 
 
+@pytest.mark.parametrize("interpreted", [True, pytest.param(False, marks=needs_compiler)])
+def test_a_step_may_keep_more_than_it_integrates(interpreted: bool) -> None:
+    kernels = Kernels({"decay": decay(), "counted": counted()}, {})
+    made = Interpreted(kernels) if interpreted else shooting(kernels)
+    k, counts = np.linspace(0.5, 2.0, 2 * WIDTH)[None, :], np.array([5, 9])
+    state = np.vstack([np.ones_like(k), np.zeros((2, k.size))])
+    found = made.run("counted", counts, k, state)
+    assert np.array_equal(found[0], made.run("decay", counts, k, np.ones_like(k))[0])
+    assert np.array_equal(found[1], np.repeat(counts, WIDTH))
+    assert found[2] == pytest.approx(1.0, abs=1e-15)
+
+
+@needs_compiler
+def test_a_step_is_the_same_compiled_to_the_last_bit() -> None:
+    kernels = Kernels({"counted": counted()}, {})
+    rng = np.random.default_rng(1)
+    k, state, counts = rng.uniform(0.5, 2, (1, 5 * WIDTH)), rng.uniform(0, 1, (3, 5 * WIDTH)), np.array([3, 1, 8, 5, 5])
+    made = shooting(kernels)
+    assert isinstance(made, Compiled)
+    assert np.array_equal(made.run("counted", counts, k, state), Interpreted(kernels).run("counted", counts, k, state))
+
+
 def test_an_operation_without_translation_leaves_casadi_to_do_it() -> None:
     x = ca.SX.sym("x")
     kernels = Kernels({}, {"floor": ca.Function("floor", [x], [ca.floor(x)])})
-    assert c_source(kernels) is None
-    assert shooting(kernels, build=True).apply("floor", np.array([[1.5, 2.5]])).tolist() == [[1.0, 2.0]]
+    assert llvm_text(kernels) is None
+    assert shooting(kernels).apply("floor", np.array([[1.5, 2.5]])).tolist() == [[1.0, 2.0]]
 
 
 @needs_compiler
-def test_what_was_compiled_is_found_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    source = c_source(Kernels({"decay": decay()}, {}))
-    assert source is not None
-    assert library(source, build=False) is None
-    assert library(source) is not None
-    assert len(list(tmp_path.rglob("*.so"))) == 1
-    monkeypatch.setattr("softnlp.batch.compiled._build", lambda *_: pytest.fail("compiled again"))
-    assert library(source, build=False) is not None
+def test_the_same_kernels_are_compiled_once() -> None:
+    text = [llvm_text(Kernels({"decay": decay()}, {})) for _ in range(2)]
+    assert text[0] == text[1]
+    assert text[0] is not None
+    assert compiled(text[0], LIBRARY) is compiled(text[0], LIBRARY)
 
 
-@pytest.mark.parametrize("command", ["no-such-compiler", "false"])
-def test_without_a_working_compiler_there_is_no_library(monkeypatch: pytest.MonkeyPatch, command: str) -> None:
-    monkeypatch.setenv("CC", command)
-    assert library("int x;") is None
-    made = shooting(Kernels({"decay": decay()}, {}), build=True)
-    assert isinstance(made, Interpreted)
-
-
-@needs_compiler
-def test_a_library_that_does_not_load_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    source = c_source(Kernels({"decay": decay()}, {}))
-    assert source is not None
-    with monkeypatch.context() as cut_short:
-        cut_short.setattr("softnlp.batch.compiled._build", lambda _, __, path: path.write_bytes(b"half") > 0)
-        assert library(source) is None
-    assert library(source, build=False) is None
-    assert library(source) is not None
-
-
-@pytest.mark.skipif(not hasattr(os, "getuid"), reason="no file modes")
-def test_a_cache_that_others_may_write_to_is_not_used(tmp_path: Path) -> None:
-    folder = cache_folder()
-    assert folder is not None
-    folder.chmod(0o777)
-    assert cache_folder() is None
-
-
-@pytest.mark.parametrize("reason", ["no folder", "switched off"])
-def test_without_a_cache_or_leave_to_compile_casadi_does_it(
-    reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if reason == "no folder":
-        (tmp_path / "file").write_text("in the way")
-        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-        assert cache_folder() is None
-    else:
+@pytest.mark.parametrize("reason", ["switched off", "no llvmlite"])
+def test_without_machine_code_numpy_does_it(reason: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    if reason == "switched off":
         monkeypatch.setenv("SOFTNLP_COMPILE", "0")
-        assert compiler() is None
-    monkeypatch.setattr("softnlp.batch.compiled._build", lambda *_: pytest.fail("compiled"))
-    assert library("int x;") is None
-    assert isinstance(shooting(Kernels({"decay": decay()}, {}), build=True), Interpreted)
+    else:
+        monkeypatch.setitem(sys.modules, "llvmlite.binding", None)
+    assert not can_compile()
+    assert isinstance(shooting(Kernels({"decay": decay()}, {})), Interpreted)
 
 
 @settings(max_examples=30, deadline=None)

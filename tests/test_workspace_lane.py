@@ -10,12 +10,12 @@ import pytest
 
 from softnlp import BAR, Loads, Numerics, material, robot
 from softnlp.base.status import Status
-from softnlp.batch import newton, pose_lane, shooting, stretches
+from softnlp.batch import newton, stretches
 from softnlp.batch.alone import Alone
 from softnlp.batch.chunk import ChunkSolver
-from softnlp.batch.compiled import _FLAGS, compiler
 from softnlp.batch.contact_newton import PATH, BlockedShot, ContactBatch, Stage
 from softnlp.batch.grids import MOST_INTERVALS
+from softnlp.batch.jit import can_compile
 from softnlp.batch.newton import Batch, BatchSolver, Shot
 from softnlp.batch.plan import Plan, cells
 from softnlp.batch.pose_lane import PoseLane
@@ -33,22 +33,7 @@ from softnlp.studies.forward import forward
 
 REPRODUCTION_SET = Coefficients()
 LOADED = Loads(tip_force=(0.02, 0.01, -0.015), tip_moment=(1e-4, -2e-4, 1e-4), gravity=(0.0, 0.0, -9.80665))
-needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
-
-
-@pytest.fixture(autouse=True)
-def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep what is compiled for all tests of a worker."""
-    folder = tmp_path_factory.getbasetemp() / "cache"
-    folder.mkdir(exist_ok=True)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
-
-
-@pytest.fixture
-def compiled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Compile for small plans too, which takes seconds."""
-    monkeypatch.setattr(pose_lane, "WORTH_COMPILING", 0)
-    monkeypatch.setattr("softnlp.batch.blocked_lane.WORTH_COMPILING", 0)
+needs_compiler = pytest.mark.skipif(not can_compile(), reason="no llvmlite")
 
 
 def plan(
@@ -74,12 +59,10 @@ def random_pressures(count: int, highest: float, seed: int = 1) -> np.ndarray:
 
 
 @needs_compiler
-@pytest.mark.usefixtures("compiled")
 def test_compiled_and_interpreted_numbers_are_the_same_to_the_last_bit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It comes first: the tests below find what it compiled."""
     asked = plan(random_pressures(9, 1.0))
     first = ChunkSolver(asked).solve(0).rows
-    monkeypatch.setattr(shooting, "library", lambda source, build: None)
+    monkeypatch.setenv("SOFTNLP_COMPILE", "0")
     again = ChunkSolver(asked).solve(0).rows
     assert first.tobytes() == again.tobytes()
 
@@ -127,7 +110,7 @@ def test_reduced_nodes_solve_the_multiple_shooting_equations() -> None:
     found = lane.solve(columns, asked.values)
     solver = PoseSolver(asked.model, asked.numerics)
     problem = solver.grid(15).problem
-    step = reduced_rod(rod_functions(asked.model)).value
+    step = reduced_rod(rod_functions(asked.model)).onward
     for k in range(5):
         c = found.sections.constants[:, k]
         F_0, L_0 = found.sections.force_unit[k], found.sections.length_unit[k]
@@ -137,7 +120,7 @@ def test_reduced_nodes_solve_the_multiple_shooting_equations() -> None:
         for j in range(16):
             n = data[-6:-3] + c[11] * c[8:11] * (1 - j / 15)
             nodes.append(np.concatenate([state[:12], n, state[12:]]))
-            state = np.asarray(step(state, data, j / 15, 1 / 15)).ravel()
+            state = np.asarray(step(np.concatenate([state, data, [j / 15, 1 / 15]]))).ravel()
         x = np.concatenate([[found.sections.stretch[k]], *nodes])
         assert float(np.max(np.abs(np.asarray(problem.residual(x, columns[:, k]))))) < 1e-10
 
@@ -236,8 +219,6 @@ def blocked_rows(closure: str, pressures: np.ndarray, loads: Loads, offset: floa
     return asked, ChunkSolver(asked).solve(0).rows
 
 
-@needs_compiler
-@pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize(
     ("closure", "loads", "offset"),
     [
@@ -250,10 +231,7 @@ def blocked_rows(closure: str, pressures: np.ndarray, loads: Loads, offset: floa
         pytest.param("rigid", Loads(), 0.0, marks=pytest.mark.slow),
     ],
 )
-def test_blocked_poses_are_those_of_the_study(
-    closure: str, loads: Loads, offset: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("softnlp.batch.compiled._FLAGS", ("-Og", *_FLAGS[1:]))  # compiles in two thirds of the time
+def test_blocked_poses_are_those_of_the_study(closure: str, loads: Loads, offset: float) -> None:
     pressures = np.linspace(0, 1.4 * BAR, 5)[:, None] * np.array([1.0, 0, 0])
     asked, rows = blocked_rows(closure, pressures, loads, offset)
     assert asked.contact is not None
@@ -298,8 +276,6 @@ def test_poses_that_pass_through_themselves_are_those_of_the_problem(
 
 
 @pytest.mark.slow
-@needs_compiler
-@pytest.mark.usefixtures("compiled")
 def test_a_blocked_pose_out_of_the_walls_plane_is_solved_in_space() -> None:
     pressures = np.array([[1.0, 0.2, 0.0], [0.8, 0.0, 0.3]]) * BAR
     asked, rows = blocked_rows("compliant", pressures, Loads(), 0.0)
@@ -356,13 +332,8 @@ def test_a_section_that_softens_with_its_stretch_is_left_to_the_problem() -> Non
 
 
 @pytest.mark.parametrize("kernels", [pytest.param("compiled", marks=needs_compiler), "interpreted"])
-def test_a_chunk_beyond_every_equilibrium_is_named_pose_by_pose(
-    kernels: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    if kernels == "compiled":
-        request.getfixturevalue("compiled")
-    else:
-        monkeypatch.setattr(shooting, "library", lambda source, build: None)
+def test_a_chunk_beyond_every_equilibrium_is_named_pose_by_pose(kernels: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SOFTNLP_COMPILE", str(int(kernels == "compiled")))
     softening, pressures = Coefficients(elongation=0.0), np.array([[20.0, 0, 0], [30.0, 10.0, 0]]) * BAR
     asked = plan(pressures, coefficients=softening)
     block = ChunkSolver(asked).solve(0)

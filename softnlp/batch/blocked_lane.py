@@ -12,7 +12,7 @@ from softnlp.batch.bodies import self_intersecting
 from softnlp.batch.contact_newton import PATH, BlockedShot, ContactBatch, Stage
 from softnlp.batch.kernels import Kernels
 from softnlp.batch.plan import LOADS, Plan
-from softnlp.batch.pose_lane import WORTH_COMPILING, PoseLane, Poses, Sections, entries
+from softnlp.batch.pose_lane import PoseLane, Poses, Sections, entries
 from softnlp.batch.reduced import POSITION
 from softnlp.batch.reduced_contact import reduced_contact
 from softnlp.batch.shooting import shooting
@@ -68,7 +68,7 @@ class BlockedLane:
             },
             {"contact_tip": reduced.tip, "contact_onward": reduced.onward, "arc": reduced.arc},
         )
-        self._kernels = shooting(kernels, build=plan.poses >= WORTH_COMPILING)
+        self._kernels = shooting(kernels)
         self._flat = ContactBatch(functions, self._kernels, wall.plane)
         self._spatial = ContactBatch(functions, self._kernels, None)
         self._sets = plan.model.robot.chamber_sets

@@ -20,9 +20,6 @@ from softnlp.statics.loadcase import rod_functions
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-WORTH_COMPILING = 2000
-"""Poses in a sweep from which compiling pays for itself."""
-
 
 @dataclass(frozen=True, eq=False)
 class Sections:
@@ -56,7 +53,7 @@ class PoseLane:
             {"value": reduced.value, "directions": reduced.directions, "check": reduced.check},
             {"ends": reduced.ends, "onward": reduced.onward, **stretch_maps(functions)},
         )
-        self._kernels = shooting(kernels, build=plan.poses >= WORTH_COMPILING)
+        self._kernels = shooting(kernels)
         self._batch = BatchSolver(functions, self._kernels, plan.numerics.accuracy / 3, plan.numerics.intervals)
         self._stretches = Stretches(functions, self._kernels, shared=not set(plan.varied) - {"pressure", *LOADS})
         self._force, self._moment = (entries(plan, name) for name in ("tip_force", "tip_moment"))

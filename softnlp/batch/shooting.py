@@ -56,10 +56,10 @@ class Compiled:
         return found[:, :poses]
 
 
-def shooting(kernels: Kernels, *, build: bool) -> Shooting:
+def shooting(kernels: Kernels) -> Shooting:
     """Return the kernels as machine code where it is to be had, else interpreted ones; their numbers are the same.
 
-    build : whether compiling is worth the time that it takes.
+    Compiling takes a quarter of a second, which a dozen poses pay for.
     """
-    text = llvm_text(kernels) if build and can_compile() else None
+    text = llvm_text(kernels) if can_compile() else None
     return Interpreted(kernels) if text is None else Compiled(compiled(text, LIBRARY), kernels)
