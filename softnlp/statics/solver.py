@@ -52,6 +52,7 @@ _DEARER = 3  # an iteration on a neighbour's grid than on a coarse one, where th
 _FINER = 4  # how much finer a grid is tried where a coarse one finds no solution
 # Work is counted in Runge-Kutta intervals of Newton iterations, some 0.07 ms each.
 _MOST_WORK, _KEPT_TO_SHOW = 9_000, 3_000  # to find one pose, and then to solve it on the grid that its accuracy needs
+_BY_IPOPT = 4  # so much more where IPOPT makes every step, which takes more of them
 _HOPELESS = 1.0  # estimated error of a given grid, in lengths, from which its solution is none of the rod
 _TO_SHOW = 4  # iterations on that grid, the error and stability counted
 # Without loads the exact answer is a circular arc; a solution is good enough to show it.
@@ -145,7 +146,8 @@ class PoseSolver:
         loaded = any(np.any(values[name]) for name in LOADS)
         given = self.numerics.intervals
         first = given or self.first_intervals(column, branch.stretch, None if loaded else target)
-        work = Work(_MOST_WORK, _KEPT_TO_SHOW if given is None else math.inf)
+        most_work = _MOST_WORK * (_BY_IPOPT if self.numerics.engine == "ipopt" else 1)
+        work = Work(most_work, _KEPT_TO_SHOW if given is None else math.inf)
         found, iterations, how_far = self._searched(values, branch, warm, work, first, loaded)
         most = self.most_intervals
         while found is not None:
