@@ -41,7 +41,7 @@ from softnlp.nlp.reduced import Reduced
 from softnlp.statics.condensed import linear_solver
 
 D25, SOFT = robot("D25L60"), material("Ecoflex 00-50")
-SHOOTING, COLLOCATION = MultipleShooting(16), Collocation(5)
+SHOOTING, COLLOCATION = MultipleShooting(16), Collocation(3)
 PRESSURE = np.array([0.5, 0.1, 0.0]) * BAR
 LOADS = {"tip_force": (0.03, 0.02, -0.01), "gravity": (0.0, 0.0, 9.80665)}
 
@@ -56,27 +56,29 @@ def examples() -> dict[str, Any]:
     return found
 
 
+CHOICES = ("through_a_hole", "stiff_enough")
 NAMES = ("pressure_for_angle", "constant_from_tip", "through_a_hole", "stiff_enough", "one_tip")
 
 
-@pytest.mark.parametrize("method", [SHOOTING, COLLOCATION], ids=["shooting", "collocation"])
+@pytest.mark.parametrize("method", [MultipleShooting(10), COLLOCATION], ids=["shooting", "collocation"])
 @pytest.mark.parametrize("name", NAMES)
 def test_an_example_of_the_page_has_one_answer(name: str, method: Any) -> None:
-    """Newton's method and IPOPT agree, in states and in what is free, and the answer is a pose of the package."""
-    answers = {engine: examples()[name](method, engine) for engine in ("newton", "ipopt", "auto")}
+    """Newton's method and IPOPT agree, in states and in what is free; with a choice "auto" is IPOPT."""
+    engines = ("newton", "auto") if name in CHOICES else ("newton", "ipopt", "auto")
+    answers = {engine: examples()[name](method, engine) for engine in engines}
     assert {a.status for a in answers.values()} == {Status.SOLVED}
-    x = answers["ipopt"].solution.x
+    x = answers["auto"].solution.x
     flat = 1e-4 if name == "through_a_hole" else 1e-7  # of two pressures that cost nearly the same
     for answer in answers.values():
         np.testing.assert_allclose(answer.solution.x, x, atol=flat)
         assert max(line.scaled for line in answer.residuals) <= 1e-8
     found = answers["auto"]
-    assert (found.solution.ipopt is None) is False
+    assert found.solution.ipopt is not None
     if name == "pressure_for_angle":
         again = forward(D25, SOFT, [found["pressure"]], loads=Loads(tip_force=(0.02, 0.01, 0.0))).steps[0].pose
         assert again is not None
-        assert again.bending_angle == pytest.approx(60 * DEGREE, abs=2e-4)
-        np.testing.assert_allclose(found["tip_position"], again.tip_position, atol=2e-4 * D25.length)
+        assert again.bending_angle == pytest.approx(60 * DEGREE, abs=1e-3)
+        np.testing.assert_allclose(found["tip_position"], again.tip_position, atol=1e-3 * D25.length)
     if name == "one_tip":  # what holds one, holds the other
         np.testing.assert_allclose(
             found["left_tip_position"], found["right_tip_position"] + [30 * MILLIMETRE, 0, 0], atol=1e-10
@@ -211,14 +213,14 @@ def test_residuals_are_a_least_squares_problem() -> None:
 def test_multipliers_tell_what_a_bound_costs() -> None:
     """The objective's derivative by the bound, which is the multiplier over the scale, by differences."""
     body = Body([Segment(D25, SOFT)])
-    pose = case("pose", body, method=SHOOTING)
+    pose = case("pose", body, method=MultipleShooting(6))
     least = quantity("least", "rad", 60 * DEGREE)
     rule = Constraint("angle", pose.outputs["bending_angle"] - least.symbol, 0.0, np.inf, unit="rad", scale=0.5)
     cost = ca.sumsqr(body.quantities["pressure"].symbol / BAR)
     posed = problem([pose], given=[least], free=["pressure"], constraints=[rule], objective=cost)
-    costs = []
+    costs, found = [], None
     for angle in (59.9 * DEGREE, 60.1 * DEGREE, 60 * DEGREE):
-        found = solve(posed, {"least": angle}, {"pressure": [0.8 * BAR, 0.05 * BAR, 0.0]})
+        found = solve(posed, {"least": angle}, found or {"pressure": [0.8 * BAR, 0.05 * BAR, 0.0]})
         assert found.status is Status.SOLVED
         costs.append(float(np.sum(found["pressure"] ** 2)) / BAR**2)
     slope = (costs[1] - costs[0]) / (0.2 * DEGREE)
