@@ -32,6 +32,13 @@ _MOVED = (
 )
 _RENAMED = {
     "columns": "base.csv_columns",
+    "plots.abscissa": "figures.series",
+    "plots.blocked": "figures.run",
+    "plots.boxes": "figures.compare_parts",
+    "plots.cloud": "figures.space",
+    "plots.compare_tips": "figures.compare",
+    "plots.dexterity": "figures.workspace",
+    "plots.inverse": "figures.run",
     "results.targets": "studies.fields",
     "runner": "scenario.run",
     "runner_blocked": "scenario.run_blocked",

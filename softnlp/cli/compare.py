@@ -58,7 +58,7 @@ def compare(
     """
     from softnlp.cli.folder import require_writable
     from softnlp.results.comparison import comparison_document, require_free_names
-    from softnlp.results.identify_document import document_text
+    from softnlp.results.document import document_text
     from softnlp.scenario.compare import Asked, compare_task
     from softnlp.scenario.read import load_scenario
 
@@ -69,7 +69,7 @@ def compare(
         require_writable(folder)
         require_free_names(task)
     found = _compared(task)
-    document = document_text(comparison_document(task, found))
+    document = document_text(comparison_document(task, found), compact=False)
     if folder is not None:
         _write(folder, task, found, document)
     if json:

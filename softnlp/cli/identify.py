@@ -66,19 +66,15 @@ def run_study(asked: Scenario, out: Path | None, json: bool) -> int:
 
 
 def _tensile(asked: Scenario, folder: Path | None, json: bool) -> int:
-    from softnlp.results.identify_document import (
-        document_text,
-        material_file_text,
-        tensile_document,
-        tensile_table_text,
-    )
+    from softnlp.results.document import document_text
+    from softnlp.results.identify_document import material_file_text, tensile_document, tensile_table_text
     from softnlp.scenario.run_identify import run_tensile
     from softnlp.studies.identify_task import TensileTask
 
     task = asked.task
     assert isinstance(task, TensileTask)
     fit = run_tensile(asked)
-    document = document_text(tensile_document(asked, task, fit))
+    document = document_text(tensile_document(asked, task, fit), compact=False)
     if folder is not None:
         from softnlp.figures import tensile_figure
 
@@ -128,7 +124,8 @@ def _say_tensile(task: TensileTask, fit: TensileFit) -> None:
 
 def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
     from softnlp.base.status import Status
-    from softnlp.results.identify_document import document_text, identified_text, robot_document, robot_table_text
+    from softnlp.results.document import document_text
+    from softnlp.results.identify_document import identified_text, robot_document, robot_table_text
     from softnlp.studies.identify_task import RobotTask
 
     task = asked.task
@@ -139,7 +136,7 @@ def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
         complain("stopped; an identification that is not finished leaves no constants")
         return STOPPED
     solved = found.status is Status.SOLVED
-    document = document_text(robot_document(asked, task, found))
+    document = document_text(robot_document(asked, task, found), compact=False)
     if folder is not None:
         texts = {"identified.json": document, "table.csv": robot_table_text(task, found)}
         figure = None

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -13,7 +11,7 @@ from softnlp.base.errors import InputError
 from softnlp.base.reading import shown
 from softnlp.base.statistics import Statistics
 from softnlp.model.inputs import coefficients_table, contact_table, loads_table, package_version, pressure_bar, tidy
-from softnlp.results.identify_document import number
+from softnlp.results.document import csv_text, number
 from softnlp.scenario.compare import CompareTask
 from softnlp.studies.comparison import Comparison
 from softnlp.studies.observed import NUMBERS, OBSERVABLES, differences
@@ -152,7 +150,7 @@ def summary_text(found: Comparison) -> str:
                 if found.measured(name, robot):
                     cells = statistics_cells(found.statistics(v, name, robot), name)
                     rows.append([*_named(found, v).values(), label, OBSERVABLES[name].measured, *cells])
-    return _csv([*_VARIANT, "robot", "observable", *STATISTICS], rows)
+    return csv_text([*_VARIANT, "robot", "observable", *STATISTICS], rows, 10)
 
 
 def require_free_names(task: CompareTask) -> None:
@@ -195,13 +193,4 @@ def rows_text(task: CompareTask, found: Comparison) -> str:
             cells += [told.get(name, (None, None))[0] for name in observables if name in NUMBERS]
             cells += [told.get(name, (None, None))[1] for name in observables]
             rows.append(cells)
-    return _csv([*task.header, *_added(observables)], rows)
-
-
-def _csv(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    for row in rows:
-        writer.writerow([f"{v:.10g}" if isinstance(v, float) else "" if v is None else v for v in row])
-    return text.getvalue()
+    return csv_text([*task.header, *_added(observables)], rows, 10)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,16 +10,8 @@ from numpy.typing import NDArray
 
 from softnlp.base.columns import OUTPUTS, Output
 from softnlp.base.netcdf import dataset_bytes, flag_attributes, said
-from softnlp.model.inputs import (
-    coefficients_table,
-    contact_table,
-    conventions_table,
-    loads_table,
-    material_table,
-    pressure_bar,
-    robot_table,
-    versions,
-)
+from softnlp.model.inputs import file_attributes, pressure_bar
+from softnlp.model.quantities import Model
 from softnlp.nlp.solver import EquationResidual
 from softnlp.statics.step import Run, Step
 from softnlp.studies.fields import (
@@ -91,7 +81,9 @@ def to_dataset(run: Run) -> xr.Dataset:
         closures = _text([closure_of(run, step) or "" for step in steps])
         variables["closure"] = (("step",), closures, said("1", "which equations close the blocked shape"))
         variables |= _weighted(steps)
-    return xr.Dataset(variables, coords=_coordinates(run, variables["arc"][1]), attrs=_global_attributes(run))
+    model = Model(run.robot, run.material, run.coefficients, run.conventions)
+    about = file_attributes(run.study, model, run.loads, run.contact, "warnings", run.warnings)
+    return xr.Dataset(variables, coords=_coordinates(run, variables["arc"][1]), attrs={"title": run.title, **about})
 
 
 def netcdf_bytes(run: Run) -> bytes:
@@ -199,24 +191,3 @@ def _coordinates(run: Run, arc: Array) -> dict[str, Variable]:
     if len(solved) and (solved == solved[0]).all():
         coordinates["s"] = (("s",), solved[0], said("1", OUTPUTS["arc"].meaning))
     return coordinates
-
-
-def _global_attributes(run: Run) -> dict[str, str]:
-    tables = {
-        "robot": robot_table(run.robot),
-        "material": material_table(run.material),
-        "coefficients": coefficients_table(run.coefficients),
-        "loads": loads_table(run.loads),
-        "versions": versions(),
-        "conventions_in_full": conventions_table(run.conventions),
-        "warnings": list(run.warnings),
-        **({} if run.contact is None else {"contact": contact_table(run.contact)}),
-    }
-    return {
-        "title": run.title,
-        "study": run.study,
-        "conventions": run.conventions.name,
-        "softnlp": versions()["softnlp"],
-        **{name: json.dumps(table, ensure_ascii=False, allow_nan=False) for name, table in tables.items()},
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-    }

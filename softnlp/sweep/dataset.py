@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import csv
 import hashlib
-import json
 from collections.abc import Iterator, Mapping
-from datetime import UTC, datetime
 from itertools import islice
 from os import PathLike
 from pathlib import Path
@@ -20,15 +18,7 @@ from softnlp.base.files import placed_whole
 from softnlp.base.netcdf import as_characters, encoded, put, put_attributes, put_characters, said
 from softnlp.batch.plan import Plan
 from softnlp.batch.poses import Rows
-from softnlp.model.inputs import (
-    coefficients_table,
-    contact_table,
-    conventions_table,
-    loads_table,
-    material_table,
-    robot_table,
-    versions,
-)
+from softnlp.model.inputs import file_attributes
 from softnlp.sweep.columns import LONGEST_STATUS, TEXT, Column, columns
 from softnlp.sweep.journal import Journal
 from softnlp.sweep.sink import Sink
@@ -57,13 +47,16 @@ def write_workspace(path: str | PathLike[str], plan: Plan, journal: Journal, abo
     """
     import h5netcdf
 
-    listed = columns(plan)
+    listed, fingerprint = columns(plan), plan.fingerprint()
+    own = file_attributes(
+        "workspace", plan.model, plan.loads, plan.contact, "varied", plan.varied, fingerprint=fingerprint
+    )
     with placed_whole(path) as part, part.open("w+b", buffering=0) as raw:
         # HDF5 that writes to a full disk by itself ends the interpreter.
         sink = Sink(raw)
         try:
             with h5netcdf.File(sink, "w") as file:
-                put_attributes(file, _attributes(plan) | dict(about))
+                put_attributes(file, own | dict(about))
                 _declare(file, plan, listed)
                 sink.check()
                 for start, rows in _slabs(plan, journal, MEMORY):
@@ -194,28 +187,6 @@ def _write_messages(file: Any, journal: Journal, sink: Sink) -> None:
         poses[start : start + len(part)] = np.array([pose + 1 for pose, _ in part], np.int64)
         texts[start : start + len(part)] = as_characters(encoded((text for _, text in part), width))
         sink.check()
-
-
-def _attributes(plan: Plan) -> dict[str, str]:
-    model = plan.model
-    tables = {
-        "robot": robot_table(model.robot),
-        "material": material_table(model.material),
-        "coefficients": coefficients_table(model.coefficients),
-        "loads": loads_table(plan.loads),
-        "versions": versions(),
-        "conventions_in_full": conventions_table(model.conventions),
-        "varied": list(plan.varied),
-        **({} if plan.contact is None else {"contact": contact_table(plan.contact)}),
-    }
-    return {
-        "study": "workspace",
-        "conventions": model.conventions.name,
-        "softnlp": versions()["softnlp"],
-        **{name: json.dumps(table, ensure_ascii=False, allow_nan=False) for name, table in tables.items()},
-        "fingerprint": plan.fingerprint(),
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
 
 
 def _names(column: Column, sizes: Mapping[str, int]) -> list[str]:
