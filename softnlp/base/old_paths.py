@@ -56,6 +56,11 @@ _RENAMED = {
     "scenario_workspace": "scenario.workspace",
     "studies.implicit": "nlp.directions",
     "studies.statics": "statics.solver",
+    "workspace.again": "sweep.comparison",
+    "workspace.export": "sweep.read",
+    "workspace.sink": "sweep.dataset",
+    "workspace.table": "sweep.task",
+    "workspace.worker": "sweep.pool",
 }
 _FOLDERS = {"workspace": "sweep", "plots": "figures", "mesh": "figures.mesh", "evaluation": "studies"}
 # Names that left a module which is still there.

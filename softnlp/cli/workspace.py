@@ -69,8 +69,7 @@ def workspace(
     """
     from softnlp.figures.comparison import comparison_figure
     from softnlp.figures.workspace import dexterity_figure, workspace_figure
-    from softnlp.sweep.export import export_csv
-    from softnlp.sweep.read import load_workspace, read_column
+    from softnlp.sweep.read import export_csv, load_workspace, read_column
     from softnlp.sweep.summary import summarise
 
     for key, value in (("--voxel-mm", voxel_mm), ("--radius-mm", radius_mm)):

@@ -93,6 +93,13 @@ def conventions_table(conventions: Conventions) -> dict[str, Any]:
     return table
 
 
+def conventions_of_table(table: Mapping[str, Any]) -> Conventions:
+    """Return the conventions of a `conventions_table`; KeyError or TypeError where one is missing."""
+    values = dict(table)
+    values["fibre_thickness"] = float(values.pop("fibre_thickness_mm")) * MILLIMETRE
+    return Conventions(**values)
+
+
 def loads_table(loads: Loads) -> dict[str, Any]:
     """Return the dead loads in the world frame, gravity in words too."""
     return {

@@ -19,8 +19,7 @@ from softnlp.model.rod import Vector
 from softnlp.scenario.contact import contact_settings
 from softnlp.scenario.schema_workspace import WorkspaceFile, WorkspaceTable
 from softnlp.sweep.manufacture import check_many
-from softnlp.sweep.table import combinations, varied_table
-from softnlp.sweep.task import Axis, WorkspaceTask
+from softnlp.sweep.task import Axis, WorkspaceTask, combinations, varied_table
 
 Array = NDArray[np.float64]
 

@@ -1,7 +1,8 @@
-"""Reading a finished sweep, `workspace.nc`: the columns that are needed, in SI, as flat arrays."""
+"""Reading a finished sweep, `workspace.nc`: the columns that are needed, in SI, as flat arrays; or all, as CSV."""
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from softnlp.base.columns import OUTPUTS, by_key, outputs
 from softnlp.base.errors import InputError, nearest
+from softnlp.base.files import placed_whole
 from softnlp.base.reading import one_line
 from softnlp.base.status import Status
 from softnlp.model.inputs import robot_of_table
@@ -28,6 +30,7 @@ _PRESSURE, _TIP, _BENDING, _ROTATION = (
     OUTPUTS[name] for name in ("pressure", "tip_position", "bending_angle", "tip_rotation")
 )
 _SLAB = 65_536  # poses read at a time where a column is not kept as it is in the file
+_BLOCK = 16_384  # poses written at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,6 +221,37 @@ def read_block(workspace: Workspace, names: Sequence[str], rows: slice) -> list[
                 values = np.where(hidden, np.nan, values)
             found.append(values)
     return found
+
+
+def export_csv(workspace: Workspace, path: str | PathLike[str]) -> Path:
+    """Write every number of every pose, with status, under its name in the file; empty where there is none.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be written.
+    """
+    names = column_names(workspace)
+    words = np.array([status.value for status in STATUSES], dtype=object)
+    with placed_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["pose", "status", *names])
+        for start in range(0, workspace.poses, _BLOCK):
+            rows = slice(start, min(start + _BLOCK, workspace.poses))
+            cells: list[list[Any]] = [
+                list(range(rows.start + 1, rows.stop + 1)),
+                words[workspace.status[rows]].tolist(),
+            ]
+            cells += [_cells(column) for column in read_block(workspace, names, rows)]
+            table.writerows(zip(*cells, strict=True))
+    return Path(path)
+
+
+def _cells(values: Any) -> list[Any]:
+    """Return numbers as CSV has them: rounded to 12 digits, empty for NaN."""
+    if values.dtype.kind != "f":
+        return list(values.tolist())
+    return ["" if value != value else float(f"{value:.12g}") for value in values.tolist()]
 
 
 _POSE_NUMBERS = tuple(output.key for output in (*outputs("pose", "wall"), OUTPUTS["discretisation_error"]))

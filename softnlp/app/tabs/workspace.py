@@ -13,7 +13,7 @@ from softnlp.app.tabs import cloud
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.figures.space import shown
-from softnlp.sweep.export import export_csv
+from softnlp.sweep.read import export_csv
 
 STUDY = "workspace"
 _FIRST = {"levels": 8, "samples": 1000}
