@@ -32,6 +32,7 @@ _MOVED = (
 )
 _RENAMED = {
     "columns": "base.csv_columns",
+    "mesh.export": "figures.mesh.solid",
     "plots.abscissa": "figures.series",
     "plots.blocked": "figures.run",
     "plots.boxes": "figures.compare_parts",
@@ -39,7 +40,10 @@ _RENAMED = {
     "plots.compare_tips": "figures.compare",
     "plots.dexterity": "figures.workspace",
     "plots.inverse": "figures.run",
+    "results.csv_table": "results.table",
     "results.targets": "studies.fields",
+    "results.terminal": "results.table",
+    "results.view": "results.folder",
     "runner": "scenario.run",
     "runner_blocked": "scenario.run_blocked",
     "runner_compare": "scenario.compare",

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json as json_module
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say, say_rows
@@ -223,14 +222,8 @@ def _sigma_text(found: Identified, key: str) -> str:
 
 def _write(folder: Path, asked: Scenario, texts: Mapping[str, str], figure: Callable[[], Figure] | None) -> None:
     """Write the numbers, each file whole, after all of them are made, and then the figure."""
-    from softnlp.base.files import make_folder, write_whole
-    from softnlp.model.inputs import versions
+    from softnlp.results.folder import write_files
 
-    contents: dict[str, Any] = {name: text.encode() for name, text in texts.items()}
-    contents["versions.json"] = (json_module.dumps(versions(), indent=2) + "\n").encode()
-    contents["scenario.toml"] = asked.text.encode()
-    make_folder(folder)
-    for name, content in contents.items():
-        write_whole(folder / name, content)
+    write_files(folder, texts, asked.text)
     if figure is not None:
         draw({folder / "figure.png": figure}, folder)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.figures.mesh.rings import circle, placed
 from softnlp.figures.space import axes_3d, draw_faces, draw_lines, plain_3d
@@ -18,8 +19,6 @@ from softnlp.results import Body, RunView
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 BODY_FACETS, CHAMBER_FACETS, GHOST_FACETS = 32, 10, 24
 BODY_STATIONS, GHOST_STATIONS = 25, 13

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.statistics import USED, groups
 from softnlp.base.units import BAR, MILLIMETRE
@@ -37,8 +38,6 @@ from softnlp.sweep.boundary import thinned
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 _WIDTH, _LEFT = 11.0, 6.6  # of the figure, and of its panels of curves [inch]
 _MOST_PANELS, _MOST_LANES = 12, 24

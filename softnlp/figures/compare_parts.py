@@ -8,8 +8,8 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.figures.style import COLOURS, GREY, INK, SMALL, WRONG, colour, legend, mark, plain, user_text
 from softnlp.studies.comparison import Comparison
 from softnlp.studies.observed import OBSERVABLES
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 _LINES: tuple[Any, ...] = ("-", "--", ":", (0, (6, 1, 1, 1)), (0, (1, 1)), (0, (8, 2, 2, 2)))
 _HATCHES = ("", "////", "....", "xxxx", "----", "\\\\\\\\")

@@ -6,8 +6,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.statistics import groups, statistics
 from softnlp.base.units import MILLIMETRE
@@ -24,13 +24,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
-
 _MAP = "cividis_r"
 _MOST_LINES, _MOST_POINTS = 2_000, 20_000
 _WIDTH, _HEIGHT = 11.0, 7.2
 _ALL = "all"
-
 
 BENDING, DISTANCE = OUTPUTS["bending_angle"], OBSERVABLES["tip_position"]
 

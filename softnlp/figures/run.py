@@ -10,8 +10,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.units import MILLIMETRE
 from softnlp.figures.body import (
@@ -49,8 +49,6 @@ from softnlp.statics.step import STABLE_FLAGS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 BENDING, ELONGATION, FORCE = (OUTPUTS[name] for name in ("bending_angle", "elongation", "blocked_force"))
 DISTANCE, ANGLE = OUTPUTS["distance"], OUTPUTS["direction_error"]

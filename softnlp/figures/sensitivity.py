@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.figures.body import frame, side_camera, tube
 from softnlp.figures.space import axes_3d, draw_faces
@@ -33,8 +33,6 @@ from softnlp.studies.report import SensitivityReport
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 _SIZE = 0.3  # largest semi-axis of an ellipsoid drawn, of L_0
 _MOST_BARS = 10

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.units import BAR
 from softnlp.figures.style import GREY, WRONG, colour, listed, plain, step_colours
@@ -18,8 +18,6 @@ from softnlp.statics.step import STABLE_FLAGS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 LEAST_SPAN = 1.0  # of a vertical axis [deg or mm]
 STEP = "step"

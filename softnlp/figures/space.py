@@ -6,17 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array, Index
 from softnlp.figures.style import GREY, INK, PALE, SMALL, TEXT, plain
 from softnlp.sweep.boundary import alpha_shape, convex_hull, thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 MOST_SHOWN = 20_000  # of a panel
 MOST_OUTLINED = 4_000

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.columns import DEG, ONE, OUTPUTS
 from softnlp.base.units import DEGREE, MILLIMETRE
 from softnlp.figures.body import disc
@@ -34,8 +34,6 @@ from softnlp.sweep.summary import parameters
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 COLOUR, TILT = OUTPUTS["bending_angle"].key, OUTPUTS["tilt"]
 _MAP = "viridis"

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softnlp.base.columns import BAR_, DEG, MM, NMM, N
 from softnlp.model.inputs import loads_table, package_version, pressure_bar
@@ -14,8 +13,6 @@ from softnlp.results.document import plain
 from softnlp.studies.derivatives import entries_of
 from softnlp.studies.ellipsoids import Ellipsoid
 from softnlp.studies.report import SensitivityReport
-
-Array = NDArray[np.float64]
 
 SHOWN: Mapping[str, tuple[str, float]] = {unit.si: (unit.suffix, unit.scale) for unit in (MM, DEG, BAR_, NMM)}
 """The unit in which a unit of SI is shown, and its size."""

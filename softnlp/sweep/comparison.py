@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array, Index
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, MILLIMETRE
@@ -24,9 +25,6 @@ from softnlp.studies.forward import forward
 from softnlp.sweep.measured import Measured
 from softnlp.sweep.read import Workspace
 from softnlp.sweep.summary import varied_besides_pressure
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 BENDING = OUTPUTS["bending_angle"]
 WITHIN = 1.0  # pressures that differ by no more are equal [Pa]

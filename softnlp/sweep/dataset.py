@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.arrays import Index
 from softnlp.base.columns import by_key
 from softnlp.base.files import placed_whole
 from softnlp.base.netcdf import as_characters, encoded, put, put_attributes, put_characters, said
@@ -60,13 +61,12 @@ def write_workspace(path: str | PathLike[str], plan: Plan, journal: Journal, abo
                 put_attributes(file, own | dict(about))
                 _declare(file, plan, listed)
                 sink.check()
-                for start, rows in _slabs(plan, journal, MEMORY):
-                    numbers = np.arange(start, start + rows.size, dtype=np.int64)
+                for numbers, rows in _slabs(plan, journal, MEMORY):
                     for column in listed:
                         values = column.of(rows, numbers)
                         if column.kind == TEXT:
                             values = as_characters(values.astype(f"S{LONGEST_STATUS}"))
-                        file.variables[column.name][start : start + rows.size] = values
+                        file.variables[column.name][numbers[0] : numbers[-1] + 1] = values
                         sink.check()
                 _write_messages(file, journal, sink)
         finally:
@@ -90,8 +90,7 @@ def write_csv(path: str | PathLike[str], plan: Plan, journal: Journal) -> Path:
     with placed_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["pose", *(name for column in listed for name in _names(column, sizes))])
-        for start, rows in _slabs(plan, journal, MEMORY // 16):
-            numbers = np.arange(start, start + rows.size, dtype=np.int64)
+        for numbers, rows in _slabs(plan, journal, MEMORY // 16):
             cells: list[list[Any]] = [(numbers + 1).tolist()]
             for column in listed:
                 values = column.of(rows, numbers).reshape(rows.size, -1)
@@ -216,8 +215,8 @@ def _declare(file: Any, plan: Plan, listed: tuple[Column, ...]) -> None:
             put_attributes(file.create_variable(column.name, dims, column.kind), attributes)
 
 
-def _slabs(plan: Plan, journal: Journal, memory: int) -> Iterator[tuple[int, Rows]]:
-    """Yield the first number and the rows of consecutive poses, in the order of the plan."""
+def _slabs(plan: Plan, journal: Journal, memory: int) -> Iterator[tuple[Index, Rows]]:
+    """Yield the numbers and the rows of consecutive poses, in the order of the plan."""
     kind = plan.row_type
     size = max(plan.chunk, memory // kind.itemsize)
     place = np.empty(plan.poses, np.int64)
@@ -233,7 +232,7 @@ def _slabs(plan: Plan, journal: Journal, memory: int) -> Iterator[tuple[int, Row
                 inside = (numbers >= start) & (numbers < stop)
                 numbers, given = numbers[inside], given[inside]
             rows.view(whole)[numbers - start] = given
-        yield start, rows
+        yield np.arange(start, stop, dtype=np.int64), rows
 
 
 def _write_messages(file: Any, journal: Journal, sink: Sink) -> None:

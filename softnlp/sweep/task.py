@@ -7,11 +7,9 @@ from math import prod
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.model.rod import Vector
-
-Array = NDArray[np.float64]
 
 MOST_HALTON = 12
 """Dimensions up to which the Halton sequence is even enough."""
