@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import prod
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from softnlp.base.arrays import Array
+from softnlp.base.columns import DEG, MM, NMM, N
+from softnlp.model.materials import Material
+from softnlp.model.robot import DIMENSIONS
 from softnlp.model.rod import Vector
 
 MOST_HALTON = 12
@@ -56,6 +59,43 @@ class WorkspaceTask:
     def combinations(self) -> int:
         """The number of combinations of what a grid varies besides the pressures."""
         return prod(axis.values.size for axis in self.vary)
+
+
+class Varied(NamedTuple):
+    """A quantity that may be varied: where it goes as in `Axis`, its unit in files, SI per unit, and what it is."""
+
+    quantity: str
+    place: int | Vector | None
+    unit: str
+    scale: float
+    meaning: str
+
+
+def varied_quantities(material: Material, gravity: Vector) -> dict[str, Varied]:
+    """Return what may be varied besides pressures, by its key in a scenario; gravity : the direction that it has."""
+    kinds: dict[str, Varied] = {}
+    for k, x in enumerate("xyz"):
+        for what, unit in (("force", N), ("moment", NMM)):
+            words = f"tip {what} along {x}"
+            kinds[f"tip_load.{what}_{x}_{unit.suffix}"] = Varied(f"tip_{what}", k, unit.attribute, unit.scale, words)
+    kinds["gravity.size_m_per_s2"] = Varied("gravity", gravity, "m/s^2", 1.0, "size of gravity")
+    for d in DIMENSIONS:
+        if d.scale is not None:
+            unit, words = DEG if d.file_key.endswith(DEG.suffix) else MM, f"{d.field.replace('_', ' ')} of the robot"
+            kinds[f"robot.{d.file_key}"] = Varied(f"robot.{d.field}", None, unit.attribute, d.scale, words)
+    for c in material.law.constants:
+        words = f"constant {c.name} of the silicone"
+        kinds[f"material.{c.file_key}"] = Varied(f"material.{c.name}", None, c.unit, c.scale, words)
+    kinds["material.density_kg_m3"] = Varied("material.density", None, "kg/m^3", 1.0, "density of the silicone")
+    for table, names in (
+        ("stiffening", ("elongation", "bending")),
+        ("corrections", ("area", "inertia", "bore_fraction")),
+    ):
+        for name in names:
+            kinds[f"{table}.{name}"] = Varied(
+                f"{table}.{name}", None, "1", 1.0, f"coefficient {name.replace('_', ' ')}"
+            )
+    return kinds
 
 
 def pressure_table(task: WorkspaceTask, chamber_sets: int, given: Array) -> Array:
