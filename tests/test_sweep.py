@@ -58,7 +58,7 @@ def use(monkeypatch: pytest.MonkeyPatch, solver: type[Any]) -> None:
     monkeypatch.setattr("softnlp.sweep.run.ChunkSolver", solver)
     monkeypatch.setattr("softnlp.sweep.pool.ChunkSolver", solver)
     monkeypatch.setattr("softnlp.sweep.pool._solvers", {})
-    monkeypatch.setattr("softnlp.sweep.run.audit", lambda plan, journal: Audit())  # IPOPT would not confirm them
+    monkeypatch.setattr("softnlp.sweep.run.audit", lambda plan, journal, stop: Audit())  # IPOPT would not confirm them
     monkeypatch.setattr(pool, "process_context", lambda: multiprocessing.get_context("fork"))
 
 
