@@ -22,7 +22,7 @@ from softnlp.base import columns
 from softnlp.base.columns import DEG, ONE, OUTPUTS, TABLES, Output, by_key, outputs, written
 from softnlp.results import netcdf_bytes, table_lines, table_text, to_json
 from softnlp.results.dataset import to_dataset
-from softnlp.results.view import view_of_dataset
+from softnlp.results.folder import view_of_dataset
 from softnlp.statics.step import Pose, Run
 
 PACKAGE = Path(softnlp.__file__).parent

@@ -34,7 +34,7 @@ from softnlp.base.errors import InputError
 from softnlp.base.status import Status
 from softnlp.base.units import BAR, DEGREE, MILLIMETRE
 from softnlp.cli import main
-from softnlp.results.csv_table import write_table
+from softnlp.results.table import write_table
 from softnlp.scenario.compare import Asked, compare_task
 from softnlp.studies.variants import every_variant, labels
 

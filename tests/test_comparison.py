@@ -16,11 +16,11 @@ from softnlp.base.statistics import groups, statistics
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.cli import main
 from softnlp.figures import comparison_figure
-from softnlp.sweep.again import model_of
 from softnlp.sweep.comparison import (
     compare_measured,
     compare_workspaces,
     comparison_rows,
+    model_of,
 )
 from softnlp.sweep.measured import load_measured
 from softnlp.sweep.read import Workspace, column_names, load_workspace, read_column

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from softnlp.base.errors import InputError
 from softnlp.base.units import DEGREE
-from softnlp.figures.dexterity import dexterity_figure
+from softnlp.figures.workspace import dexterity_figure
 from softnlp.sweep.dexterity import dexterity, nearest_direction, seen_along, spread_directions
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -15,8 +15,8 @@ from softnlp.figures.body import Camera, side_camera
 from softnlp.figures.run import run_figure
 from softnlp.model.gravity import DIRECTIONS, gravity_lines, gravity_named, gravity_words, is_hanging
 from softnlp.results import to_dataset, to_json
-from softnlp.results.terminal import table_lines
-from softnlp.results.view import view_of_run
+from softnlp.results.folder import view_of_run
+from softnlp.results.table import table_lines
 
 G = 9.80665
 STANDING, HANGING = "standing, gravity towards the base (-z)", "hanging, gravity away from the base (+z)"

@@ -56,8 +56,8 @@ def no_solving(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def use(monkeypatch: pytest.MonkeyPatch, solver: type[Any]) -> None:
     monkeypatch.setattr("softnlp.sweep.run.ChunkSolver", solver)
-    monkeypatch.setattr("softnlp.sweep.worker.ChunkSolver", solver)
-    monkeypatch.setattr("softnlp.sweep.worker._solvers", {})
+    monkeypatch.setattr("softnlp.sweep.pool.ChunkSolver", solver)
+    monkeypatch.setattr("softnlp.sweep.pool._solvers", {})
     monkeypatch.setattr("softnlp.sweep.run.audit", lambda plan, journal, stop: Audit())  # IPOPT would not confirm them
     monkeypatch.setattr(pool, "process_context", lambda: multiprocessing.get_context("fork"))
 

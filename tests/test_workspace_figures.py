@@ -15,7 +15,7 @@ from matplotlib.text import Text
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, DEGREE, MILLIMETRE
 from softnlp.figures import workspace_figure
-from softnlp.figures.cloud import VIEWS, mark_size, outline, seen
+from softnlp.figures.space import VIEWS, mark_size, outline, seen
 from softnlp.sweep.boundary import Extent
 from softnlp.sweep.read import Workspace, load_workspace
 from softnlp.sweep.summary import parameters, summarise
@@ -115,9 +115,9 @@ def test_a_large_cloud_is_thinned_by_what_is_nearest(space: Workspace) -> None:
 
 
 def test_a_thinned_figure_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("softnlp.figures.cloud.MOST_SHOWN", 150)
-    monkeypatch.setattr("softnlp.figures.cloud.shown.__defaults__", (150,))
-    monkeypatch.setattr("softnlp.figures.cloud.seen.__defaults__", (150,))
+    monkeypatch.setattr("softnlp.figures.space.MOST_SHOWN", 150)
+    monkeypatch.setattr("softnlp.figures.space.shown.__defaults__", (150,))
+    monkeypatch.setattr("softnlp.figures.space.seen.__defaults__", (150,))
     figure = workspace_figure(load_workspace(write_workspace(tmp_path, grid(7))))
     counts = [len(cloud.get_array()) for cloud in labelled(figure, "poses")]
     assert max(counts) <= 150

@@ -26,7 +26,7 @@ from softnlp.model.robot import ROBOTS, check
 from softnlp.scenario.planning import plan_of
 from softnlp.scenario.workspace import MOST_POSES
 from softnlp.sweep.manufacture import check_many
-from softnlp.sweep.table import unit_samples
+from softnlp.sweep.task import unit_samples
 
 SEQUENCE = "[pressure]\nsequence_bar = [[0.1, 0.0, 0.0], [0.0, 0.2, 0.0], [0.3, 0.3, 0.0], [0.1, 0.0, 0.0]]\n"
 

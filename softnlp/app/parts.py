@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from math import isfinite
 from typing import Any, TypeVar
@@ -14,6 +12,7 @@ from softnlp.app.job import Progress, Stopped, in_background
 from softnlp.app.session import LARGEST_FILE
 from softnlp.app.theme import darkness, figure_config, figure_layout, figure_text, on_dark
 from softnlp.base.errors import InputError, SoftnlpError
+from softnlp.results import document
 
 T = TypeVar("T")
 
@@ -119,12 +118,7 @@ def number_text(value: Any, digits: int = 5) -> str:
 
 def csv_text(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     """Return rows as CSV, numbers in full, empty where there is none."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    for row in rows:
-        writer.writerow(["" if v is None or v != v else v for v in row])
-    return text.getvalue()
+    return document.csv_text(header, ([None if v != v else v for v in row] for row in rows))
 
 
 class NumberTable:

@@ -32,7 +32,18 @@ _MOVED = (
 )
 _RENAMED = {
     "columns": "base.csv_columns",
+    "mesh.export": "figures.mesh.solid",
+    "plots.abscissa": "figures.series",
+    "plots.blocked": "figures.run",
+    "plots.boxes": "figures.compare_parts",
+    "plots.cloud": "figures.space",
+    "plots.compare_tips": "figures.compare",
+    "plots.dexterity": "figures.workspace",
+    "plots.inverse": "figures.run",
+    "results.csv_table": "results.table",
     "results.targets": "studies.fields",
+    "results.terminal": "results.table",
+    "results.view": "results.folder",
     "runner": "scenario.run",
     "runner_blocked": "scenario.run_blocked",
     "runner_compare": "scenario.compare",
@@ -49,6 +60,11 @@ _RENAMED = {
     "scenario_workspace": "scenario.workspace",
     "studies.implicit": "nlp.directions",
     "studies.statics": "statics.solver",
+    "workspace.again": "sweep.comparison",
+    "workspace.export": "sweep.read",
+    "workspace.sink": "sweep.dataset",
+    "workspace.table": "sweep.task",
+    "workspace.worker": "sweep.pool",
 }
 _FOLDERS = {"workspace": "sweep", "plots": "figures", "mesh": "figures.mesh", "evaluation": "studies"}
 # Names that left a module which is still there.

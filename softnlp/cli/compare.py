@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json as json_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
 from softnlp.cli.figures import draw
@@ -58,7 +57,7 @@ def compare(
     """
     from softnlp.cli.folder import require_writable
     from softnlp.results.comparison import comparison_document, require_free_names
-    from softnlp.results.identify_document import document_text
+    from softnlp.results.document import document_text
     from softnlp.scenario.compare import Asked, compare_task
     from softnlp.scenario.read import load_scenario
 
@@ -69,7 +68,7 @@ def compare(
         require_writable(folder)
         require_free_names(task)
     found = _compared(task)
-    document = document_text(comparison_document(task, found))
+    document = document_text(comparison_document(task, found), compact=False)
     if folder is not None:
         _write(folder, task, found, document)
     if json:
@@ -152,20 +151,15 @@ def _complain_of_lost(found: Comparison) -> None:
 
 def _write(folder: Path, task: CompareTask, found: Comparison, document: str) -> None:
     """Write the numbers, each file whole, after all of them are made, and then the figures."""
-    from softnlp.base.files import make_folder, write_whole
     from softnlp.figures.compare import figure_makers
-    from softnlp.model.inputs import versions
     from softnlp.results.comparison import rows_text, summary_text
+    from softnlp.results.folder import write_files
 
-    contents: dict[str, Any] = {
-        "comparison.json": document.encode(),
-        "rows.csv": rows_text(task, found).encode(),
-        "summary.csv": summary_text(found).encode(),
-        "versions.json": (json_module.dumps(versions(), indent=2) + "\n").encode(),
-        "scenario.toml": task.scenario.text.encode(),
-        "measured.csv": task.text.encode(),
+    texts = {
+        "comparison.json": document,
+        "rows.csv": rows_text(task, found),
+        "summary.csv": summary_text(found),
+        "measured.csv": task.text,
     }
-    make_folder(folder)
-    for name, content in contents.items():
-        write_whole(folder / name, content)
+    write_files(folder, texts, task.scenario.text)
     draw({folder / f"{name}.png": figure for name, figure in figure_makers(task, found).items()}, folder)

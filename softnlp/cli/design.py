@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 import os
 import tomllib
 from pathlib import Path
@@ -102,28 +101,20 @@ def _solve(asked: Scenario, workers: int | None) -> tuple[Design, bool]:
 
 def _write(done: Design, folder: Path, asked: Scenario) -> None:
     """Write the numbers, made before the first file is written so that an error leaves no half, and the figure."""
-    from softnlp.base.files import make_folder, write_whole
     from softnlp.figures.design import design_figure
-    from softnlp.model.inputs import versions
     from softnlp.results.design import best_scenario, design_csv, design_json
+    from softnlp.results.folder import write_files
 
     given = tomllib.loads(asked.text)
     if "file" in given["material"]:  # its path counted from the folder of the scenario
         given["material"]["file"] = str((asked.path.parent / given["material"]["file"]).resolve())
-    contents = {
-        "design.json": design_json(done).encode(),
-        "table.csv": design_csv(done).encode(),
-        "versions.json": (json_module.dumps(versions(), indent=2) + "\n").encode(),
-        "scenario.toml": asked.text.encode(),
-    }
+    texts = {"design.json": design_json(done), "table.csv": design_csv(done)}
     best = best_scenario(done, given)
     if best is not None:
-        contents["best.toml"] = best.encode()
-    make_folder(folder)
-    if best is None:  # one of an earlier run would not belong to these results
+        texts["best.toml"] = best
+    else:  # one of an earlier run would not belong to these results
         (folder / "best.toml").unlink(missing_ok=True)
-    for name, content in contents.items():
-        write_whole(folder / name, content)
+    write_files(folder, texts, asked.text)
     draw({folder / "figure.png": lambda: design_figure(done)}, folder)
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json as json_module
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say, say_rows
@@ -66,19 +65,15 @@ def run_study(asked: Scenario, out: Path | None, json: bool) -> int:
 
 
 def _tensile(asked: Scenario, folder: Path | None, json: bool) -> int:
-    from softnlp.results.identify_document import (
-        document_text,
-        material_file_text,
-        tensile_document,
-        tensile_table_text,
-    )
+    from softnlp.results.document import document_text
+    from softnlp.results.identify_document import material_file_text, tensile_document, tensile_table_text
     from softnlp.scenario.run_identify import run_tensile
     from softnlp.studies.identify_task import TensileTask
 
     task = asked.task
     assert isinstance(task, TensileTask)
     fit = run_tensile(asked)
-    document = document_text(tensile_document(asked, task, fit))
+    document = document_text(tensile_document(asked, task, fit), compact=False)
     if folder is not None:
         from softnlp.figures import tensile_figure
 
@@ -128,7 +123,8 @@ def _say_tensile(task: TensileTask, fit: TensileFit) -> None:
 
 def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
     from softnlp.base.status import Status
-    from softnlp.results.identify_document import document_text, identified_text, robot_document, robot_table_text
+    from softnlp.results.document import document_text
+    from softnlp.results.identify_document import identified_text, robot_document, robot_table_text
     from softnlp.studies.identify_task import RobotTask
 
     task = asked.task
@@ -139,7 +135,7 @@ def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
         complain("stopped; an identification that is not finished leaves no constants")
         return STOPPED
     solved = found.status is Status.SOLVED
-    document = document_text(robot_document(asked, task, found))
+    document = document_text(robot_document(asked, task, found), compact=False)
     if folder is not None:
         texts = {"identified.json": document, "table.csv": robot_table_text(task, found)}
         figure = None
@@ -226,14 +222,8 @@ def _sigma_text(found: Identified, key: str) -> str:
 
 def _write(folder: Path, asked: Scenario, texts: Mapping[str, str], figure: Callable[[], Figure] | None) -> None:
     """Write the numbers, each file whole, after all of them are made, and then the figure."""
-    from softnlp.base.files import make_folder, write_whole
-    from softnlp.model.inputs import versions
+    from softnlp.results.folder import write_files
 
-    contents: dict[str, Any] = {name: text.encode() for name, text in texts.items()}
-    contents["versions.json"] = (json_module.dumps(versions(), indent=2) + "\n").encode()
-    contents["scenario.toml"] = asked.text.encode()
-    make_folder(folder)
-    for name, content in contents.items():
-        write_whole(folder / name, content)
+    write_files(folder, texts, asked.text)
     if figure is not None:
         draw({folder / "figure.png": figure}, folder)

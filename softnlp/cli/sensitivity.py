@@ -47,7 +47,8 @@ def sensitivity(
     json
         Print one JSON document and nothing else; no files are written unless --out is given.
     """
-    from softnlp.results.sensitivity import document_text, sensitivity_document, table_rows
+    from softnlp.results.document import document_text
+    from softnlp.results.sensitivity import sensitivity_document, table_rows
     from softnlp.scenario.read import load_scenario
     from softnlp.studies.report import named_tolerances, sensitivity_report
 

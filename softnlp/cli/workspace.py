@@ -68,10 +68,8 @@ def workspace(
         Write all poses to this CSV file as well.
     """
     from softnlp.figures.comparison import comparison_figure
-    from softnlp.figures.dexterity import dexterity_figure
-    from softnlp.figures.workspace import workspace_figure
-    from softnlp.sweep.export import export_csv
-    from softnlp.sweep.read import load_workspace, read_column
+    from softnlp.figures.workspace import dexterity_figure, workspace_figure
+    from softnlp.sweep.read import export_csv, load_workspace, read_column
     from softnlp.sweep.summary import summarise
 
     for key, value in (("--voxel-mm", voxel_mm), ("--radius-mm", radius_mm)):

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.figures.mesh.rings import circle, placed
-from softnlp.figures.style import GREY, INK, PALE, SMALL, TEXT, colour, step_colours
+from softnlp.figures.space import axes_3d, draw_faces, draw_lines, plain_3d
+from softnlp.figures.style import GREY, INK, SMALL, TEXT, colour, step_colours
 from softnlp.model.gravity import gravity_lines, is_hanging
 from softnlp.results import Body, RunView
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 BODY_FACETS, CHAMBER_FACETS, GHOST_FACETS = 32, 10, 24
 BODY_STATIONS, GHOST_STATIONS = 25, 13
@@ -103,8 +103,6 @@ def view_camera(view: RunView) -> Camera:
 
 def body_panel(figure: Figure, centre: tuple[float, float], view: RunView) -> Any:
     """Draw the 3-D panel of a run about a point of the figure [inch] and return its axes."""
-    from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
-
     camera = view_camera(view)
     axes, reach = base_axes(figure, centre, view, camera)
     solved = view.solved
@@ -115,15 +113,11 @@ def body_panel(figure: Figure, centre: tuple[float, float], view: RunView) -> An
         assert body is not None
         quads, normals = tube(body, body.radii.outer, (0, 0), GHOST_FACETS, GHOST_STATIONS)
         pale = shaded(normals, GHOST_TINT * shades[k][:3] + (1 - GHOST_TINT), light, contrast=0.06)
-        axes.add_collection3d(
-            Poly3DCollection(quads, facecolors=pale, edgecolors=pale, linewidths=0.4, zorder=2, label="earlier step")
-        )
+        draw_faces(axes, quads, pale, zorder=2, label="earlier step")
         reach.append(quads.reshape(-1, 3))
     if solved:
         lines = [b.position / MILLIMETRE for b in view.bodies if b is not None]
-        axes.add_collection3d(
-            Line3DCollection(lines, colors=shades[list(solved)], linewidths=1.4, zorder=3, label="axes of the steps")
-        )
+        draw_lines(axes, lines, 1.4, colors=shades[list(solved)], zorder=3, label="axes of the steps")
         reach += lines
         reach += draw_cut_open(axes, view, solved[-1], camera.eye, light)
         reach += draw_loads(axes, view, lines[-1][-1], np.vstack(reach), camera)
@@ -136,21 +130,15 @@ def base_axes(figure: Figure, centre: tuple[float, float], view: RunView, camera
 
     Gravity, where there is some, is said in words beneath.
     """
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
     width, height = figure.get_size_inches()
     left, bottom = centre[0] - _CANVAS / 2, centre[1] - _CANVAS / 2
     box = (left / width, bottom / height, _CANVAS / width, _CANVAS / height)
-    axes: Any = figure.add_axes(box, projection="3d", computed_zorder=False)
-    axes.patch.set_visible(False)
+    axes = axes_3d(figure, box)
     camera.aim(axes)
     for line in gravity_lines(view.loads.gravity):
         figure.text(0.018, 0.053, line, size=SMALL, color=GREY)
-    axes.set_proj_type("ortho")
     plate = disc(0.75 * view.robot.outer_diameter / MILLIMETRE, 40, 0.0)
-    axes.add_collection3d(
-        Poly3DCollection(plate, facecolors="#EEEEEE", edgecolors=GREY, linewidths=0.6, zorder=1, label="base")
-    )
+    draw_faces(axes, plate, "#EEEEEE", GREY, 0.6, zorder=1, label="base")
     return axes, [plate.reshape(-1, 3), np.array([[0.0, 0.0, view.robot.length / MILLIMETRE]])]
 
 
@@ -168,7 +156,6 @@ def draw_cut_open(axes: Any, view: RunView, k: int, eye: Array, light: Array, *,
     Chambers without pressure are pale.
     """
     from matplotlib.colors import to_rgb
-    from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
     body, robot = view.bodies[k], view.robot
     assert body is not None
@@ -188,12 +175,7 @@ def draw_cut_open(axes: Any, view: RunView, k: int, eye: Array, light: Array, *,
     quads.append(edges)
     colours.append(np.tile(to_rgb(GREY), (len(edges), 1)))
     # One collection, so that all is sorted by depth together; edges of the face's colour close the seams.
-    faces = np.concatenate(colours)
-    axes.add_collection3d(
-        Poly3DCollection(
-            np.concatenate(quads), facecolors=faces, edgecolors=faces, linewidths=0.6, zorder=4, label="last step"
-        )
-    )
+    draw_faces(axes, np.concatenate(quads), np.concatenate(colours), width=0.6, zorder=4, label="last step")
     rim = skin.reshape(-1, BODY_FACETS, 4, 3)[-1, :, 1]
     axes.plot(*np.vstack([rim, rim[:1]]).T, color=GREY, linewidth=0.8, zorder=5, label="tip rim")
 
@@ -202,7 +184,7 @@ def draw_cut_open(axes: Any, view: RunView, k: int, eye: Array, light: Array, *,
     tip, R = body.position[-1] / MILLIMETRE, body.rotation[-1]
     size = 0.2 * robot.length / MILLIMETRE
     arms = [(tip, tip + size * R[:, j]) for j in range(3)]
-    axes.add_collection3d(Line3DCollection(arms, colors=GREY, linewidths=1.2, zorder=6, label="tip frame"))
+    draw_lines(axes, arms, 1.2, colors=GREY, zorder=6, label="tip frame")
     for (_, end), name in zip(arms, "xyz", strict=True):
         axes.text(*(tip + 1.35 * (end - tip)), name, size=SMALL, color=GREY, ha="center", va="center", zorder=7)
     return [skin.reshape(-1, 3), np.array([tip + 1.4 * size * R[:, j] for j in range(3)])]
@@ -266,7 +248,6 @@ def draw_arrow(
 ) -> list[Array]:
     """Draw an arrow [mm], its head flat towards the viewer and its text beyond one end; return points it reaches."""
     from matplotlib.patheffects import withStroke
-    from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
     eye, right = camera.eye, camera.right
     size = float(np.linalg.norm(step))
@@ -274,7 +255,7 @@ def draw_arrow(
     across = 0.4 * across / np.linalg.norm(across) if np.linalg.norm(across) > 0.1 * size else 0.4 * right
     tail, side = start + 0.74 * step, 0.28 * size * across
     lines = [(start, start + step), (tail + side, start + step), (tail - side, start + step)]
-    axes.add_collection3d(Line3DCollection(lines, colors=ink, linewidths=1.6, zorder=6, label=label))
+    draw_lines(axes, lines, 1.6, colors=ink, zorder=6, label=label)
     sideways = float(step @ right) / size * (-1 if at_tail else 1)
     place, away = ("center", 0.22) if abs(sideways) < 0.4 else ("left" if sideways > 0 else "right", 0.05)
     end = start - away * step if at_tail else start + (1 + away) * step
@@ -290,18 +271,12 @@ def frame(axes: Any, points: Array) -> None:
     low, high = low - 0.03 * widest, high + 0.03 * widest
     decade = 10.0 ** np.floor(np.log10(widest / 6))
     distance = next(d for d in decade * np.array([1.0, 2.0, 5.0, 10.0]) if d >= widest / 6)
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    axes.set_zlim(low[2], high[2])
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     _fit(axes, high - low)
-    for k, (axis, name) in enumerate(((axes.xaxis, "x"), (axes.yaxis, "y"), (axes.zaxis, "z"))):
+    for k, axis in enumerate(plain_3d(axes)):
         # No tick next to a corner, where the labels of two axes would meet.
         first, last = np.ceil((low[k] + 0.07 * widest) / distance), np.floor((high[k] - 0.07 * widest) / distance)
         axis.set_ticks(distance * np.arange(first, last + 1))
-        axis.set_pane_color((1, 1, 1, 0))
-        axis.line.set_color(GREY)
-        axis._axinfo["grid"].update(color=PALE, linewidth=0.6)
-        axis.set_label_text(f"{name} [mm]", size=TEXT, color=INK)
     axes.tick_params(labelsize=SMALL, colors=INK, pad=0)
     # mplot3d scales label distances with the width of the box, so a slender one needs more.
     slender = widest / float((high - low)[:2].max()) - 1

@@ -1,4 +1,4 @@
-"""Figures of a comparison with measurements, as the paper draws them: a figure for each thing measured."""
+"""Figures of a comparison with measurements, as the paper draws them: a figure for each number, and one of tips."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.statistics import USED, groups
-from softnlp.base.units import BAR
+from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.figures.compare_parts import (
     LEGEND_ROW,
     MEASURED,
@@ -20,27 +21,30 @@ from softnlp.figures.compare_parts import (
     bars,
     box_labels,
     boxes,
-    legend,
+    draw_boxes,
+    foot_legend,
     legend_rows,
     looks,
     robot_label,
-    shown_labels,
+    variant_marks,
 )
-from softnlp.figures.compare_tips import tips_figure
-from softnlp.figures.style import GREY, INK, PALE, SMALL, TEXT, in_own_style, new_figure, plain
+from softnlp.figures.space import around, draw_lines, mark_size, space_axes
+from softnlp.figures.style import GREY, INK, PALE, SMALL, TEXT, WRONG, in_own_style, mark, new_figure, plain
 from softnlp.scenario.compare import CompareTask
-from softnlp.studies.comparison import Comparison
+from softnlp.studies.comparison import AXES, Comparison
 from softnlp.studies.observed import NUMBERS, OBSERVABLES
+from softnlp.sweep.boundary import thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
-
 _WIDTH, _LEFT = 11.0, 6.6  # of the figure, and of its panels of curves [inch]
 _MOST_PANELS, _MOST_LANES = 12, 24
 _FEWEST = 3  # pressures of a curve
+_TIPS_HEIGHT = 6.8  # of the figure of tips, without its legend [inch]
+_MOST_SHOWN = 4_000  # pairs of tips
+_BINS = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,21 +133,10 @@ def observable_figure(found: Comparison, name: str, title: str, times: list[Arra
     start = max(start, right)
     boxes(figure.add_axes((start / _WIDTH, bottom, (_WIDTH - start - 0.15) / _WIDTH, half)), found, name, made)
     lost = any(found.statistics(v, name).count < found.measured(name) for v in range(len(made)))
-    legend(figure, _handles(found, made, curved), legend_columns, "; crosses: no solution" if lost else "")
+    shape: dict[str, Any] = {"marker": "o", "markersize": 5} if curved else {"marker": "|", "markersize": 11}
+    handles = [mark(MEASURED, INK, markerfacecolor="white", markeredgewidth=1.2, **shape), *variant_marks(found, made)]
+    foot_legend(figure, handles, legend_columns, "; crosses: no solution" if lost else "")
     return figure
-
-
-def _handles(found: Comparison, made: list[Look], curved: bool) -> list[Any]:
-    from matplotlib.lines import Line2D
-
-    look: dict[str, Any] = {"marker": "o", "markersize": 5} if curved else {"marker": "|", "markersize": 11}
-    measured = Line2D([], [], color=INK, markerfacecolor="white", markeredgewidth=1.2, linestyle="none", **look)
-    measured.set_label(MEASURED)
-    lines = [
-        Line2D([], [], color=look.colour, linestyle=look.line, linewidth=1.8, label=label)
-        for look, label in zip(made, shown_labels(found), strict=True)
-    ]
-    return [measured, *lines]
 
 
 # --- curves -----------------------------------------------------------------------------------------------------------
@@ -219,18 +212,8 @@ def _curve_panel(axes: Axes, found: Comparison, name: str, panel: _Panel, made: 
             foot = axes.get_xaxis_transform()
             places = panel.x[~known]
             axes.plot(places, [0.03] * len(places), "x", color=look.colour, markersize=4, transform=foot, zorder=3)
-    axes.plot(
-        panel.x,
-        measured,
-        linestyle="none",
-        marker="o",
-        color=INK,
-        markerfacecolor="white",
-        markersize=2.5 if many else 4.6,
-        markeredgewidth=0.9,
-        zorder=3,
-        label=MEASURED,
-    )
+    dot: dict[str, Any] = {"markerfacecolor": "white", "markersize": 2.5 if many else 4.6, "markeredgewidth": 0.9}
+    axes.plot(panel.x, measured, "o", color=INK, zorder=3, label=MEASURED, **dot)
     axes.margins(x=0.04)
     if panel.label.startswith("pressure"):
         axes.set_xlim(left=-0.03 * float(panel.x.max()))
@@ -278,3 +261,95 @@ def _pressed(pressure: Array) -> str:
     if np.ptp(used) > USED:
         return " / ".join(f"{P / BAR:.3g}" for P in pressure) + " bar"
     return f"{words} at {used[0] / BAR:.3g} bar"
+
+
+# --- tips -------------------------------------------------------------------------------------------------------------
+
+
+@in_own_style
+def tips_figure(found: Comparison, title: str) -> Figure:
+    """Draw measured and simulated tips, and how far they are apart.
+
+    Left, the tips in 3-D: measured ones hollow, simulated ones of the best variant filled, each pair joined by a line.
+    Right, the errors of every variant by axis and as a distance (boxes), and a histogram of the distances.
+    """
+    best = found.best_of("tip_position")
+    parts = [", ".join(o.label for o in found.observed[:4]), found.variants[0].material.name]
+    parts.append(f"{found.measured('tip_position'):,} tips")
+    if best is not None:
+        s = found.statistics(best, "tip_position")
+        least = f"{found.labels[best]}: " if len(found.variants) > 1 else ""
+        parts.append(f"{least}mean {s.mean / MILLIMETRE:.3g} mm, {s.mape:.3g} % of the length")
+    columns, lines = legend_rows(found, _WIDTH)
+    foot = 0.12 + LEGEND_ROW * lines
+    height = _TIPS_HEIGHT + LEGEND_ROW * lines
+    figure = new_figure(_WIDTH, height, f"{title}: tip position", "  ·  ".join(parts))
+    if best is None:
+        figure.text(0.5, 0.5, "No row has a solution", size=TEXT, color=WRONG, ha="center")
+        return figure
+    made = looks(found)
+    bottom, top = (foot + 0.5) / height, 1 - 0.75 / height
+    _clouds(figure, found, best, made[best], (-0.01, foot / height, 0.54, top - foot / height + 0.02))
+    half = (top - bottom - 0.7 / height) / 2
+    _axis_boxes(figure.add_axes((0.62, top - half, 0.37, half)), found, made)
+    _histogram(figure.add_axes((0.62, bottom, 0.37, half)), found, made)
+    handles = [mark(MEASURED, INK, "o", markerfacecolor="white", markersize=5), *variant_marks(found, made)]
+    handles[1 + best].set(marker="o", markersize=4)
+    foot_legend(figure, handles, columns, "; thin lines: mean distances")
+    return figure
+
+
+def _clouds(figure: Figure, found: Comparison, v: int, look: Look, place: tuple[float, float, float, float]) -> None:
+    """Draw pairs of tips in 3-D."""
+    measured = np.concatenate([o.values[:, :3] for o in found.observed]) / MILLIMETRE
+    simulated = np.concatenate([s.values[:, :3] for s in found.simulated[v]]) / MILLIMETRE
+    both = np.isfinite(measured).all(axis=1) & np.isfinite(simulated).all(axis=1)
+    measured, simulated = measured[both], simulated[both]
+    k = thinned(measured, _MOST_SHOWN)
+    measured, simulated = measured[k], simulated[k]
+    axes = space_axes(figure, place, around(np.vstack([measured, simulated])))
+    draw_lines(axes, np.stack([measured, simulated], axis=1), 0.6, colors=GREY, zorder=1, label="pairs")
+    size = max(mark_size(len(k), 9_000), 4.0)
+    plot: dict[str, Any] = {"s": size, "depthshade": False, "rasterized": True}
+    axes.scatter(*simulated.T, color=look.colour, linewidths=0, zorder=3, label=found.labels[v], **plot)
+    axes.scatter(*measured.T, facecolors="none", edgecolors=INK, linewidths=0.8, zorder=3, label=MEASURED, **plot)
+
+
+def _axis_boxes(axes: Axes, found: Comparison, made: list[Look]) -> None:
+    """Draw the errors along each axis and the distance, a box a variant."""
+    plain(axes, "", "simulated - measured [mm]")
+    width = 0.8 / len(made)
+    names = (*AXES, "tip_position")
+    values, faces, hatches, places = [], [], [], []
+    for g, name in enumerate(names):
+        for v, look in enumerate(made):
+            values.append(found.errors(v, name)[0] / MILLIMETRE)
+            faces.append(look.colour)
+            hatches.append(look.hatch)
+            places.append(g + (v - (len(made) - 1) / 2) * width)
+    axes.axhline(0, color=GREY, linewidth=0.8, zorder=1)
+    draw_boxes(
+        axes, values, faces, hatches=hatches, positions=places, width=0.85 * width, mean=len(made) <= 3, upright=True
+    )
+    axes.set_xticks(range(len(names)), ["x", "y", "z", "distance"])
+    axes.tick_params(axis="x", length=0, labelsize=TEXT)
+    axes.grid(False, axis="x")
+    axes.set_xlim(-0.55, len(names) - 0.45)
+
+
+def _histogram(axes: Axes, found: Comparison, made: list[Look]) -> None:
+    """Draw how many tips are how far apart."""
+    distances = [found.errors(v, "tip_position")[0] / MILLIMETRE for v in range(len(made))]
+    highest = max((float(d.max()) for d in distances if d.size), default=0.0) or 1.0
+    edges = np.linspace(0.0, highest, _BINS + 1)
+    plain(axes, OBSERVABLES["tip_position"].axis, "tips")
+    for d, look, label in zip(distances, made, found.labels, strict=True):
+        counts, _ = np.histogram(d, edges)
+        axes.stairs(counts, edges, color=look.colour, linestyle=look.line, linewidth=1.6, label=label)
+        if len(made) == 1:
+            axes.stairs(counts, edges, color=look.colour, alpha=0.25, fill=True)
+        if d.size:
+            axes.axvline(float(np.mean(d)), color=look.colour, linestyle=look.line, linewidth=0.9, alpha=0.8)
+    axes.set_xlim(0.0, highest)
+    axes.set_ylim(bottom=0)
+    axes.tick_params(labelsize=SMALL)

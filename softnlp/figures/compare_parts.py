@@ -8,10 +8,9 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softnlp.figures.boxes import draw_boxes
-from softnlp.figures.style import COLOURS, GREY, INK, SMALL, WRONG, colour, plain, user_text
+from softnlp.base.arrays import Array
+from softnlp.figures.style import COLOURS, GREY, INK, SMALL, WRONG, colour, legend, mark, plain, user_text
 from softnlp.studies.comparison import Comparison
 from softnlp.studies.observed import OBSERVABLES
 
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 _LINES: tuple[Any, ...] = ("-", "--", ":", (0, (6, 1, 1, 1)), (0, (1, 1)), (0, (8, 2, 2, 2)))
 _HATCHES = ("", "////", "....", "xxxx", "----", "\\\\\\\\")
@@ -71,22 +69,21 @@ def legend_rows(found: Comparison, width: float) -> tuple[int, int]:
     return columns, -(-(len(found.labels) + 1) // columns)
 
 
-def legend(figure: Figure, handles: Sequence[Any], columns: int, more: str = "") -> None:
+def variant_marks(found: Comparison, made: Sequence[Look]) -> list[Any]:
+    """Return what stands in a legend for each variant."""
+    return [
+        mark(label, look.colour, line=look.line, linewidth=1.8)
+        for look, label in zip(made, shown_labels(found), strict=True)
+    ]
+
+
+def foot_legend(figure: Figure, handles: Sequence[Any], columns: int, more: str = "") -> None:
     """Put the legend at the foot of a figure, and beside it what the marks of all of them mean."""
     note: dict[str, Any] = {"size": SMALL, "color": GREY, "ha": "right"}
     figure.text(1 - 0.15 / figure.get_figwidth(), 0.1 / figure.get_figheight(), _NOTE + more, **note)
-    figure.legend(
-        handles=list(handles),
-        loc="lower left",
-        bbox_to_anchor=(0.1 / figure.get_figwidth(), 0.04 / figure.get_figheight()),
-        ncols=columns,
-        fontsize=SMALL,
-        frameon=False,
-        labelcolor=INK,
-        handlelength=2.6,
-        borderaxespad=0.0,
-        columnspacing=1.4,
-    )
+    place = (0.1 / figure.get_figwidth(), 0.04 / figure.get_figheight())
+    look: dict[str, Any] = {"handlelength": 2.6, "borderaxespad": 0.0, "columnspacing": 1.4}
+    legend(figure, handles, loc="lower left", bbox_to_anchor=place, ncols=columns, **look)
 
 
 def bars(axes: Axes, found: Comparison, name: str, made: Sequence[Look]) -> None:
@@ -95,19 +92,11 @@ def bars(axes: Axes, found: Comparison, name: str, made: Sequence[Look]) -> None
     robots = [k for k in range(len(found.observed)) if found.measured(name, k)]
     plain(axes, "", f"mean error [{what.unit}]")
     width = min(0.82 / len(made), _WIDEST_BAR)
-    for v, look in enumerate(made):
+    for v, v_look in enumerate(made):
         means = np.array([found.statistics(v, name, k).mean for k in robots]) / what.scale
         places = np.arange(len(robots)) + (v - (len(made) - 1) / 2) * width
-        axes.bar(
-            places,
-            means,
-            0.92 * width,
-            color=look.colour,
-            hatch=look.hatch,
-            edgecolor="white",
-            linewidth=0.3,
-            label=found.labels[v],
-        )
+        look: dict[str, Any] = {"color": v_look.colour, "hatch": v_look.hatch, "edgecolor": "white", "linewidth": 0.3}
+        axes.bar(places, means, 0.92 * width, label=found.labels[v], **look)
         if (lost := ~np.isfinite(means)).any():
             foot = axes.get_xaxis_transform()
             axes.plot(places[lost], [0.025] * int(lost.sum()), "x", color=WRONG, markersize=4, transform=foot)
@@ -139,3 +128,37 @@ def boxes(axes: Axes, found: Comparison, name: str, made: Sequence[Look]) -> Non
     axes.tick_params(axis="y", length=0)
     axes.tick_params(labelsize=SMALL if len(made) <= 12 else SMALL - 1.5)
     axes.grid(False, axis="y")
+
+
+def draw_boxes(
+    axes: Axes,
+    values: Sequence[Array],
+    faces: Sequence[str],
+    *,
+    hatches: Sequence[str] | None = None,
+    positions: Sequence[float] | None = None,
+    width: float = 0.6,
+    mean: bool = False,
+    upright: bool = False,
+) -> None:
+    """Draw a box for each array of values, 1, 2, … from below or at positions; `mean` adds diamonds.
+
+    Boxes are quartiles with the median, whiskers reach the last value within 1.5 times their height, dots lie beyond.
+    """
+    drawn: dict[str, Any] = axes.boxplot(
+        list(values),
+        orientation="vertical" if upright else "horizontal",
+        positions=positions,
+        widths=width,
+        showmeans=mean,
+        patch_artist=True,
+        medianprops={"color": INK, "linewidth": 1.5},
+        whiskerprops={"color": GREY},
+        capprops={"color": GREY},
+        meanprops={"marker": "D", "markerfacecolor": "white", "markeredgecolor": INK, "markersize": 4},
+        flierprops={"marker": ".", "markersize": 3, "markeredgecolor": GREY, "rasterized": True},
+    )
+    for k, (box, face) in enumerate(zip(drawn["boxes"], faces, strict=True)):
+        box.set(facecolor=face, edgecolor=GREY, alpha=0.75)
+        if hatches is not None and hatches[k]:
+            box.set(hatch=hatches[k])

@@ -6,14 +6,13 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.statistics import groups, statistics
 from softnlp.base.units import MILLIMETRE
-from softnlp.figures.boxes import draw_boxes
-from softnlp.figures.cloud import mark_size
-from softnlp.figures.space import around, space_axes
+from softnlp.figures.compare_parts import draw_boxes
+from softnlp.figures.space import around, colour_bar, draw_cloud, space_axes
 from softnlp.figures.style import GREY, INK, SMALL, TEXT, colour, in_own_style, new_figure, plain
 from softnlp.model.gravity import gravity_lines, is_hanging
 from softnlp.studies.observed import OBSERVABLES
@@ -25,13 +24,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
-
 _MAP = "cividis_r"
 _MOST_LINES, _MOST_POINTS = 2_000, 20_000
 _WIDTH, _HEIGHT = 11.0, 7.2
 _ALL = "all"
-
 
 BENDING, DISTANCE = OUTPUTS["bending_angle"], OBSERVABLES["tip_position"]
 
@@ -85,7 +81,6 @@ def _norm(comparison: Comparison) -> Any:
 
 def _tips(figure: Figure, comparison: Comparison, norm: Any, *, hanging: bool) -> int:
     """Draw pairs of tips in 3-D, upside down where the robot hangs; return how many."""
-    from matplotlib.cm import ScalarMappable
     from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
     k = thinned(comparison.other, _MOST_LINES)
@@ -96,24 +91,8 @@ def _tips(figure: Figure, comparison: Comparison, norm: Any, *, hanging: bool) -
     lines.set_array(distance)
     lines.set_label("pairs")
     axes.add_collection3d(lines)
-    axes.scatter(
-        *other.T,
-        c=distance,
-        s=mark_size(len(k), 50_000),
-        cmap=_MAP,
-        norm=norm,
-        depthshade=False,
-        linewidths=0,
-        rasterized=True,
-        zorder=3,
-        label="other tips",
-    )
-    bar = figure.colorbar(
-        ScalarMappable(norm, _MAP), cax=figure.add_axes((0.05, 0.86, 0.36, 0.018)), orientation="horizontal"
-    )
-    bar.outline.set_visible(False)
-    bar.ax.tick_params(labelsize=SMALL, colors=INK, color=GREY)
-    bar.set_label(DISTANCE.axis, size=TEXT, color=INK)
+    draw_cloud(axes, other, distance, norm, _MAP, 50_000, "other tips")
+    colour_bar(figure, (0.05, 0.86, 0.36, 0.018), (norm, _MAP), DISTANCE.axis)
     return len(k)
 
 
@@ -125,18 +104,8 @@ def _errors(axes: Axes, comparison: Comparison, norm: Any, first: int, second: i
     axes.set(xlim=(-half, half), ylim=(-half, half), aspect="equal")
     axes.axhline(0, color=GREY, linewidth=0.8)
     axes.axvline(0, color=GREY, linewidth=0.8)
-    axes.scatter(
-        error[k, first],
-        error[k, second],
-        c=comparison.distance[k] / MILLIMETRE,
-        s=mark_size(len(k), 15_000),
-        cmap=_MAP,
-        norm=norm,
-        linewidths=0,
-        rasterized=True,
-        zorder=2,
-        label="errors",
-    )
+    distance = comparison.distance[k] / MILLIMETRE
+    draw_cloud(axes, error[k][:, [first, second]], distance, norm, _MAP, 15_000, "errors")
     mean = error.mean(axis=0)
     axes.plot(mean[first], mean[second], "+", color=colour(1), markersize=11, markeredgewidth=2, label="mean")
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.units import KILOPASCAL
-from softnlp.figures.style import GREY, INK, PALE, SMALL, TEXT, colour, in_own_style, new_figure, plain, user_text
+from softnlp.figures.style import GREY, INK, PALE, TEXT, colour, in_own_style, legend, new_figure, plain, user_text
 from softnlp.studies.measurements import OBSERVABLES, column_slice
 
 if TYPE_CHECKING:
@@ -54,18 +53,13 @@ def tensile_figure(fit: TensileFit, name: str, before: Any = None) -> Figure:
             user_text(f.law.name),
             f"R² = {f.r_squared:.5f}",
             *([f.status] if f.material is None else ()),
-            *_unsure(f.notes),
+            *(f"{name} {note}" for name, note in f.notes.items() if note),  # on constants
         )
         left.plot(stretch, f.stress(stretch) / KILOPASCAL, label=", ".join(words), **look)
         right.plot(fit.stretch[order], (f.stress(fit.stretch) - fit.stress)[order] / KILOPASCAL, **look)
     right.axhline(0.0, color=GREY, linewidth=0.8, zorder=1)
-    left.legend(fontsize=SMALL, frameon=False, labelcolor=INK)
+    legend(left)
     return figure
-
-
-def _unsure(notes: Mapping[str, str]) -> list[str]:
-    """Return a legend's words on the constants that have a note."""
-    return [f"{name} {note}" for name, note in notes.items() if note]
 
 
 @in_own_style
@@ -102,5 +96,5 @@ def identified_figure(found: Identified, title: str) -> Figure:
             f"rmse {before.rmse / unit:.3g} before (grey), {after.rmse / unit:.3g} after", size=TEXT, color=INK
         )
         if k == named:
-            axes.legend(fontsize=SMALL, frameon=False, labelcolor=INK)
+            legend(axes)
     return figure

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softnlp.base.errors import InputError
-from softnlp.figures.style import GREY, INK, SMALL, colour, in_own_style, new_figure, plain, user_text
+from softnlp.base.units import KILOPASCAL
+from softnlp.figures.style import GREY, INK, colour, in_own_style, legend, mark, new_figure, plain, user_text
 from softnlp.model.materials import Material
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-KILOPASCAL = 1e3
 POINTS = 241
 LINE_STYLES = {
     "mooney-rivlin": "-",
@@ -68,14 +68,8 @@ def material_figure(materials: Sequence[Material], stretch_range: tuple[float, f
         inside = []
         for material in materials:
             values = getattr(material, method)(stretch) / KILOPASCAL
-            axes.plot(
-                stretch,
-                values,
-                color=colour(names.index(material.name)),
-                linestyle=styles[material.law.name],
-                linewidth=1.5,
-                label=f"{material.name}, {material.law.name}",
-            )
+            look: dict[str, Any] = {"color": colour(names.index(material.name)), "linestyle": styles[material.law.name]}
+            axes.plot(stretch, values, linewidth=1.5, label=f"{material.name}, {material.law.name}", **look)
             within = (stretch >= material.fitted_stretch[0]) & (stretch <= material.fitted_stretch[1])
             inside.append(values[within] if within.any() else values)
         reached = np.concatenate(inside)
@@ -97,17 +91,9 @@ def line_styles(materials: Sequence[Material]) -> dict[str, Any]:
 
 
 def _legends(figure: Figure, names: list[str], laws: dict[str, Any], top: float) -> None:
-    from matplotlib.lines import Line2D
-
-    colours = [Line2D([], [], color=colour(k), linewidth=3, label=user_text(name)) for k, name in enumerate(names)]
-    styles = [Line2D([], [], color=INK, linestyle=style, label=user_text(law)) for law, style in laws.items()]
-    look: dict[str, Any] = {
-        "loc": "upper left",
-        "fontsize": SMALL,
-        "frameon": False,
-        "labelcolor": INK,
-        "handlelength": 3.2,
-    }
-    figure.legend(handles=colours, ncols=_COLUMNS, bbox_to_anchor=(0.045, top), **look)
+    colours = [mark(user_text(name), colour(k), line="-", linewidth=3) for k, name in enumerate(names)]
+    styles = [mark(user_text(law), INK, line=style) for law, style in laws.items()]
     below = top - _LINE * -(-len(names) // _COLUMNS) / figure.get_figheight()
-    figure.legend(handles=styles, ncols=_COLUMNS, bbox_to_anchor=(0.045, below), **look)
+    for handles, upper in ((colours, top), (styles, below)):
+        place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.045, upper), "ncols": _COLUMNS}
+        legend(figure, handles, handlelength=3.2, **place)

@@ -6,11 +6,11 @@ from collections.abc import Collection, Sequence
 from itertools import permutations
 from math import cos, degrees, hypot, isfinite, pi, radians, sin, sqrt
 from textwrap import wrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from softnlp.base.errors import InputError
 from softnlp.base.units import MILLIMETRE
-from softnlp.figures.style import GREY, INK, SMALL, TEXT, WRONG, colour, in_own_style, ink_on, new_figure
+from softnlp.figures.style import GREY, INK, SMALL, TEXT, WRONG, colour, in_own_style, ink_on, legend, new_figure
 from softnlp.model.robot import Robot, Violation, touching_stretch
 from softnlp.statics.step import SectionRadii
 
@@ -26,6 +26,7 @@ _WINDOW = (-1.25, 2.17, -1.8, 1.25)  # left, right, bottom, top of a drawing, in
 _LEADER_ANGLE = radians(35)  # where the labelled chamber is looked for
 _COLUMN = 1.3  # left edge of the labels beside a drawing, in outer radii
 _LEGEND_COLUMNS = 3  # a drawing
+_ARROW: dict[str, Any] = {"color": INK, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
 _LINE = 0.19  # height of a line of text below the drawings [inch]
 
 
@@ -140,7 +141,7 @@ def _circle(axes: Axes, centre: Point, radius: float, **style: object) -> None:
 
 def _axes_cross(axes: Axes, R: float) -> None:
     """Draw the body axes x and y through the centre; +z points at the reader."""
-    arrow = {"arrowstyle": "-|>", "color": INK, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
+    arrow = {"arrowstyle": "-|>", **_ARROW}
     for x, y, name in ((1.16, 0.0, "x"), (0.0, 1.16, "y")):
         axes.annotate("", (x * R, y * R), (0, 0), arrowprops=arrow, zorder=2.6)
         axes.text(1.05 * x * R, 1.05 * y * R, name, size=TEXT, color=INK, ha="center", va="center")
@@ -154,12 +155,7 @@ def _diameters(axes: Axes, radii: SectionRadii, R: float, made: bool) -> None:
         r, y = radius / MILLIMETRE, -(1.17 + 0.2 * k) * R
         for x in (-r, r):
             axes.plot([x, x], [0, y - 0.04 * R], color=GREY, linewidth=0.5, zorder=2.5)
-        axes.annotate(
-            "",
-            (-r, y),
-            (r, y),
-            arrowprops={"arrowstyle": "<->", "color": INK, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0},
-        )
+        axes.annotate("", (-r, y), (r, y), arrowprops={"arrowstyle": "<->", **_ARROW})
         axes.text(
             0, y, f"${letter}$ {_number(2 * r)}", size=SMALL, color=INK, ha="center", va="center", parse_math=True,
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.2},
@@ -229,10 +225,8 @@ def _legend(figure: Figure, robot: Robot, height: float, columns: int) -> None:
         first, last = k * robot.chambers_per_set + 1, (k + 1) * robot.chambers_per_set
         members = f"chamber {first}" if first == last else f"chambers {first} to {last}"
         handles.append(Patch(color=colour(k), label=f"set {k + 1}: {members}"))
-    figure.legend(
-        handles=handles, loc="upper left", bbox_to_anchor=(0.01, 1 - 0.56 / height), ncols=columns, fontsize=SMALL,
-        frameon=False, labelcolor=INK, handlelength=1.2, columnspacing=1.4,
-    )  # fmt: skip
+    place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (0.01, 1 - 0.56 / height), "ncols": columns}
+    legend(figure, handles, handlelength=1.2, columnspacing=1.4, **place)
 
 
 def _number(value: float) -> str:

@@ -5,11 +5,24 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.figures.body import frame, side_camera, tube
-from softnlp.figures.style import GREY, INK, PALE, SMALL, TEXT, colour, in_own_style, new_figure, plain, user_text
+from softnlp.figures.space import axes_3d, draw_faces
+from softnlp.figures.style import (
+    GREY,
+    INK,
+    PALE,
+    SMALL,
+    TEXT,
+    colour,
+    in_own_style,
+    legend,
+    new_figure,
+    plain,
+    user_text,
+)
 from softnlp.model.gravity import gravity_lines
 from softnlp.results import Body
 from softnlp.results.sensitivity import shown
@@ -20,8 +33,6 @@ from softnlp.studies.report import SensitivityReport
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 _SIZE = 0.3  # largest semi-axis of an ellipsoid drawn, of L_0
 _MOST_BARS = 10
@@ -46,21 +57,15 @@ def sensitivity_figure(report: SensitivityReport, title: str) -> Figure:
 
 def _tip_panel(figure: Figure, report: SensitivityReport) -> None:
     """Draw the body's axis and outline, and the ellipsoids about the tip [mm]."""
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
     pose = report.pose
     assert pose is not None
-    axes: Any = figure.add_axes((0.0, 0.12, 0.52, 0.7), projection="3d", computed_zorder=False)
-    axes.patch.set_visible(False)
+    axes = axes_3d(figure, (0.0, 0.12, 0.52, 0.7))
     gravity = report.loads.gravity
     side_camera(pose.tip_position[:2], 0.02 * report.robot.length, gravity).aim(axes)
     for words in gravity_lines(gravity):
         figure.text(0.018, 0.053, words, size=SMALL, color=GREY)
-    axes.set_proj_type("ortho")
     quads, _ = tube(Body(pose.shape.position, pose.shape.rotation, pose.radii), pose.radii.outer, (0, 0), 24, 16)
-    axes.add_collection3d(
-        Poly3DCollection(quads, facecolors="#F3F1EE", edgecolors=PALE, linewidths=0.3, alpha=0.35, zorder=2)
-    )
+    draw_faces(axes, quads, "#F3F1EE", PALE, 0.3, alpha=0.35, zorder=2)
     line = pose.shape.position / MILLIMETRE
     axes.plot(*line.T, color=GREY, linewidth=1.2, zorder=3)
     reach = [quads.reshape(-1, 3)]
@@ -105,8 +110,7 @@ def _jacobian(axes: Axes, report: SensitivityReport) -> None:
         axes.bar(place, J[:, k], width, color=colour(k), label=f"set {k + 1}")
     axes.axhline(0, color=GREY, linewidth=0.8)
     axes.set_xticks(np.arange(3), ["x", "y", "z"])
-    axes.legend(fontsize=SMALL, frameon=False, labelcolor=INK, ncols=min(sets, 6), loc="lower right",
-                bbox_to_anchor=(1.0, 1.0))  # fmt: skip
+    legend(axes, ncols=min(sets, 6), loc="lower right", bbox_to_anchor=(1.0, 1.0))
 
 
 def _tornado(axes: Axes, report: SensitivityReport) -> None:

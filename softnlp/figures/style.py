@@ -132,6 +132,18 @@ def plain(axes: Axes, x_label: str, y_label: str) -> None:
         axes.spines[side].set_color(GREY)
 
 
+def legend(of: Figure | Axes, handles: Sequence[Any] | None = None, **look: Any) -> None:
+    """Give a figure or a panel a legend without a box, of its own artists where no others are given."""
+    of.legend(handles=handles, **{"fontsize": SMALL, "frameon": False, "labelcolor": INK, **look})
+
+
+def mark(label: str, ink: str, marker: str = "", line: Any = "", **look: Any) -> Any:
+    """Return what stands in a legend for marks or for a line."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], color=ink, marker=marker, linestyle=line, label=label, **look)
+
+
 def listed(words: Sequence[str]) -> str:
     """Return "a", "a and b" or "a, b and c"."""
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -1,20 +1,33 @@
-"""The figure of a workspace: the tips in 3-D and three projections, coloured by a number of the poses."""
+"""Figures of a workspace: its tips in 3-D and three projections, coloured by a number; and maps of its dexterity."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.columns import DEG, ONE, OUTPUTS
-from softnlp.base.units import MILLIMETRE
+from softnlp.base.units import DEGREE, MILLIMETRE
 from softnlp.figures.body import disc
-from softnlp.figures.cloud import VIEWS, Outline, mark_size, outline, seen, shown
-from softnlp.figures.space import space_axes
-from softnlp.figures.style import GREY, INK, SMALL, TEXT, WRONG, in_own_style, new_figure, plain
+from softnlp.figures.space import (
+    VIEWS,
+    Outline,
+    View,
+    colour_bar,
+    draw_cloud,
+    draw_faces,
+    draw_lines,
+    outline,
+    seen,
+    shown,
+    space_axes,
+    view_axes,
+)
+from softnlp.figures.style import GREY, INK, SMALL, TEXT, WRONG, in_own_style, legend, mark, new_figure
 from softnlp.model.gravity import gravity_lines, is_hanging
 from softnlp.statics.step import STABLE_FLAGS
+from softnlp.sweep.dexterity import Dexterity, seen_along
 from softnlp.sweep.read import Column, Workspace, read_column
 from softnlp.sweep.summary import parameters
 
@@ -22,13 +35,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
-
-COLOUR = OUTPUTS["bending_angle"].key
+COLOUR, TILT = OUTPUTS["bending_angle"].key, OUTPUTS["tilt"]
 _MAP = "viridis"
 _LOGARITHMIC = ("residual", "discretisation_error")
 _ROUND_OFF = 1e-20
-_AXES = "xyz"
 _WIDTH, _HEIGHT = 11.0, 7.6
 
 
@@ -76,11 +86,11 @@ def workspace_figure(workspace: Workspace, colour: str = COLOUR) -> Figure:
     drawn_3d = _cloud_panel(
         figure, tips, numbers, scale, (low, high), outlines, size, hanging=is_hanging(workspace.gravity)
     )
-    drawn = [
-        _projection(_place(figure, k, high - low), tips, numbers, scale, k, (low, high), outlines[k], size)
-        for k in range(len(VIEWS))
-    ]
-    _colour_bar(figure, column, scale)
+    drawn = []
+    for view, place, found in zip(VIEWS, _places(high - low), outlines, strict=True):
+        axes = view_axes(figure, place, view)
+        drawn.append(_projection(axes, tips, numbers, scale, view, (low, high), found, size))
+    colour_bar(figure, (0.05, 0.862, 0.36, 0.018), (scale, _MAP), column_label(column))
     _captions(figure, len(tips), drawn_3d, drawn, outlines)
     return figure
 
@@ -118,8 +128,6 @@ def _cloud_panel(
     hanging: bool,
 ) -> int:
     """Draw the cloud in 3-D with the outlines on the walls behind it; return how many poses are drawn."""
-    from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
-
     low, high = limits
     axes = space_axes(figure, (-0.025, 0.05, 0.56, 0.86), limits, zoom=0.96, hanging=hanging)
     floor, side = (high[2], high[0]) if hanging else (low[2], low[0])
@@ -130,36 +138,22 @@ def _cloud_panel(
                 lines = np.full((len(edges), 2, 3), wall)
                 lines[:, :, first], lines[:, :, second] = edges[:, :, 0], edges[:, :, 1]
                 lines[:, :, sight] = wall
-                axes.add_collection3d(Line3DCollection(lines, zorder=1, **{**style, "alpha": 0.55}))
-    plate = disc(size / 2, 40, 0.0)
-    axes.add_collection3d(
-        Poly3DCollection(plate, facecolors="#EEEEEE", edgecolors=GREY, linewidths=0.8, zorder=2, label="base")
-    )
+                draw_lines(axes, lines, zorder=1, alpha=0.55, **style)
+    draw_faces(axes, disc(size / 2, 40, 0.0), "#EEEEEE", GREY, 0.8, zorder=2, label="base")
     k = shown(tips)
-    axes.scatter(
-        *tips[k].T,
-        c=numbers[k],
-        s=mark_size(len(k), 90_000),
-        cmap=_MAP,
-        norm=scale,
-        depthshade=False,
-        linewidths=0,
-        rasterized=True,
-        zorder=3,
-        label="poses",
-    )
+    draw_cloud(axes, tips[k], numbers[k], scale, _MAP, 90_000, "poses")
     return len(k)
 
 
-_BOUNDARY: dict[str, Any] = {"colors": INK, "linewidths": 1.1}
-_HULL: dict[str, Any] = {"colors": GREY, "linewidths": 0.9, "linestyles": (0, (4, 3))}
+_BOUNDARY: dict[str, Any] = {"colors": INK, "width": 1.1}
+_HULL: dict[str, Any] = {"colors": GREY, "width": 0.9, "linestyles": (0, (4, 3))}
 
 # Places of the projections: xz above xy, which share x; yz beside xz, which share z.
 _LEFT, _BOTTOM, _RIGHT, _TOP, _GAP = 0.605, 0.075, 0.985, 0.885, 0.055
 
 
-def _place(figure: Figure, k: int, spans: Array) -> Axes:
-    """Return the axes of projection k: first-angle views that share x and z, all at one scale."""
+def _places(spans: Array) -> list[tuple[float, float, float, float]]:
+    """Return where the projections are: first-angle views that share x and z, all at one scale."""
     width, height = (_RIGHT - _LEFT - _GAP) * _WIDTH, (_TOP - _BOTTOM - 1.5 * _GAP) * _HEIGHT
     inch = min(width / (spans[0] + spans[1]), height / (spans[2] + spans[1]))  # for a mm
     dx, dy, dz = spans * inch
@@ -170,8 +164,7 @@ def _place(figure: Figure, k: int, spans: Array) -> Axes:
         (left, top - dz, dx, dz),
         (left + dx + gap_x, top - dz, dy, dz),
     )
-    x, y, w, h = boxes[k]
-    return figure.add_axes((x / _WIDTH, y / _HEIGHT, w / _WIDTH, h / _HEIGHT))
+    return [(x / _WIDTH, y / _HEIGHT, w / _WIDTH, h / _HEIGHT) for x, y, w, h in boxes]
 
 
 def _projection(
@@ -179,7 +172,7 @@ def _projection(
     tips: Array,
     numbers: Array,
     scale: Any,
-    k: int,
+    view: View,
     limits: tuple[Array, Array],
     found: Outline,
     size: float,
@@ -188,12 +181,9 @@ def _projection(
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Circle
 
-    view = VIEWS[k]
-    first, second, sight, side = view
-    plain(axes, f"{_AXES[first]} [mm]", f"{_AXES[second]} [mm]")
+    first, second, sight, _ = view
     low, high = limits
     axes.set(xlim=(low[first], high[first]), ylim=(low[second], high[second]), aspect="equal")
-    axes.set_title(f"seen from {'+' if side > 0 else '−'}{_AXES[sight]}", size=SMALL, color=GREY, loc="left", pad=3)
     if sight == 2:
         axes.add_patch(Circle((0, 0), size / 2, facecolor="#EEEEEE", edgecolor=GREY, linewidth=0.8, label="base"))
     else:
@@ -201,32 +191,11 @@ def _projection(
     chosen = seen(tips, view)
     box = axes.get_position()
     area = box.width * _WIDTH * box.height * _HEIGHT * 72**2
-    axes.scatter(
-        tips[chosen, first],
-        tips[chosen, second],
-        c=numbers[chosen],
-        s=mark_size(len(chosen), area),
-        cmap=_MAP,
-        norm=scale,
-        linewidths=0,
-        rasterized=True,
-        zorder=2,
-        label="poses",
-    )
-    axes.add_collection(LineCollection(list(found.boundary), zorder=3, label="boundary", **_BOUNDARY))
-    axes.add_collection(LineCollection(list(found.hull), zorder=3, label="convex hull", **_HULL))
+    draw_cloud(axes, tips[chosen][:, [first, second]], numbers[chosen], scale, _MAP, area, "poses")
+    for words, edges, style in (("boundary", found.boundary, _BOUNDARY), ("convex hull", found.hull, _HULL)):
+        look = {"linewidths" if key == "width" else key: value for key, value in style.items()}
+        axes.add_collection(LineCollection(list(edges), zorder=3, label=words, **look))
     return len(chosen)
-
-
-def _colour_bar(figure: Figure, column: Column, scale: Any) -> None:
-    """Say what the colours mean, above the 3-D panel."""
-    from matplotlib.cm import ScalarMappable
-
-    axes = figure.add_axes((0.05, 0.862, 0.36, 0.018))
-    bar = figure.colorbar(ScalarMappable(scale, _MAP), cax=axes, orientation="horizontal")
-    bar.outline.set_visible(False)
-    bar.ax.tick_params(labelsize=SMALL, colors=INK, color=GREY)
-    bar.set_label(column_label(column), size=TEXT, color=INK)
 
 
 def column_label(column: Column) -> str:
@@ -241,17 +210,13 @@ def column_label(column: Column) -> str:
 
 def _captions(figure: Figure, poses: int, drawn_3d: int, drawn: list[int], outlines: list[Outline]) -> None:
     """Explain the lines, and say how many poses are drawn where not all are."""
-    from matplotlib.lines import Line2D
-
-    kinds: tuple[tuple[str, Any], ...] = (("boundary", "-"), ("hull", (0, (4, 3))))
     lines = [
-        Line2D([], [], color=style["colors"], linewidth=style["linewidths"], linestyle=dashes, label=words)
-        for (name, dashes), style, words in zip(kinds, (_BOUNDARY, _HULL), ("boundary", "convex hull"), strict=True)
+        mark(words, style["colors"], line=style.get("linestyles", "-"), linewidth=style["width"])
+        for name, style, words in (("boundary", _BOUNDARY, "boundary"), ("hull", _HULL, "convex hull"))
         if any(len(getattr(found, name)) for found in outlines)
     ]
-    style: dict[str, Any] = {"fontsize": SMALL, "frameon": False, "labelcolor": INK}
     if lines:
-        figure.legend(handles=lines, loc="upper right", bbox_to_anchor=(0.99, 0.945), ncols=2, **style)
+        legend(figure, lines, loc="upper right", bbox_to_anchor=(0.99, 0.945), ncols=2)
     least, most = min(drawn), max(drawn)
     flat = f"{least:,}" if least == most else f"{least:,} to {most:,}"
     if drawn_3d == poses == least:
@@ -262,3 +227,53 @@ def _captions(figure: Figure, poses: int, drawn_3d: int, drawn: list[int], outli
             "projections, the nearest to the viewer"
         )
     figure.text(0.018, 0.014, text, size=SMALL, color=GREY)
+
+
+# --- dexterity --------------------------------------------------------------------------------------------------------
+
+_MAPS_HEIGHT, _ROW, _MAPS_LEFT, _MAPS_GAP = 11.8, 2.65, 0.17, 0.05
+
+
+@in_own_style
+def dexterity_figure(found: Dexterity, title: str, robot: str) -> Figure:
+    """Draw maps of four numbers of the voxels, each seen along z, y and x: the largest of those behind each other.
+
+    Rows: how many poses, the highest tilt, the range of tilts, and the part of all directions that the tip axis takes.
+    """
+    from matplotlib.colors import LogNorm, Normalize
+
+    parts = [
+        robot,
+        f"{len(found.voxel):,} voxels of {found.size / MILLIMETRE:.3g} mm",
+        f"{found.directions} directions of {found.resolution / DEGREE:.3g} deg",
+        f"{100 * found.overall:.3g} % taken anywhere",
+    ]
+    figure = new_figure(_WIDTH, _MAPS_HEIGHT, f"{title}: dexterity", "  ·  ".join(parts))
+    highest, spread = TILT.shown(found.highest_tilt), TILT.shown(found.tilt_range)
+    rows: tuple[tuple[str, Array, Any], ...] = (
+        ("poses in a voxel", found.poses.astype(float), LogNorm(1, max(2, int(found.poses.max())))),
+        (f"highest tilt [{TILT.unit}]", highest, Normalize(0, float(highest.max()) or 1)),
+        (f"range of tilts [{TILT.unit}]", spread, Normalize(0, float(spread.max()) or 1)),
+        ("directions taken [%]", 100 * found.coverage, Normalize(0, 100 * float(found.coverage.max()))),
+    )
+    spans = (found.voxel.max(axis=0) + 1) * found.size
+    width = (_RIGHT - _MAPS_LEFT - 2 * _MAPS_GAP) * _WIDTH
+    inch = min(width / float(spans[0] + spans[0] + spans[1]), 2.15 / float(max(spans[1], spans[2])))  # for a metre
+    for row, (label, values, norm) in enumerate(rows):
+        left, bottom = _MAPS_LEFT * _WIDTH, _MAPS_HEIGHT - 0.75 - (row + 1) * _ROW + 0.45
+        drawn: Any = None
+        for view in VIEWS:
+            first, second, sight, _ = view
+            w, h = float(spans[first]) * inch, float(spans[second]) * inch
+            place = (left / _WIDTH, bottom / _MAPS_HEIGHT, w / _WIDTH, h / _MAPS_HEIGHT)
+            axes = view_axes(figure, place, view, titled=row == 0)
+            across, up, largest = seen_along(found, values, sight)
+            drawn = axes.pcolormesh(
+                across / MILLIMETRE, up / MILLIMETRE, largest.T, cmap="viridis", norm=norm, rasterized=True, label=label
+            )
+            axes.set_aspect("equal")
+            left += w + _MAPS_GAP * _WIDTH
+        colour_bar(figure, (0.085, bottom / _MAPS_HEIGHT, 0.012, 2.0 / _MAPS_HEIGHT), drawn, label, upright=True)
+    text = "Each map shows the largest value of the voxels behind each other"
+    figure.text(0.018, 0.012, text, size=SMALL, color=GREY)
+    return figure

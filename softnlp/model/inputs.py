@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import platform
 from collections.abc import Mapping
 from dataclasses import asdict, fields
+from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from softnlp.base.units import BAR, MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.model.contact_settings import ContactSettings
@@ -15,6 +17,9 @@ from softnlp.model.gravity import gravity_words
 from softnlp.model.materials import Material
 from softnlp.model.robot import DIMENSIONS, Robot
 from softnlp.model.rod import Loads
+
+if TYPE_CHECKING:
+    from softnlp.model.quantities import Model
 
 
 def tidy(value: float, scale: float = 1.0) -> float:
@@ -88,6 +93,13 @@ def conventions_table(conventions: Conventions) -> dict[str, Any]:
     return table
 
 
+def conventions_of_table(table: Mapping[str, Any]) -> Conventions:
+    """Return the conventions of a `conventions_table`; KeyError or TypeError where one is missing."""
+    values = dict(table)
+    values["fibre_thickness"] = float(values.pop("fibre_thickness_mm")) * MILLIMETRE
+    return Conventions(**values)
+
+
 def loads_table(loads: Loads) -> dict[str, Any]:
     """Return the dead loads in the world frame, gravity in words too."""
     return {
@@ -105,6 +117,37 @@ def loads_of_table(table: Mapping[str, Any]) -> Loads:
         tip_moment=tuple(float(m) * NEWTON_MILLIMETRE for m in table["tip_moment_Nmm"]),
         gravity=tuple(float(g) for g in table["gravity_m_per_s2"]),
     )
+
+
+def asked_tables(model: Model, loads: Loads) -> dict[str, Any]:
+    """Return what was asked of any study as tables by name."""
+    return {
+        "robot": robot_table(model.robot),
+        "material": material_table(model.material),
+        "coefficients": coefficients_table(model.coefficients),
+        "loads": loads_table(loads),
+    }
+
+
+def file_attributes(
+    study: str, model: Model, loads: Loads, contact: ContactSettings | None, table: str, entries: Any, **more: str
+) -> dict[str, str]:
+    """Return the global attributes of a netCDF file, what was asked as JSON. table, entries : one of its own."""
+    tables = {
+        **asked_tables(model, loads),
+        "versions": versions(),
+        "conventions_in_full": conventions_table(model.conventions),
+        table: list(entries),
+        **({} if contact is None else {"contact": contact_table(contact)}),
+    }
+    return {
+        "study": study,
+        "conventions": model.conventions.name,
+        "softnlp": versions()["softnlp"],
+        **{name: json.dumps(found, ensure_ascii=False, allow_nan=False) for name, found in tables.items()},
+        **more,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
 
 
 def package_version(name: str = "softnlp") -> str:

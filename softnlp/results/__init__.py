@@ -4,12 +4,19 @@ Files carry the unit in the name of a number; the package itself stays in SI.
 """
 
 from softnlp.base.files import write_whole
-from softnlp.results.csv_table import table_text, write_table
 from softnlp.results.dataset import netcdf_bytes, to_dataset
 from softnlp.results.document import json_text, to_json
-from softnlp.results.folder import load_run, save
-from softnlp.results.terminal import table_lines
-from softnlp.results.view import Body, ContactView, RunView, TargetView, view_of_dataset, view_of_run
+from softnlp.results.folder import (
+    Body,
+    ContactView,
+    RunView,
+    TargetView,
+    load_run,
+    save,
+    view_of_dataset,
+    view_of_run,
+)
+from softnlp.results.table import table_lines, table_text, write_table
 
 __all__ = [
     "Body",

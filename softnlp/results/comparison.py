@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -13,7 +11,7 @@ from softnlp.base.errors import InputError
 from softnlp.base.reading import shown
 from softnlp.base.statistics import Statistics
 from softnlp.model.inputs import coefficients_table, contact_table, loads_table, package_version, pressure_bar, tidy
-from softnlp.results.identify_document import number
+from softnlp.results.document import csv_text, number
 from softnlp.scenario.compare import CompareTask
 from softnlp.studies.comparison import Comparison
 from softnlp.studies.observed import NUMBERS, OBSERVABLES, differences
@@ -115,32 +113,17 @@ def _row(task: CompareTask, found: Comparison, v: int, row: int, robot: int | No
     known = status is not None and status.has_solution
     told["self_intersecting"] = k in solved.self_intersecting if known else None
     parts: dict[str, dict[str, Any]] = {"measured": {}, "simulated": {}, "error": {}}
-    for name, measured, simulated, error in _numbers(found, v, robot, k):
-        key = OBSERVABLES[name].measured
-        if measured is not None:
-            parts["measured"][key], parts["simulated"][key] = measured, simulated
-        parts["error"][key] = error
-    return told | parts
-
-
-def _numbers(
-    found: Comparison, v: int, robot: int, k: int
-) -> Iterator[tuple[str, float | None, float | None, float | None]]:
-    """Yield (name, measured, simulated, error) of what was measured in a row, in the unit of files.
-
-    The distance of the tips has no measured and no simulated number.
-    """
-    o, solved = found.observed[robot], found.simulated[v][robot]
     measured, simulated = o.values[k], solved.values[k]
     for name in found.observables:
-        scale = OBSERVABLES[name].scale
-        error, _ = differences(name, simulated[None, :], measured[None, :], float(o.robot.length))
-        if name in NUMBERS:
-            at = NUMBERS.index(name)
-            if np.isfinite(measured[at]):
-                yield name, number(measured[at] / scale), number(simulated[at] / scale), number(error[0] / scale)
-        elif np.isfinite(measured[:3]).all():
-            yield name, None, None, number(error[0] / scale)
+        key, scale = OBSERVABLES[name].measured, OBSERVABLES[name].scale
+        # The distance of the tips has no measured and no simulated number.
+        at: Any = NUMBERS.index(name) if name in NUMBERS else slice(3)
+        if np.isfinite(measured[at]).all():
+            if name in NUMBERS:
+                parts["measured"][key], parts["simulated"][key] = (number(v[at] / scale) for v in (measured, simulated))
+            error, _ = differences(name, simulated[None, :], measured[None, :], float(o.robot.length))
+            parts["error"][key] = number(error[0] / scale)
+    return told | parts
 
 
 def summary_text(found: Comparison) -> str:
@@ -152,7 +135,7 @@ def summary_text(found: Comparison) -> str:
                 if found.measured(name, robot):
                     cells = statistics_cells(found.statistics(v, name, robot), name)
                     rows.append([*_named(found, v).values(), label, OBSERVABLES[name].measured, *cells])
-    return _csv([*_VARIANT, "robot", "observable", *STATISTICS], rows)
+    return csv_text([*_VARIANT, "robot", "observable", *STATISTICS], rows, 10)
 
 
 def require_free_names(task: CompareTask) -> None:
@@ -165,43 +148,25 @@ def require_free_names(task: CompareTask) -> None:
             )
 
 
-def _added(observables: Sequence[str]) -> list[str]:
-    """Return the columns that the table of rows has beside those of the file."""
-    numbers = [OBSERVABLES[name].measured for name in observables if name in NUMBERS]
+def _added(observables: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Return the columns that the table of rows has beside those of the file, each with its part and key in a row."""
     keys = [OBSERVABLES[name].measured for name in observables]
-    return [
-        *(f"variant_{name}" for name in _VARIANT),
-        *("simulated_status", "simulated_message"),
-        *(f"simulated_{key}" for key in numbers),
-        *(f"error_{key}" for key in keys),
-    ]
+    simulated = [OBSERVABLES[name].measured for name in observables if name in NUMBERS]
+    return {
+        **{f"variant_{name}": ("", name) for name in _VARIANT},
+        **{f"simulated_{key}": ("", key) for key in ("status", "message")},
+        **{f"simulated_{key}": ("simulated", key) for key in simulated},
+        **{f"error_{key}": ("error", key) for key in keys},
+    }
 
 
 def rows_text(task: CompareTask, found: Comparison) -> str:
     """Return every row of the file as CSV for each variant: its cells, what is simulated, and the errors."""
-    observables = found.observables
+    added = _added(found.observables)
     rows: list[list[Any]] = []
     for v in range(len(found.variants)):
-        for row, robot, k in _places(task):
-            cells: list[Any] = [*task.columns.rows[row], *_named(found, v).values()]
-            told: dict[str, tuple[Any, Any]] = {}
-            if robot is not None:
-                solved = found.simulated[v][robot]
-                status = solved.status[k]
-                cells += [None if status is None else status.value, solved.message[k]]
-                told = {name: (simulated, error) for name, _, simulated, error in _numbers(found, v, robot, k)}
-            else:
-                cells += [None, None]
-            cells += [told.get(name, (None, None))[0] for name in observables if name in NUMBERS]
-            cells += [told.get(name, (None, None))[1] for name in observables]
-            rows.append(cells)
-    return _csv([*task.header, *_added(observables)], rows)
-
-
-def _csv(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    for row in rows:
-        writer.writerow([f"{v:.10g}" if isinstance(v, float) else "" if v is None else v for v in row])
-    return text.getvalue()
+        for place in _places(task):
+            told = _row(task, found, v, *place) | _named(found, v)
+            cells = [(told.get(part, {}) if part else told).get(key) for part, key in added.values()]
+            rows.append([*task.columns.rows[place[0]], *cells])
+    return csv_text([*task.header, *added], rows, 10)

@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.columns import OUTPUTS, Output
 from softnlp.base.netcdf import dataset_bytes, flag_attributes, said
-from softnlp.model.inputs import (
-    coefficients_table,
-    contact_table,
-    conventions_table,
-    loads_table,
-    material_table,
-    pressure_bar,
-    robot_table,
-    versions,
-)
+from softnlp.model.inputs import file_attributes, pressure_bar
+from softnlp.model.quantities import Model
 from softnlp.nlp.solver import EquationResidual
 from softnlp.statics.step import Run, Step
 from softnlp.studies.fields import (
@@ -37,10 +27,20 @@ from softnlp.studies.fields import (
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 Variable = tuple[tuple[str, ...], Any, dict[str, Any]]
 
-AXES = ("x", "y", "z")
+_CERTIFICATE = (
+    "largest error of each equation",
+    "the same: force by EI/L^2, moment by EI/L, length by L",
+    "unit of the certificate",
+    "equation of the certificate",
+)
+_WEIGHTED = (
+    "what `weighted` left of each equation",
+    "the same, scaled as the certificate",
+    "unit of what was left",
+    "equation that `weighted` weighs",
+)
 
 
 def to_dataset(run: Run) -> xr.Dataset:
@@ -64,34 +64,28 @@ def to_dataset(run: Run) -> xr.Dataset:
     import xarray as xr
 
     steps, pressure = run.steps, OUTPUTS["pressure"]
-    sizes = {
-        "axis": 3,
-        "row": 3,
-        "col": 3,
-        "chamber": run.robot.chambers,
-        "s": max((_points(step) for step in steps), default=0),
-    }
+    points = max((_points(step) for step in steps), default=0)
+    sizes = {"axis": 3, "row": 3, "col": 3, "chamber": run.robot.chambers, "s": points}
     variables: dict[str, Variable] = {
         pressure.key: (
             ("step", *pressure.dims),
             [pressure_bar(step.pressure) for step in steps],
             said(pressure.unit.attribute, pressure.meaning),
         ),
-        "status": (("step",), _text([s.status.value for s in steps]), said("1", "how the step ended")),
-        "message": (("step",), _text([s.message for s in steps]), said("1", "the same in words")),
-        "warnings": (
-            ("step",),
-            _text(["; ".join(s.warnings) for s in steps]),
-            said("1", "warnings of the step"),
-        ),
+        "status": _words("step", [s.status.value for s in steps], "how the step ended"),
+        "message": _words("step", [s.message for s in steps], "the same in words"),
+        "warnings": _words("step", ["; ".join(s.warnings) for s in steps], "warnings of the step"),
     }
     variables |= {output.key: _variable(output, steps, sizes) for output in dataset_outputs(run)}
-    variables |= _certificate(steps)
+    variables |= _errors("certificate", "equation", "equation_unit", [s.certificate for s in steps], _CERTIFICATE)
     if run.study == BLOCKED_FORCE:
-        closures = _text([closure_of(run, step) or "" for step in steps])
-        variables["closure"] = (("step",), closures, said("1", "which equations close the blocked shape"))
-        variables |= _weighted(steps)
-    return xr.Dataset(variables, coords=_coordinates(run, variables["arc"][1]), attrs=_global_attributes(run))
+        closures = [closure_of(run, step) or "" for step in steps]
+        variables["closure"] = _words("step", closures, "which equations close the blocked shape")
+        if any(left := [left_by_weights(step) for step in steps]):
+            variables |= _errors("weighted_residual", "weighted_equation", "weighted_residual_unit", left, _WEIGHTED)
+    model = Model(run.robot, run.material, run.coefficients, run.conventions)
+    about = file_attributes(run.study, model, run.loads, run.contact, "warnings", run.warnings)
+    return xr.Dataset(variables, coords=_coordinates(run, variables["arc"][1]), attrs={"title": run.title, **about})
 
 
 def netcdf_bytes(run: Run) -> bytes:
@@ -102,12 +96,8 @@ def netcdf_bytes(run: Run) -> bytes:
     return dataset_bytes(to_dataset(run))
 
 
-def _number(value: float | None) -> float:
-    return float("nan") if value is None else float(value)
-
-
-def _text(values: Sequence[str]) -> NDArray[np.object_]:
-    return np.array(values, dtype=object)
+def _words(along: str, texts: Sequence[str], meaning: str) -> Variable:
+    return (along,), np.array(texts, dtype=object), said("1", meaning)
 
 
 def _variable(output: Output, steps: Sequence[Step], sizes: Mapping[str, int]) -> Variable:
@@ -125,56 +115,33 @@ def _points(step: Step) -> int:
     return max(pose.shape.arc.size, 0 if step.contact is None else step.contact.free.shape.arc.size)
 
 
-def _spread(lines: Sequence[tuple[EquationResidual, ...]]) -> tuple[Array, dict[str, str]]:
-    """Return (2, step, equation) value and scaled value, and each equation's unit, in order of first appearance."""
+def _errors(
+    name: str,
+    along: str,
+    unit_name: str,
+    lines: Sequence[tuple[EquationResidual, ...]],
+    words: tuple[str, str, str, str],
+) -> dict[str, Variable]:
+    """Return errors of equations (step, equation) as a variable for each unit, NaN at the equations of another one.
+
+    lines : of each step; equations stand in order of first appearance. words : of errors, scaled, units, equations.
+    """
     units = {line.equation: line.unit for step in lines for line in step}
     column = {equation: k for k, equation in enumerate(units)}
     values = np.full((2, len(lines), len(units)), np.nan)
     for k, step in enumerate(lines):
         for line in step:
             values[:, k, column[line.equation]] = line.value, line.scaled
-    return values, units
-
-
-def _weighted(steps: Sequence[Step]) -> dict[str, Variable]:
-    """Return what the `weighted` closure left as (step, weighted_equation); nothing for other closures."""
-    values, units = _spread([left_by_weights(step) for step in steps])
-    if not units:
-        return {}
-    dims, line = ("step", "weighted_equation"), ("weighted_equation",)
-    return {
-        **_by_unit("weighted_residual", dims, values[0], units, "what `weighted` left of each equation"),
-        "weighted_residual_scaled": (dims, values[1], said("1", "the same, scaled as the certificate")),
-        "weighted_residual_unit": (line, _text(list(units.values())), said("1", "unit of what was left")),
-        "weighted_equation": (line, _text(list(units)), said("1", "equation that `weighted` weighs")),
-    }
-
-
-def _by_unit(
-    name: str, dims: tuple[str, ...], values: Array, units: Mapping[str, str], meaning: str
-) -> dict[str, Variable]:
-    """Return values of equations (step, equation) as a variable for each unit, NaN at the equations of another one."""
-    made: dict[str, Variable] = {}
+    dims, made = ("step", along), {}
     for unit in dict.fromkeys(units.values()):
-        own = np.where([other == unit for other in units.values()], values, np.nan)
+        own = np.where([other == unit for other in units.values()], values[0], np.nan)
         label = name if unit == "1" else f"{name}_{unit.replace(' ', '')}"
-        made[label] = (dims, own, said(unit, f"{meaning} that has this unit"))
-    return made
-
-
-def _certificate(steps: Sequence[Step]) -> dict[str, Variable]:
-    """Return the certificates as (step, equation)."""
-    values, units = _spread([step.certificate for step in steps])
-    dims = ("step", "equation")
+        made[label] = (dims, own, said(unit, f"{words[0]} that has this unit"))
     return {
-        **_by_unit("certificate", dims, values[0], units, "largest error of each equation"),
-        "certificate_scaled": (
-            dims,
-            values[1],
-            said("1", "the same: force by EI/L^2, moment by EI/L, length by L"),
-        ),
-        "equation_unit": (("equation",), _text(list(units.values())), said("1", "unit of the certificate")),
-        "equation": (("equation",), _text(list(units)), said("1", "equation of the certificate")),
+        **made,
+        f"{name}_scaled": (dims, values[1], said("1", words[1])),
+        unit_name: _words(along, list(units.values()), words[2]),
+        along: _words(along, list(units), words[3]),
     }
 
 
@@ -185,38 +152,13 @@ def _coordinates(run: Run, arc: Array) -> dict[str, Variable]:
         "step": (("step",), np.arange(1, len(run.steps) + 1), said("1", "step of the run, from 1")),
         "set": (("set",), np.arange(1, robot.chamber_sets + 1), said("1", "chamber set, from 1")),
         "chamber": (("chamber",), np.arange(1, robot.chambers + 1), said("1", "chamber, set by set, from 1")),
-        "chamber_set": (
-            ("chamber",),
-            np.array(robot.set_of_chamber) + 1,
-            said("1", "set of each chamber, from 1"),
-        ),
-        **{name: ((name,), list(AXES), said("1", meaning)) for name, meaning in axes.items()},
+        "chamber_set": (("chamber",), np.array(robot.set_of_chamber) + 1, said("1", "set of each chamber, from 1")),
+        **{name: ((name,), list("xyz"), said("1", meaning)) for name, meaning in axes.items()},
     }
     if any(step.time is not None for step in run.steps):
-        times = [_number(step.time) for step in run.steps]
+        times = [np.nan if step.time is None else float(step.time) for step in run.steps]
         coordinates["t_s"] = (("step",), times, said("s", OUTPUTS["t"].meaning))
     solved = arc[~np.isnan(arc[:, :1]).all(axis=1)]
     if len(solved) and (solved == solved[0]).all():
         coordinates["s"] = (("s",), solved[0], said("1", OUTPUTS["arc"].meaning))
     return coordinates
-
-
-def _global_attributes(run: Run) -> dict[str, str]:
-    tables = {
-        "robot": robot_table(run.robot),
-        "material": material_table(run.material),
-        "coefficients": coefficients_table(run.coefficients),
-        "loads": loads_table(run.loads),
-        "versions": versions(),
-        "conventions_in_full": conventions_table(run.conventions),
-        "warnings": list(run.warnings),
-        **({} if run.contact is None else {"contact": contact_table(run.contact)}),
-    }
-    return {
-        "title": run.title,
-        "study": run.study,
-        "conventions": run.conventions.name,
-        "softnlp": versions()["softnlp"],
-        **{name: json.dumps(table, ensure_ascii=False, allow_nan=False) for name, table in tables.items()},
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-    }

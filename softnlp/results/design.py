@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
@@ -13,18 +11,11 @@ from softnlp.base import columns
 from softnlp.base.columns import DEG, MM, ONE, Output
 from softnlp.base.units import BAR
 from softnlp.model.gravity import gravity_lines
-from softnlp.model.inputs import (
-    coefficients_table,
-    contact_table,
-    loads_table,
-    material_table,
-    package_version,
-    robot_table,
-    tidy,
-)
+from softnlp.model.inputs import asked_tables, contact_table, robot_table, tidy
 from softnlp.model.materials import Material
+from softnlp.model.quantities import Model
 from softnlp.model.robot import DIMENSIONS, Robot
-from softnlp.results.document import compact_json, engine_table
+from softnlp.results.document import csv_text, document_head, document_text, engine_table, number
 from softnlp.studies.design import Design
 from softnlp.studies.design_candidate import Candidate
 from softnlp.studies.design_optimise import Active
@@ -51,14 +42,8 @@ def design_document(done: Design) -> dict[str, Any]:
     if found is not None and done.free_closure_force is not None:
         found[f"{FORCE}_free_closure_{OUTPUTS[FORCE].unit}"] = done.free_closure_force
     return {
-        "softnlp": package_version(),
-        "title": done.title,
-        "study": "design",
-        "conventions": setting.conventions.name,
-        "robot": robot_table(setting.robot),
-        "material": material_table(setting.material),
-        "coefficients": coefficients_table(setting.coefficients),
-        "loads": loads_table(setting.loads),
+        **document_head(done.title, "design", setting.conventions.name),
+        **asked_tables(Model(setting.robot, setting.material, setting.coefficients), setting.loads),
         **({"contact": contact_table(setting.contact)} if task.needs_force else {}),
         "objective": {"maximise" if task.maximise else "minimise": task.objective.key},
         "requirements": limits,
@@ -70,12 +55,12 @@ def design_document(done: Design) -> dict[str, Any]:
 
 def design_json(done: Design) -> str:
     """Return the document as text, ending in a newline."""
-    return compact_json(json.dumps(design_document(done), indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
+    return document_text(design_document(done))
 
 
 def candidate_table(done: Design, candidate: Candidate) -> dict[str, Any]:
     """Return a candidate in the units of files."""
-    outputs = {o.key: _plain(candidate.outputs.get(o.name), o.scale) for o in known_outputs(done)}
+    outputs = {o.key: number(candidate.outputs.get(o.name), o.scale) for o in known_outputs(done)}
     return {
         "number": candidate.number,
         "choices": choices_table(candidate.choices),
@@ -89,7 +74,7 @@ def candidate_table(done: Design, candidate: Candidate) -> dict[str, Any]:
         "optimal": candidate.optimal,
         "iterations": candidate.iterations,
         "intervals": candidate.intervals,
-        "residual": _plain(candidate.step.residual if candidate.step else None),
+        "residual": number(candidate.step.residual if candidate.step else None),
         **engine_table(*((step.engine, step.ipopt) if (step := candidate.step) else (None, None))),
         "warnings": list(candidate.warnings),
         columns.OUTPUTS["solve_time"].key: candidate.solve_time,
@@ -124,9 +109,9 @@ def active_table(done: Design, active: Active) -> dict[str, Any]:
     return {
         "limit": OUTPUTS[active.name].key if active.name in OUTPUTS else active.name,
         "side": active.side,
-        "value": _plain(active.limit, scale),
+        "value": number(active.limit, scale),
         "unit": unit,
-        "gain_per_unit": None if not isfinite(active.limit) else _plain(active.rate * scale, objective.scale),
+        "gain_per_unit": None if not isfinite(active.limit) else number(active.rate * scale, objective.scale),
         "gain_unit": objective.unit.label,
     }
 
@@ -143,18 +128,15 @@ def design_csv(done: Design) -> str:
     """Return the candidates as CSV, a row each; cells of what is not known are empty."""
     keys = list(dict.fromkeys(key for c in done.candidates for key in choices_table(c.choices)))
     outputs = [o.key for o in known_outputs(done)]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(
-        ["number", "status", *(f"choice {key}" for key in keys), *outputs, "reasons", "warnings", "optimal"]
-    )
+    header = ["number", "status", *(f"choice {key}" for key in keys), *outputs, "reasons", "warnings", "optimal"]
+    rows = []
     for candidate in done.candidates:
         table = candidate_table(done, candidate)
         cells = [table["choices"].get(key) for key in keys] + [table["outputs"][key] for key in outputs]
-        row = [table["number"], table["status"], *("" if cell is None else cell for cell in cells)]
         known = "" if candidate.optimal is None else str(candidate.optimal).lower()
-        writer.writerow([*row, "; ".join(table["reasons"]), "; ".join(table["warnings"]), known])
-    return text.getvalue()
+        words = ["; ".join(table[name]) for name in ("reasons", "warnings")]
+        rows.append([table["number"], table["status"], *cells, *words, known])
+    return csv_text(header, rows)
 
 
 def label(done: Design, candidate: Candidate) -> str:
@@ -171,10 +153,10 @@ def label(done: Design, candidate: Candidate) -> str:
         elif name == "chambers_per_set":
             words.append(f"{candidate.robot.chambers} chambers")
         else:
-            ((key, number),) = choices_table({name: value}).items()
+            ((key, entry),) = choices_table({name: value}).items()
             stem, _, unit = key.removeprefix("robot.").rpartition("_")
             words.append(
-                f"{stem.replace('_', ' ')} {number:g} {unit}" if unit in ("mm", "deg") else f"{key[6:]} {number}"
+                f"{stem.replace('_', ' ')} {entry:g} {unit}" if unit in ("mm", "deg") else f"{key[6:]} {entry}"
             )
     return ", ".join(words) or "design"
 
@@ -298,10 +280,6 @@ def pressure_words(pressure: float | Range | PressureSteps) -> str:
     return f"{pressure / BAR:g} bar"
 
 
-def _plain(value: float | None, scale: float = 1.0) -> float | None:
-    return None if value is None or not isfinite(value) else float(value) / scale
-
-
 def _digits(value: float | None, scale: float) -> str:
-    number = _plain(value, scale)
-    return "-" if number is None else f"{number:.4g}"
+    found = number(value, scale)
+    return "-" if found is None else f"{found:.4g}"

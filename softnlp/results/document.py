@@ -1,24 +1,19 @@
-"""A run as one JSON document: the names and units that people's scripts rely on."""
+"""A run as one JSON document: the names and units that people's scripts rely on; and how any study writes text."""
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import re
+from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from typing import Any
 
 import numpy as np
 
-from softnlp.model.inputs import (
-    coefficients_table,
-    contact_table,
-    loads_table,
-    material_table,
-    package_version,
-    pressure_bar,
-    robot_table,
-    tidy,
-)
+from softnlp.model.inputs import asked_tables, contact_table, package_version, pressure_bar, tidy
+from softnlp.model.quantities import Model
 from softnlp.nlp.solver import EquationResidual, Ipopt
 from softnlp.statics.step import Run, Step
 from softnlp.studies.fields import BLOCKED_FORCE, closure_of, document_outputs, left_by_weights, value
@@ -40,17 +35,10 @@ def to_json(run: Run) -> dict[str, Any]:
         Numbers under keys with their unit, such as "tip_position_mm". A step without a solution keeps pressure, time,
         status, message, residual, certificate and warnings; its other numbers are None.
     """
-    contact = {} if run.contact is None else {"contact": contact_table(run.contact)}
     return {
-        "softnlp": package_version(),
-        "title": run.title,
-        "study": run.study,
-        "conventions": run.conventions.name,
-        "robot": robot_table(run.robot),
-        "material": material_table(run.material),
-        "coefficients": coefficients_table(run.coefficients),
-        "loads": loads_table(run.loads),
-        **contact,
+        **document_head(run.title, run.study, run.conventions.name),
+        **asked_tables(Model(run.robot, run.material, run.coefficients), run.loads),
+        **({} if run.contact is None else {"contact": contact_table(run.contact)}),
         "warnings": list(run.warnings),
         "steps": [_step(run, step) for step in run.steps],
     }
@@ -58,13 +46,29 @@ def to_json(run: Run) -> dict[str, Any]:
 
 def json_text(run: Run) -> str:
     """Return the document of `to_json` as text, ending in a newline."""
-    return compact_json(json.dumps(to_json(run), indent=2, ensure_ascii=False, allow_nan=False)) + "\n"
+    return document_text(to_json(run))
 
 
-def compact_json(text: str) -> str:
-    """Put each list of numbers of an indented document on one line."""
-    # Strings hold no bare newline, so none is touched.
-    return re.sub(r"\[\n\s+([^\[\]{}\"]*?)\n\s+\]", lambda m: f"[{' '.join(m[1].split())}]", text)
+def document_head(title: str, study: str, conventions: str) -> dict[str, Any]:
+    """Return how the document of any study begins."""
+    return {"softnlp": package_version(), "title": title, "study": study, "conventions": conventions}
+
+
+def document_text(document: Mapping[str, Any], *, compact: bool = True) -> str:
+    """Return a document as text, ending in a newline; `compact` puts each list of numbers on one line."""
+    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+    if compact:  # strings hold no bare newline, so none is touched
+        text = re.sub(r"\[\n\s+([^\[\]{}\"]*?)\n\s+\]", lambda m: f"[{' '.join(m[1].split())}]", text)
+    return text + "\n"
+
+
+def csv_text(header: Iterable[Any], rows: Iterable[Sequence[Any]], digits: int | None = None) -> str:
+    """Return rows as CSV, empty cells for None; digits : of numbers, by default all that they have."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows([f"{v:.{digits}g}" if digits and isinstance(v, float) else v for v in row] for row in rows)
+    return text.getvalue()
 
 
 def _step(run: Run, step: Step) -> dict[str, Any]:
@@ -73,13 +77,13 @@ def _step(run: Run, step: Step) -> dict[str, Any]:
         table["t_s"] = tidy(step.time)
     table["status"] = step.status.value
     table["message"] = step.message
-    table |= {output.key: _plain(value(output, step)) for output in document_outputs(run)}
+    table |= {output.key: plain(value(output, step)) for output in document_outputs(run)}
     if run.study == BLOCKED_FORCE:
         table["closure"] = closure_of(run, step)
         if table["closure"] == "weighted":
             table["weighted_residual"] = _lines(left_by_weights(step))
     table |= engine_table(step.engine, step.ipopt)
-    table["residual"] = _plain(step.residual)
+    table["residual"] = plain(step.residual)
     table["certificate"] = _lines(step.certificate)
     table["warnings"] = list(step.warnings)
     return table
@@ -87,24 +91,29 @@ def _step(run: Run, step: Step) -> dict[str, Any]:
 
 def engine_table(engine: str | None, ipopt: Ipopt | None) -> dict[str, Any]:
     """Return which engine solved something, and what IPOPT said of it."""
-    said = {name: None if ipopt is None else _plain(getattr(ipopt, name)) for name in _SAID}
+    said = {name: None if ipopt is None else plain(getattr(ipopt, name)) for name in _SAID}
     return {"engine": engine, **{f"ipopt_{name}": value for name, value in said.items()}}
 
 
 def _lines(residuals: tuple[EquationResidual, ...]) -> list[dict[str, Any]]:
     """Return errors of equations, each with its unit."""
     return [
-        {"equation": line.equation, "value": _plain(line.value), "unit": line.unit, "scaled": _plain(line.scaled)}
+        {"equation": line.equation, "value": plain(line.value), "unit": line.unit, "scaled": plain(line.scaled)}
         for line in residuals
     ]
 
 
-def _plain(found: Any) -> Any:
+def plain(found: Any) -> Any:
     """Return numbers and arrays as JSON has them: Python's own types, None for what is not finite."""
     if isinstance(found, np.ndarray | np.generic):
         found = found.tolist()
+    if isinstance(found, dict):
+        return {key: plain(item) for key, item in found.items()}
     if isinstance(found, list):
-        return [_plain(item) for item in found]
-    if isinstance(found, float) and not isfinite(found):
-        return None
-    return found
+        return [plain(item) for item in found]
+    return None if isinstance(found, float) and not isfinite(found) else found
+
+
+def number(value: float | None, scale: float = 1.0) -> float | None:
+    """Return a number in a unit of so many SI, None where there is none."""
+    return None if value is None or not isfinite(value) else float(value) / scale

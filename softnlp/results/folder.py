@@ -1,27 +1,217 @@
-"""The folder that a run leaves behind, and what is read back from it."""
+"""The folder that a study leaves behind, and a run as figures see it: the same, in SI, just solved and read back."""
 
 from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.base.arrays import Array
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.files import make_folder, write_whole
-from softnlp.model.inputs import versions
-from softnlp.results.csv_table import table_text
+from softnlp.base.status import Status
+from softnlp.model.inputs import loads_of_table, robot_of_table, versions
+from softnlp.model.robot import Robot
+from softnlp.model.rod import Loads
 from softnlp.results.dataset import netcdf_bytes
 from softnlp.results.document import json_text
-from softnlp.results.view import RunView, view_of_dataset, view_of_run
-from softnlp.statics.step import Run
+from softnlp.results.table import table_text
+from softnlp.statics.step import Run, SectionRadii
+from softnlp.studies.fields import BLOCKED_FORCE, INVERSE, closure_of, series, si_value, solved_pose
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
 RESULTS_FILE = "results.nc"
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """The body of one solved step.
+
+    position : (M, 3) p [m]. rotation : (M, 3, 3) R, columns are the body axes. radii : of the deformed section.
+    """
+
+    position: Array
+    rotation: Array
+    radii: SectionRadii
+
+
+@dataclass(frozen=True, eq=False)
+class ContactView:
+    """The wall of a blocked force, S steps; NaN and None where a step has no solution.
+
+    force, gap : (S,) [N], [m]. wall_point, normal : (S, 3) [m], unit. tip_cap : L_t [m].
+    free_bending_angle : (S,) [rad]. free : the free shapes, S entries.
+    """
+
+    closure: str
+    force: Array
+    gap: Array
+    wall_point: Array
+    normal: Array
+    tip_cap: float
+    free_bending_angle: Array
+    free: tuple[Body | None, ...]
+
+    @property
+    def has_wall(self) -> bool:
+        """Whether there is a wall; without one the chambers alone are constrained."""
+        return bool(np.isfinite(self.normal).any())
+
+
+@dataclass(frozen=True, eq=False)
+class TargetView:
+    """The targets of inverse kinematics, S steps; NaN where there is none of a kind, or no pose was found.
+
+    position, direction : (S, 3) of the target [m], unit. distance, angle : (S,) what is left [m], [rad].
+    tip : (S, 3) the tip found, also where that is the nearest reachable one only [m].
+    """
+
+    position: Array
+    direction: Array
+    distance: Array
+    angle: Array
+    tip: Array
+
+
+@dataclass(frozen=True, eq=False)
+class RunView:
+    """A run as figures see it; S steps, NaN and None where a step has no solution.
+
+    material : its name and law. pressure : (S, sets) [Pa]. time : (S,) [s] or None.
+    stable : (S,) of `STABLE_FLAGS`, undefined where unsolved. stretch : (S,). bending_angle : (S,) [rad].
+    backbone_length : (S,) [m]. bodies : S entries. contact : of a blocked force, else None. targets : of inverse
+    kinematics, else None.
+    """
+
+    title: str
+    study: str
+    material: str
+    conventions: str
+    robot: Robot
+    loads: Loads
+    status: tuple[Status, ...]
+    pressure: Array
+    time: Array | None
+    stable: NDArray[np.int8]
+    stretch: Array
+    bending_angle: Array
+    backbone_length: Array
+    bodies: tuple[Body | None, ...]
+    contact: ContactView | None = None
+    targets: TargetView | None = None
+
+    @property
+    def solved(self) -> tuple[int, ...]:
+        """Indices of the steps that carry a solution."""
+        return tuple(k for k, body in enumerate(self.bodies) if body is not None)
+
+
+def view_of_run(run: Run) -> RunView:
+    """Return the view of a run."""
+    sizes = {"axis": 3}
+    times = [float("nan") if step.time is None else step.time for step in run.steps]
+
+    def body(k: int, prefix: str) -> Body | None:
+        pose, contact = solved_pose(run.steps[k]), run.steps[k].contact
+        if prefix and pose is not None:
+            pose = None if contact is None else contact.free
+        return None if pose is None else Body(pose.shape.position, pose.shape.rotation, pose.radii)
+
+    return _view(
+        lambda name: series(OUTPUTS[name], run.steps, sizes, si_value),
+        body,
+        [closure_of(run, step) for step in run.steps],
+        title=run.title,
+        study=run.study,
+        material=_material_label(run.material.name, run.material.law.name),
+        conventions=run.conventions.name,
+        robot=run.robot,
+        loads=run.loads,
+        status=tuple(step.status for step in run.steps),
+        pressure=np.array([step.pressure for step in run.steps], dtype=float),
+        time=None if np.all(np.isnan(times)) else np.array(times),
+    )
+
+
+def view_of_dataset(dataset: xr.Dataset) -> RunView:
+    """Return the view of a dataset of `to_dataset`, as it is in memory or read back.
+
+    Raises
+    ------
+    KeyError, ValueError, TypeError
+        When a variable or an attribute is missing or not what `to_dataset` writes.
+    """
+    attributes = dataset.attrs
+    material = json.loads(attributes["material"])
+    values = {str(name): variable.values for name, variable in dataset.variables.items()}
+
+    def number(name: str) -> Any:
+        found, scale = values[OUTPUTS[name].key], OUTPUTS[name].scale
+        return found if scale == 1.0 else found * scale
+
+    def body(k: int, prefix: str) -> Body | None:
+        position = number(f"{prefix}position")[k]
+        points = np.isfinite(position).all(axis=1)
+        if not points.any():
+            return None
+        radii = {field.name: float(number(f"{field.name}_radius")[k]) for field in fields(SectionRadii)}
+        return Body(position[points], number(f"{prefix}rotation")[k][points], SectionRadii(**radii))
+
+    return _view(
+        number,
+        body,
+        values.get("closure", ()),
+        title=str(attributes["title"]),
+        study=str(attributes["study"]),
+        material=_material_label(material["name"], material["model"]),
+        conventions=str(attributes["conventions"]),
+        robot=robot_of_table(json.loads(attributes["robot"])),
+        loads=loads_of_table(json.loads(attributes["loads"])),
+        status=tuple(Status(str(word)) for word in values["status"]),
+        pressure=number("pressure"),
+        time=values.get(OUTPUTS["t"].key),
+    )
+
+
+def _view(number: Callable[[str], Any], body: Callable[[int, str], Body | None], closures: Any, **head: Any) -> RunView:
+    """Return a view. number : an output of every step by name, SI. body : of a step, with "free_" its free shape."""
+    solved = [status.has_solution for status in head["status"]]
+    contact = targets = None
+    if head["study"] == INVERSE:
+        targets = TargetView(*map(number, ("target", "target_direction", "distance", "direction_error", "nearest")))
+    if head["study"] == BLOCKED_FORCE and (known := np.flatnonzero(np.isfinite(number("blocked_force")))).size:
+        contact = ContactView(
+            closure=str(closures[known[0]]),
+            force=number("blocked_force"),
+            gap=number("gap"),
+            wall_point=number("wall_point"),
+            normal=number("wall_normal"),
+            tip_cap=float(number("tip_cap")[known[0]]),
+            free_bending_angle=number("free_bending_angle"),
+            free=tuple(body(k, "free_") if k in known else None for k in range(len(solved))),
+        )
+    return RunView(
+        **head,
+        **{name: number(name) for name in ("stable", "stretch", "bending_angle", "backbone_length")},
+        bodies=tuple(body(k, "") if solution else None for k, solution in enumerate(solved)),
+        contact=contact,
+        targets=targets,
+    )
+
+
+def _material_label(name: str, law: str) -> str:
+    return f"{name}, {law}"
 
 
 def save(
@@ -55,22 +245,31 @@ def save(
     InputError
         When the folder or a file cannot be written.
     """
-    folder = make_folder(directory)
     # The numbers are all made before the first file is written, so that an error leaves no half of the new results.
-    contents = {
+    contents: dict[str, str | bytes] = {
         RESULTS_FILE: netcdf_bytes(run),
-        "table.csv": table_text(run).encode(),
-        "results.json": json_text(run).encode(),
-        "versions.json": (json.dumps(versions(), indent=2) + "\n").encode(),
+        "table.csv": table_text(run),
+        "results.json": json_text(run),
     }
-    if scenario_text is not None:
-        contents["scenario.toml"] = scenario_text.encode()
-    written = [write_whole(folder / name, content) for name, content in contents.items()]
+    written = write_files(directory, contents, scenario_text)
     if figure is not None:
         png = io.BytesIO()
         figure(view_of_run(run)).savefig(png, format="png")
-        written.append(write_whole(folder / "figure.png", png.getvalue()))
+        written.append(write_whole(Path(directory) / "figure.png", png.getvalue()))
     return written
+
+
+def write_files(
+    directory: str | PathLike[str], contents: Mapping[str, str | bytes], scenario_text: str | None = None
+) -> list[Path]:
+    """Write what a study found to a folder, made where missing, with what computed it and what was asked."""
+    folder = make_folder(directory)
+    every = {**contents, "versions.json": json.dumps(versions(), indent=2) + "\n"}
+    if scenario_text is not None:
+        every["scenario.toml"] = scenario_text
+    return [
+        write_whole(folder / name, found.encode() if isinstance(found, str) else found) for name, found in every.items()
+    ]
 
 
 def load_run(path: str | PathLike[str]) -> RunView:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-from collections.abc import Mapping
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
@@ -13,10 +10,10 @@ import numpy as np
 
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.statistics import Statistics
-from softnlp.base.units import BAR, MEGAPASCAL
-from softnlp.model.inputs import loads_table, package_version, tidy
+from softnlp.base.units import MEGAPASCAL
+from softnlp.model.inputs import loads_table, pressure_bar, tidy
 from softnlp.model.materials import Material
-from softnlp.results.document import engine_table
+from softnlp.results.document import csv_text, document_head, engine_table, number, plain
 from softnlp.studies.free_constants import COEFFICIENTS, file_name
 from softnlp.studies.measurements import OBSERVABLES, column_slice
 
@@ -30,27 +27,8 @@ if TYPE_CHECKING:
 _TABLE_OF = {"stiffening": ("k_e", "k_b"), "corrections": ("k_a", "k_i", "phi"), "contact": ("k_c",)}
 
 
-def number(value: float) -> float | None:
-    """Return a number for JSON, None where it is none."""
-    return float(value) if isfinite(value) else None
-
-
-def document_text(document: Mapping[str, Any]) -> str:
-    """Return a document as JSON text."""
-    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def _head(asked: Scenario) -> dict[str, Any]:
-    return {
-        "softnlp": package_version(),
-        "title": asked.title,
-        "study": "identify",
-        "conventions": asked.conventions.name,
-    }
-
-
 def _misfit(found: Statistics, unit: float) -> dict[str, Any]:
-    return {"count": found.count, "rmse": number(found.rmse / unit), "mape_percent": number(found.mape)}
+    return {"count": found.count, "rmse": number(found.rmse, unit), "mape_percent": number(found.mape)}
 
 
 # --- tensile tests ----------------------------------------------------------------------------------------------------
@@ -63,7 +41,7 @@ def tensile_document(asked: Scenario, task: TensileTask, fit: TensileFit) -> dic
     best = fit.best
     before = None if task.before is None else tensile_misfit(task.before, task.stretch, task.stress)
     return {
-        **_head(asked),
+        **document_head(asked.title, "identify", asked.conventions.name),
         "material": task.name,
         "files": list(task.files),
         "points": int(task.stretch.size),
@@ -72,7 +50,7 @@ def tensile_document(asked: Scenario, task: TensileTask, fit: TensileFit) -> dic
         "fitted_stretch": [float(v) for v in next(iter(fit.fits.values())).fitted_stretch],
         "before": None
         if before is None
-        else {"rmse_MPa": number(before.rmse / MEGAPASCAL), "mape_percent": number(before.mape)},
+        else {"rmse_MPa": number(before.rmse, MEGAPASCAL), "mape_percent": number(before.mape)},
         "best": None if best is None else best.law.name,
         "checks": [_check(check) for check in fit.checks],
         "laws": [_law(f) for f in fit.fits.values()],
@@ -102,10 +80,10 @@ def _law(fit: LawFit) -> dict[str, Any]:
         "standard_errors": {c.file_key: number(fit.standard_errors[c.name] / c.scale) for c in constants},
         "determined": {c.file_key: fit.determined[c.name] for c in constants},
         "at_bound": [c.file_key for c in constants if c.name in fit.at_bound],
-        "correlation": _matrix(fit.correlation),
+        "correlation": plain(fit.correlation),
         "condition": number(fit.condition),
         "r_squared": number(fit.r_squared),
-        "rmse_MPa": number(fit.misfit.rmse / MEGAPASCAL),
+        "rmse_MPa": number(fit.misfit.rmse, MEGAPASCAL),
         "mape_percent": number(fit.misfit.mape),
         "unstable_from_stretch": fit.unstable_from,
         "checks": [_check(check) for check in fit.checks],
@@ -138,7 +116,7 @@ def material_file_text(task: TensileTask, fit: TensileFit) -> str:
             block.append(f"{c.file_key} = {value!r}  # +- {error:.2g}{f.notes[c.name] and f', {f.notes[c.name]}'}")
         note = f"# R^2 = {f.r_squared:.6f}, rmse {f.misfit.rmse / MEGAPASCAL:.3g} MPa"
         problem = [f"{f.status}: {f.problem}"] if f.problem else []
-        lines += ["", note, *(f"# {_plain(w)}" for w in (*problem, *f.warnings))]
+        lines += ["", note, *(f"# {_one_line(w)}" for w in (*problem, *f.warnings))]
         lines += block if f.material is not None else [f"# {line}" for line in block]
     return "\n".join(lines) + "\n"
 
@@ -160,7 +138,7 @@ def tensile_table_text(task: TensileTask, fit: TensileFit) -> str:
         [task.files[task.file_of_point[k]], task.stretch[k], task.stress[k] / MEGAPASCAL, *(c[k] for c in curves)]
         for k in range(task.stretch.size)
     ]
-    return _csv(header, rows)
+    return csv_text(header, rows, 10)
 
 
 # --- measurements of robots -------------------------------------------------------------------------------------------
@@ -174,21 +152,21 @@ def robot_document(asked: Scenario, task: RobotTask, found: Identified) -> dict[
         constants.append(
             {
                 "name": key,
-                "value": number(found.constants[k] / scale),
-                "standard_error": number(found.uncertainty.standard_errors[k] / scale),
-                "start": number(found.free.start[k] / scale),
-                "bounds": [number(found.free.lower[k] / scale), number(found.free.upper[k] / scale)],
+                "value": number(found.constants[k], scale),
+                "standard_error": number(found.uncertainty.standard_errors[k], scale),
+                "start": number(found.free.start[k], scale),
+                "bounds": [number(found.free.lower[k], scale), number(found.free.upper[k], scale)],
                 "at_bound": name in found.at_bound,
                 "determined": found.determined[name],
             }
         )
     return {
-        **_head(asked),
+        **document_head(asked.title, "identify", asked.conventions.name),
         "loads": loads_table(asked.loads),
         "status": str(found.status),
         "message": found.message,
         "constants": constants,
-        "correlation": _matrix(found.uncertainty.correlation),
+        "correlation": plain(found.uncertainty.correlation),
         "condition": number(found.uncertainty.condition),
         "weighted_rms": {"before": number(found.weighted_rms(False)), "after": number(found.weighted_rms())},
         "errors": {
@@ -219,7 +197,7 @@ def _rows(found: Identified, k: int) -> list[dict[str, Any]]:
     data = found.data[k]
     rows = []
     for j, P in enumerate(data.pressure):
-        row: dict[str, Any] = {"robot": data.label, "pressure_bar": [tidy(p, BAR) for p in P]}
+        row: dict[str, Any] = {"robot": data.label, "pressure_bar": pressure_bar(P)}
         for when, values in (("measured", data.values), ("before", found.before[k]), ("after", found.after[k])):
             row[when] = {
                 OUTPUTS[key].key: _value(OUTPUTS[key].shown(values[j, column_slice(key)]))
@@ -270,7 +248,7 @@ def identified_text(asked: Scenario, found: Identified) -> str:
         errors[key] = f"  # identified, +- {error:.2g}" if isfinite(error) else "  # identified, without standard error"
         if note := found.notes[name]:
             errors[key] = "  # identified, at its bound" if name in found.at_bound else f"{errors[key]}, {note}"
-    lines = [f"# Identified from {_plain(asked.title)}; tables to paste into a scenario."]
+    lines = [f"# Identified from {_one_line(asked.title)}; tables to paste into a scenario."]
     for table, values in scenario_tables(found).items():
         if table == "contact":
             lines += ["", "# for study blocked-force only"]
@@ -301,19 +279,7 @@ def robot_table_text(task: RobotTask, found: Identified) -> str:
         for j, row in enumerate(cells):
             pairs = [(found.before[k][j, c] / unit, found.after[k][j, c] / unit) for c, unit in picks]
             rows.append([*row, *(v if isfinite(v) else "" for pair in pairs for v in pair)])
-    return _csv(header, rows)
-
-
-def _matrix(values: Any) -> list[list[float | None]]:
-    return [[number(v) for v in row] for row in values]
-
-
-def _csv(header: list[str], rows: list[list[Any]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows([[f"{v:.10g}" if isinstance(v, float) else v for v in row] for row in rows])
-    return text.getvalue()
+    return csv_text(header, rows, 10)
 
 
 def _quoted(text: str, *, always: bool = False) -> str:
@@ -322,5 +288,5 @@ def _quoted(text: str, *, always: bool = False) -> str:
     return text if not always and bare.isascii() and bare.isalnum() else json.dumps(text, ensure_ascii=False)
 
 
-def _plain(text: str) -> str:
+def _one_line(text: str) -> str:
     return " ".join(text.split())

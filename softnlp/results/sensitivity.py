@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
-from math import isfinite
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softnlp.base.columns import BAR_, DEG, MM, NMM, N
 from softnlp.model.inputs import loads_table, package_version, pressure_bar
+from softnlp.results.document import plain
 from softnlp.studies.derivatives import entries_of
 from softnlp.studies.ellipsoids import Ellipsoid
 from softnlp.studies.report import SensitivityReport
-
-Array = NDArray[np.float64]
 
 SHOWN: Mapping[str, tuple[str, float]] = {unit.si: (unit.suffix, unit.scale) for unit in (MM, DEG, BAR_, NMM)}
 """The unit in which a unit of SI is shown, and its size."""
@@ -75,14 +70,8 @@ def sensitivity_document(report: SensitivityReport, title: str, step: int, notes
             "solved": report.sampled.solved,
             "asked": report.sampled.asked,
         }
-    plain: dict[str, Any] = _plain(document)
-    return plain
-
-
-def document_text(document: dict[str, Any]) -> str:
-    """Return the document as text, a list of numbers on one line."""
-    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
-    return re.sub(r"\[\n\s+([^\[\]{}\"]*?)\n\s+\]", lambda m: f"[{' '.join(m[1].split())}]", text) + "\n"
+    found: dict[str, Any] = plain(document)
+    return found
 
 
 def table_rows(report: SensitivityReport) -> Iterator[Rows]:
@@ -159,16 +148,3 @@ def _stem(name: str) -> str:
 
 def _ellipsoid(e: Ellipsoid) -> dict[str, Any]:
     return {"unit": e.unit, "semi_axes": e.semi_axes, "axes": e.axes}
-
-
-def _plain(value: Any) -> Any:
-    """Return Python's own types, None for what is not finite."""
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and not isfinite(value):
-        return None
-    return value

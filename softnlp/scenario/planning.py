@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from softnlp.batch.plan import CHUNK, Plan, cells
 from softnlp.scenario.read import Scenario, scenario_of
-from softnlp.sweep.table import pressure_table, varied_table
-from softnlp.sweep.task import WorkspaceTask
+from softnlp.sweep.task import WorkspaceTask, pressure_table, varied_table
 
 Array = NDArray[np.float64]
 
@@ -16,7 +15,7 @@ Array = NDArray[np.float64]
 def plan_of(scenario: Scenario) -> Plan:
     """Return the plan of a scenario of study "workspace".
 
-    Poses are numbered as `softnlp.sweep.table` lists them. Grids and samples are walked cell by cell, so that
+    Poses are numbered as `softnlp.sweep.task` lists them. Grids and samples are walked cell by cell, so that
     neighbours are solved together; pressures of the scenario's own in the order in which they are given.
 
     Raises

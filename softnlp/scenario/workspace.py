@@ -4,37 +4,27 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.errors import InputError, located, nearest
 from softnlp.base.reading import shown
-from softnlp.base.units import BAR, MILLIMETRE, NEWTON_MILLIMETRE
+from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.model.contact_settings import require_in_front
 from softnlp.model.materials import Material
-from softnlp.model.robot import DIMENSIONS, Robot
-from softnlp.model.rod import Vector
+from softnlp.model.robot import Robot
 from softnlp.scenario.contact import contact_settings
 from softnlp.scenario.schema_workspace import WorkspaceFile, WorkspaceTable
 from softnlp.sweep.manufacture import check_many
-from softnlp.sweep.table import combinations, varied_table
-from softnlp.sweep.task import Axis, WorkspaceTask
+from softnlp.sweep.task import Axis, WorkspaceTask, combinations, varied_quantities, varied_table
 
 Array = NDArray[np.float64]
 
 MOST_POSES = 20_000_000
 _CONTACT_OF_STEPS = ("offsets_mm", "offset_ramp", "target_force_N")
 _MATERIALS_AT_ONCE = 10_000
-
-
-class _Kind(NamedTuple):
-    """A quantity that may be varied: where it goes, and SI per file unit."""
-
-    quantity: str
-    place: int | Vector | None
-    scale: float
 
 
 def workspace_task(file: WorkspaceFile, robot: Robot, material: Material, pressures: Array) -> WorkspaceTask:
@@ -128,30 +118,9 @@ def _sets(table: WorkspaceTable, sets: int) -> tuple[int, ...]:
     return tuple(one - 1 for one in chosen)
 
 
-def _kinds(file: WorkspaceFile, material: Material) -> dict[str, _Kind]:
-    """Return what may be varied, by key."""
-    kinds: dict[str, _Kind] = {}
-    for letter, component in zip("xyz", range(3), strict=True):
-        kinds[f"tip_load.force_{letter}_N"] = _Kind("tip_force", component, 1.0)
-        kinds[f"tip_load.moment_{letter}_Nmm"] = _Kind("tip_moment", component, NEWTON_MILLIMETRE)
-    kinds["gravity.size_m_per_s2"] = _Kind("gravity", file.gravity.direction, 1.0)
-    for d in DIMENSIONS:
-        if d.scale is not None:
-            kinds[f"robot.{d.file_key}"] = _Kind(f"robot.{d.field}", None, d.scale)
-    for c in material.law.constants:
-        kinds[f"material.{c.file_key}"] = _Kind(f"material.{c.name}", None, c.scale)
-    kinds["material.density_kg_m3"] = _Kind("material.density", None, 1.0)
-    for name in ("elongation", "bending"):
-        kinds[f"stiffening.{name}"] = _Kind(f"stiffening.{name}", None, 1.0)
-    for name in ("area", "inertia"):
-        kinds[f"corrections.{name}"] = _Kind(f"corrections.{name}", None, 1.0)
-    kinds["corrections.bore_fraction"] = _Kind("corrections.bore_fraction", None, 1.0)
-    return kinds
-
-
 def _axes(file: WorkspaceFile, material: Material) -> tuple[Axis, ...]:
     """Return what differs besides the pressures, in the order of the file."""
-    kinds = _kinds(file, material)
+    kinds = varied_quantities(material, file.gravity.direction)
     axes = []
     for key, entry in _flat(file.workspace.vary).items():
         place = f"vary.{key}"

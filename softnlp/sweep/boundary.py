@@ -15,10 +15,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array, Index
 from softnlp.base.errors import InputError
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 FLATNESS = 1e-6  # of the largest extent: a cloud that is thinner is flat
 MOST_POINTS = 20_000  # of a Delaunay triangulation; more are thinned to one a cell

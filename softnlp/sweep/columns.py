@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.base.columns import DEG, MM, OUTPUTS
+from softnlp.base.arrays import Index
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.netcdf import flag_attributes
-from softnlp.base.units import NEWTON_MILLIMETRE
 from softnlp.batch.plan import Plan
 from softnlp.batch.poses import STATUSES, Lane, Rows
 from softnlp.model.gravity import gravity_words
-from softnlp.model.robot import DIMENSIONS
 from softnlp.studies.fields import FLAGS
+from softnlp.sweep.task import varied_quantities
 
 Array = NDArray[Any]
 
@@ -40,7 +40,7 @@ class Column:
     kind: str
     unit: str
     meaning: str
-    of: Callable[[Rows, NDArray[np.int64]], Array]
+    of: Callable[[Rows, Index], Array]
     more: dict[str, Any] = field(default_factory=dict)
 
 
@@ -49,7 +49,7 @@ def columns(plan: Plan) -> tuple[Column, ...]:
     given = OUTPUTS["pressure"]
     return (
         _given(given.key, given.dims, given.unit.attribute, given.meaning, plan.pressures(), given.scale),
-        *_times(plan),
+        *(() if plan.times is None else (_given("t_s", (), "s", "time of the pose", plan.times, 1.0),)),
         *(c for name in plan.varied if name != "pressure" for c in _varied(plan, name)),
         *_POSE,
         *(_WALL if plan.contact is not None else ()),
@@ -62,12 +62,16 @@ def _tilt(rows: Rows) -> Array:
     return np.asarray(np.arctan2(np.hypot(axis[:, 0], axis[:, 1]), axis[:, 2]))
 
 
+def _lane(rows: Rows, numbers: Index) -> Array:
+    return np.asarray(rows["lane"])
+
+
 def _output(name: str, of: Callable[[Rows], Array] | None = None, kind: str = "f8") -> Column:
     """Return the column of an output, an entry of the rows where nothing else is said."""
     output = OUTPUTS[name]
     more = flag_attributes(FLAGS[name]) if name in FLAGS else {}
 
-    def values(rows: Rows, numbers: NDArray[np.int64]) -> Array:
+    def values(rows: Rows, numbers: Index) -> Array:
         return np.asarray(output.shown(rows[name] if of is None else of(rows)))
 
     return Column(output.key, output.dims, kind, output.unit.attribute, output.meaning, values, more)
@@ -88,64 +92,28 @@ _SOLVE = (
     _output("discretisation_error", lambda rows: rows["error"]),
     _output("intervals", kind="i4"),
     _output("iterations", kind="i4"),
-    Column(
-        "lane",
-        (),
-        "i1",
-        "1",
-        "which solver the pose comes from",
-        lambda rows, numbers: rows["lane"],
-        flag_attributes(_LANES),
-    ),
+    Column("lane", (), "i1", "1", "which solver the pose comes from", _lane, flag_attributes(_LANES)),
 )
 
 
-def _times(plan: Plan) -> tuple[Column, ...]:
-    return () if plan.times is None else (_given("t_s", (), "s", "time of the pose", plan.times, 1.0),)
-
-
-def _varied(plan: Plan, name: str) -> list[Column]:
-    """Return the columns of a varied quantity, named as the scenario names what may be varied."""
+def _varied(plan: Plan, name: str) -> Iterator[Column]:
+    """Yield the columns of a varied quantity, named as the scenario names what may be varied."""
     values = plan.values[:, plan.columns_of(name)]
-    table, _, entry = name.partition(".")
-    if name == "gravity":
-        size, words = np.linalg.norm(values, axis=1), gravity_words(values[int(np.argmax(np.abs(values).sum(axis=1)))])
-        return [_given("gravity_size_m_per_s2", (), "m/s^2", f"size of gravity; {words}", size, 1.0)]
-    if name in ("tip_force", "tip_moment"):
-        what, unit, scale = ("force", "N", 1.0) if name == "tip_force" else ("moment", "Nmm", NEWTON_MILLIMETRE)
-        shown = "N" if unit == "N" else "N mm"
-        return [
-            _given(f"tip_load_{what}_{x}_{unit}", (), shown, f"tip {what} along {x}", values[:, k], scale)
-            for k, x in enumerate("xyz")
-        ]
-    value = values[:, 0]
-    if table == "robot":
-        dimension = next(d for d in DIMENSIONS if d.field == entry)
-        unit = (DEG if dimension.file_key.endswith(DEG.suffix) else MM).attribute
-        meaning = f"{entry.replace('_', ' ')} of the robot"
-        return [_given(f"robot_{dimension.file_key}", (), unit, meaning, value, dimension.scale or 1.0)]
-    if name == "material.density":
-        return [_given("material_density_kg_m3", (), "kg/m^3", "density of the silicone", value, 1.0)]
-    if table == "material":
-        constant = next(c for c in plan.model.material.law.constants if c.name == entry)
-        meaning = f"constant {constant.name} of the silicone"
-        return [_given(f"material_{constant.file_key}", (), constant.unit, meaning, value, constant.scale)]
-    return [_given(name.replace(".", "_"), (), "1", f"coefficient {entry.replace('_', ' ')}", value, 1.0)]
+    for key, kind in varied_quantities(plan.model.material, plan.loads.gravity).items():
+        if kind.quantity == name:
+            size, meaning = values[:, kind.place if isinstance(kind.place, int) else 0], kind.meaning
+            if name == "gravity":
+                largest = values[int(np.argmax(np.abs(values).sum(axis=1)))]
+                size, meaning = np.linalg.norm(values, axis=1), f"{meaning}; {gravity_words(largest)}"
+            yield _given(key.replace(".", "_"), (), kind.unit, meaning, size, kind.scale)
 
 
-def _given(
-    name: str,
-    dims: tuple[str, ...],
-    unit: str,
-    meaning: str,
-    values: Array,
-    scale: float,
-) -> Column:
+def _given(name: str, dims: tuple[str, ...], unit: str, meaning: str, values: Array, scale: float) -> Column:
     """Return a column of what the plan gives."""
     return Column(name, dims, "f8", unit, meaning, partial(_in_file_unit, values, scale))
 
 
-def _in_file_unit(values: Array, scale: float, rows: Rows, numbers: NDArray[np.int64]) -> Array:
+def _in_file_unit(values: Array, scale: float, rows: Rows, numbers: Index) -> Array:
     """Return values in another unit, those that are short decimals as such: 0.3, not 0.30000000000000004."""
     given = values[numbers]
     converted = given / scale

@@ -1,22 +1,30 @@
-"""Comparing a workspace with measured tips or with another workspace: pose by pose at equal pressures."""
+"""Comparing a workspace with measured tips or with another workspace: pose by pose at equal pressures.
+
+Poses that the workspace does not hold are solved for this, from the tables that its file carries.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array, Index
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, MILLIMETRE
-from softnlp.sweep.again import solve_again
+from softnlp.model.conventions import Coefficients
+from softnlp.model.inputs import conventions_of_table, loads_of_table
+from softnlp.model.materials import material_from_table
+from softnlp.model.quantities import Model
+from softnlp.model.rod import Loads
+from softnlp.statics.step import Run, Step
+from softnlp.studies.forward import forward
 from softnlp.sweep.measured import Measured
 from softnlp.sweep.read import Workspace
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from softnlp.sweep.summary import varied_besides_pressure
 
 BENDING = OUTPUTS["bending_angle"]
 WITHIN = 1.0  # pressures that differ by no more are equal [Pa]
@@ -163,6 +171,52 @@ def compare_workspaces(workspace: Workspace, other: Workspace, *, within: float 
         unsolved=int(np.count_nonzero(has_pose & ~known)),
         skipped=0,
         reason="",
+    )
+
+
+def model_of(workspace: Workspace) -> tuple[Model, Loads]:
+    """Return the robot, silicone and loads that every pose of a sweep shares.
+
+    Raises
+    ------
+    InputError
+        When poses differ in more than pressure, when they stand at a wall, or when the file does not tell the model in
+        full (a law of one's own).
+    """
+    source = str(workspace.file)
+    if varied := varied_besides_pressure(workspace):
+        raise InputError(f"expected a sweep of pressures alone; this varies {', '.join(varied)} too", source=source)
+    if "contact" in workspace.attributes:
+        raise InputError("expected a sweep of free poses; this one stands at a wall", source=source)
+    try:
+        tables = workspace.attributes
+        made = material_from_table(tables["material"])
+        known = {f.name for f in fields(Coefficients)}
+        coefficients = Coefficients(**{k: float(v) for k, v in tables["coefficients"].items() if k in known})
+        conventions = conventions_of_table(tables["conventions_in_full"])
+        return Model(workspace.robot, made, coefficients, conventions), loads_of_table(tables["loads"])
+    except (KeyError, TypeError, ValueError) as error:
+        reason = error.message if isinstance(error, InputError) else f"no {error}"
+        raise InputError(f"the file does not tell the model in full: {reason}", source=source) from None
+
+
+def solve_again(workspace: Workspace, pressures: Array, progress: Callable[[int, Step], None] | None = None) -> Run:
+    """Solve the poses at further pressures (M, sets) [Pa] of a sweep's robot.
+
+    Raises
+    ------
+    InputError
+        As `model_of`.
+    """
+    model, loads = model_of(workspace)
+    return forward(
+        model.robot,
+        model.material,
+        pressures,
+        loads=loads,
+        coefficients=model.coefficients,
+        conventions=model.conventions,
+        progress=progress,
     )
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 import hashlib
-import json
+import os
 from collections.abc import Iterator, Mapping
-from datetime import UTC, datetime
+from io import FileIO
 from itertools import islice
 from os import PathLike
 from pathlib import Path
@@ -15,23 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.arrays import Index
 from softnlp.base.columns import by_key
 from softnlp.base.files import placed_whole
 from softnlp.base.netcdf import as_characters, encoded, put, put_attributes, put_characters, said
 from softnlp.batch.plan import Plan
 from softnlp.batch.poses import Rows
-from softnlp.model.inputs import (
-    coefficients_table,
-    contact_table,
-    conventions_table,
-    loads_table,
-    material_table,
-    robot_table,
-    versions,
-)
+from softnlp.model.inputs import file_attributes
 from softnlp.sweep.columns import LONGEST_STATUS, TEXT, Column, columns
 from softnlp.sweep.journal import Journal
-from softnlp.sweep.sink import Sink
 
 MEMORY = 128 * 2**20
 """Bytes of rows that are put in the order of the plan at once."""
@@ -57,22 +49,24 @@ def write_workspace(path: str | PathLike[str], plan: Plan, journal: Journal, abo
     """
     import h5netcdf
 
-    listed = columns(plan)
+    listed, fingerprint = columns(plan), plan.fingerprint()
+    own = file_attributes(
+        "workspace", plan.model, plan.loads, plan.contact, "varied", plan.varied, fingerprint=fingerprint
+    )
     with placed_whole(path) as part, part.open("w+b", buffering=0) as raw:
         # HDF5 that writes to a full disk by itself ends the interpreter.
         sink = Sink(raw)
         try:
             with h5netcdf.File(sink, "w") as file:
-                put_attributes(file, _attributes(plan) | dict(about))
+                put_attributes(file, own | dict(about))
                 _declare(file, plan, listed)
                 sink.check()
-                for start, rows in _slabs(plan, journal, MEMORY):
-                    numbers = np.arange(start, start + rows.size, dtype=np.int64)
+                for numbers, rows in _slabs(plan, journal, MEMORY):
                     for column in listed:
                         values = column.of(rows, numbers)
                         if column.kind == TEXT:
                             values = as_characters(values.astype(f"S{LONGEST_STATUS}"))
-                        file.variables[column.name][start : start + rows.size] = values
+                        file.variables[column.name][numbers[0] : numbers[-1] + 1] = values
                         sink.check()
                 _write_messages(file, journal, sink)
         finally:
@@ -96,8 +90,7 @@ def write_csv(path: str | PathLike[str], plan: Plan, journal: Journal) -> Path:
     with placed_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["pose", *(name for column in listed for name in _names(column, sizes))])
-        for start, rows in _slabs(plan, journal, MEMORY // 16):
-            numbers = np.arange(start, start + rows.size, dtype=np.int64)
+        for numbers, rows in _slabs(plan, journal, MEMORY // 16):
             cells: list[list[Any]] = [(numbers + 1).tolist()]
             for column in listed:
                 values = column.of(rows, numbers).reshape(rows.size, -1)
@@ -135,6 +128,71 @@ def fingerprint_of(path: str | PathLike[str]) -> str | None:
         return None
 
 
+class Sink:
+    """A file that HDF5 writes through Python: the first OSError is kept, and writing goes on as if into the void.
+
+    An error inside HDF5's own calls leaves its library in a state in which closing the file can end the interpreter.
+    `check` raises what was kept.
+    """
+
+    def __init__(self, file: FileIO) -> None:
+        self._file = file
+        self._error: OSError | None = None
+
+    def check(self) -> None:
+        """Raise the first error of the file."""
+        if self._error is not None:
+            raise self._error
+
+    def write(self, content: Any) -> int:
+        """Write all of it."""
+        rest = memoryview(content).cast("B")
+        size = len(rest)
+        try:
+            while rest and self._error is None:
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            self._error = error
+        return size
+
+    def read(self, size: int) -> bytes:
+        """Return so many bytes; those that cannot be read are zero."""
+        content = bytearray(size)
+        self.readinto(content)
+        return bytes(content)
+
+    def readinto(self, buffer: Any) -> int:
+        """Fill the buffer; what cannot be read is zero."""
+        rest = memoryview(buffer).cast("B")
+        size = len(rest)
+        try:
+            while rest and self._error is None and (count := self._file.readinto(rest)):
+                rest = rest[count:]
+        except OSError as error:
+            self._error = error
+        rest[:] = bytes(len(rest))
+        return size
+
+    def seek(self, position: int, whence: int = os.SEEK_SET) -> int:
+        """Go to a place of the file."""
+        return self._file.seek(position, whence)
+
+    def tell(self) -> int:
+        """Return the place in the file."""
+        return self._file.tell()
+
+    def truncate(self, size: int) -> int:
+        """Cut the file, or make it longer."""
+        try:
+            return self._file.truncate(size) if self._error is None else size
+        except OSError as error:
+            self._error = error
+            return size
+
+    def flush(self) -> None:
+        """Nothing is kept back."""
+
+
 def _sizes(plan: Plan) -> dict[str, int]:
     robot = plan.model.robot
     return {"set": robot.chamber_sets, "axis": 3, "row": 3, "col": 3, "chamber": robot.chambers}
@@ -157,8 +215,8 @@ def _declare(file: Any, plan: Plan, listed: tuple[Column, ...]) -> None:
             put_attributes(file.create_variable(column.name, dims, column.kind), attributes)
 
 
-def _slabs(plan: Plan, journal: Journal, memory: int) -> Iterator[tuple[int, Rows]]:
-    """Yield the first number and the rows of consecutive poses, in the order of the plan."""
+def _slabs(plan: Plan, journal: Journal, memory: int) -> Iterator[tuple[Index, Rows]]:
+    """Yield the numbers and the rows of consecutive poses, in the order of the plan."""
     kind = plan.row_type
     size = max(plan.chunk, memory // kind.itemsize)
     place = np.empty(plan.poses, np.int64)
@@ -174,7 +232,7 @@ def _slabs(plan: Plan, journal: Journal, memory: int) -> Iterator[tuple[int, Row
                 inside = (numbers >= start) & (numbers < stop)
                 numbers, given = numbers[inside], given[inside]
             rows.view(whole)[numbers - start] = given
-        yield start, rows
+        yield np.arange(start, stop, dtype=np.int64), rows
 
 
 def _write_messages(file: Any, journal: Journal, sink: Sink) -> None:
@@ -194,28 +252,6 @@ def _write_messages(file: Any, journal: Journal, sink: Sink) -> None:
         poses[start : start + len(part)] = np.array([pose + 1 for pose, _ in part], np.int64)
         texts[start : start + len(part)] = as_characters(encoded((text for _, text in part), width))
         sink.check()
-
-
-def _attributes(plan: Plan) -> dict[str, str]:
-    model = plan.model
-    tables = {
-        "robot": robot_table(model.robot),
-        "material": material_table(model.material),
-        "coefficients": coefficients_table(model.coefficients),
-        "loads": loads_table(plan.loads),
-        "versions": versions(),
-        "conventions_in_full": conventions_table(model.conventions),
-        "varied": list(plan.varied),
-        **({} if plan.contact is None else {"contact": contact_table(plan.contact)}),
-    }
-    return {
-        "study": "workspace",
-        "conventions": model.conventions.name,
-        "softnlp": versions()["softnlp"],
-        **{name: json.dumps(table, ensure_ascii=False, allow_nan=False) for name, table in tables.items()},
-        "fingerprint": plan.fingerprint(),
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
 
 
 def _names(column: Column, sizes: Mapping[str, int]) -> list[str]:

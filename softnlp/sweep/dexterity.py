@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from math import pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array, Index
 from softnlp.base.errors import InputError
 from softnlp.base.units import DEGREE
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 RESOLUTION = 10 * DEGREE
 VOXELS_ALONG = 20  # of a cloud's largest extent

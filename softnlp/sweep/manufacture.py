@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.errors import RobotError
 from softnlp.model.robot import DIMENSIONS, LENGTH_LIMITS, ROUND_OFF, Robot, check
-
-Array = NDArray[np.float64]
 
 _BLOCK = 65_536
 _MARGIN = 1e-12  # suspects are looked at again one by one [m]

@@ -7,15 +7,13 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import TIME_COLUMN, read_columns
 from softnlp.base.errors import InputError
 from softnlp.base.ranges import noise_note, without_noise
 from softnlp.base.units import BAR, MILLIMETRE
-
-Array = NDArray[np.float64]
 
 TIP_COLUMNS = tuple(OUTPUTS[f"tip_{x}"].measured for x in "xyz")
 

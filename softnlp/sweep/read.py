@@ -1,7 +1,8 @@
-"""Reading a finished sweep, `workspace.nc`: the columns that are needed, in SI, as flat arrays."""
+"""Reading a finished sweep, `workspace.nc`: the columns that are needed, in SI, as flat arrays; or all, as CSV."""
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,14 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.columns import OUTPUTS, by_key, outputs
 from softnlp.base.errors import InputError, nearest
+from softnlp.base.files import placed_whole
 from softnlp.base.reading import one_line
 from softnlp.base.status import Status
 from softnlp.model.inputs import robot_of_table
 from softnlp.model.robot import Robot
-
-Array = NDArray[np.float64]
 
 WORKSPACE_FILE = "workspace.nc"
 STATUSES: tuple[Status, ...] = tuple(Status)
@@ -28,6 +29,7 @@ _PRESSURE, _TIP, _BENDING, _ROTATION = (
     OUTPUTS[name] for name in ("pressure", "tip_position", "bending_angle", "tip_rotation")
 )
 _SLAB = 65_536  # poses read at a time where a column is not kept as it is in the file
+_BLOCK = 16_384  # poses written at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +168,7 @@ def workspace_file(path: str | PathLike[str]) -> Path:
 def column_names(workspace: Workspace) -> tuple[str, ...]:
     """Return the name of every number of a pose that the file holds, one for each component of a vector."""
     with _opened(workspace.file) as data:
-        return tuple(name for name, *_ in _columns(data))
+        return tuple(_columns(data))
 
 
 def read_column(workspace: Workspace, name: str) -> Column:
@@ -181,7 +183,7 @@ def read_column(workspace: Workspace, name: str) -> Column:
         For a name that the file does not hold; the text has the nearest one.
     """
     with _opened(workspace.file) as data:
-        known = {found: (variable, index) for found, variable, index in _columns(data)}
+        known = _columns(data)
         if name not in known:
             hint = nearest(name, known)
             raise InputError(
@@ -189,8 +191,9 @@ def read_column(workspace: Workspace, name: str) -> Column:
             )
         variable, index = known[name]
         values = np.asarray(data[variable][(slice(None), *index)], dtype=float)
-        unit = _unit(data[variable])
-        meaning = str(_text(data[variable].attrs.get("long_name", name)))
+        unit, meaning = (
+            str(_text(data[variable].attrs.get(key, other))) for key, other in (("units", "1"), ("long_name", name))
+        )
     if variable in _POSE_NUMBERS:
         values[~workspace.solved] = np.nan
     return Column(name, unit, meaning, values)
@@ -208,7 +211,7 @@ def read_block(workspace: Workspace, names: Sequence[str], rows: slice) -> list[
     blocks: dict[str, Any] = {}
     found = []
     with _opened(workspace.file) as data:
-        known = {name: (variable, index) for name, variable, index in _columns(data)}
+        known = _columns(data)
         for name in names:
             variable, index = known[name]
             if variable not in blocks:
@@ -218,6 +221,37 @@ def read_block(workspace: Workspace, names: Sequence[str], rows: slice) -> list[
                 values = np.where(hidden, np.nan, values)
             found.append(values)
     return found
+
+
+def export_csv(workspace: Workspace, path: str | PathLike[str]) -> Path:
+    """Write every number of every pose, with status, under its name in the file; empty where there is none.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be written.
+    """
+    names = column_names(workspace)
+    words = np.array([status.value for status in STATUSES], dtype=object)
+    with placed_whole(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["pose", "status", *names])
+        for start in range(0, workspace.poses, _BLOCK):
+            rows = slice(start, min(start + _BLOCK, workspace.poses))
+            cells: list[list[Any]] = [
+                list(range(rows.start + 1, rows.stop + 1)),
+                words[workspace.status[rows]].tolist(),
+            ]
+            cells += [_cells(column) for column in read_block(workspace, names, rows)]
+            table.writerows(zip(*cells, strict=True))
+    return Path(path)
+
+
+def _cells(values: Any) -> list[Any]:
+    """Return numbers as CSV has them: rounded to 12 digits, empty for NaN."""
+    if values.dtype.kind != "f":
+        return list(values.tolist())
+    return ["" if value != value else float(f"{value:.12g}") for value in values.tolist()]
 
 
 _POSE_NUMBERS = tuple(output.key for output in (*outputs("pose", "wall"), OUTPUTS["discretisation_error"]))
@@ -306,24 +340,21 @@ def _statuses(data: Any, N: int) -> NDArray[np.int8]:
     return codes
 
 
-def _columns(data: Any) -> Iterator[tuple[str, str, tuple[int, ...]]]:
-    """Yield (column, variable, index after the pose) of every number of a pose."""
+def _columns(data: Any) -> dict[str, tuple[str, tuple[int, ...]]]:
+    """Return (variable, index after the pose) of every number of a pose, by the name of its column."""
+    columns = {}
     for variable in sorted(data):
         found = data[variable]
-        if not hasattr(found, "dtype") or found.dtype.kind not in "fiu" or not _is_per_pose(found):
-            continue
-        if variable == "pose":
+        if variable == "pose" or getattr(found, "dtype", np.dtype("O")).kind not in "fiu" or not _is_per_pose(found):
             continue
         output = by_key(variable)
         for index in np.ndindex(*found.shape[1:]):
             if output is not None and len(output.entries) == len(index):
-                yield output.entry(index), variable, index
+                name = output.entry(index)
             else:
-                yield "_".join([variable, *(str(k + 1) for k in index)]), variable, index
-
-
-def _unit(found: Any) -> str:
-    return str(_text(found.attrs.get("units", "1")))
+                name = "_".join([variable, *(str(k + 1) for k in index)])
+            columns[name] = variable, index
+    return columns
 
 
 def _text(value: Any) -> Any:

@@ -30,7 +30,7 @@ from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR
 from softnlp.figures.style import colour
-from softnlp.results.csv_table import table_text
+from softnlp.results.table import table_text
 from softnlp.statics.step import Run, Step
 
 Array = NDArray[np.float64]

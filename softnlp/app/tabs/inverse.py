@@ -28,7 +28,7 @@ from softnlp.app.tabs.target_table import (
     words_of,
 )
 from softnlp.base.errors import InputError
-from softnlp.results.csv_table import table_text
+from softnlp.results.table import table_text
 from softnlp.statics.step import Step
 
 STUDY = "inverse"

@@ -27,7 +27,7 @@ from softnlp.base.columns import MM
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR
 from softnlp.figures.style import colour
-from softnlp.results.csv_table import table_text
+from softnlp.results.table import table_text
 from softnlp.statics.step import Run, Step
 
 STUDY = "forward"

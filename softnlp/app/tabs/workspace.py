@@ -12,8 +12,8 @@ from softnlp.app.stage import Stage
 from softnlp.app.tabs import cloud
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, MILLIMETRE
-from softnlp.figures.cloud import shown
-from softnlp.sweep.export import export_csv
+from softnlp.figures.space import shown
+from softnlp.sweep.read import export_csv
 
 STUDY = "workspace"
 _FIRST = {"levels": 8, "samples": 1000}

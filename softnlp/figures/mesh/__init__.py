@@ -1,9 +1,18 @@
 """Bodies as meshes: triangles for live display, and watertight solids for printing and moulds."""
 
 from softnlp.figures.mesh.display import DisplayMesh, Part, display_mesh
-from softnlp.figures.mesh.export import format_of, write_solids
 from softnlp.figures.mesh.rings import natural_body, resampled
-from softnlp.figures.mesh.solid import FACETS, HOLES, Solid, body_solid, cores, mould_body, require
+from softnlp.figures.mesh.solid import (
+    FACETS,
+    HOLES,
+    Solid,
+    body_solid,
+    cores,
+    format_of,
+    mould_body,
+    require,
+    write_solids,
+)
 
 __all__ = [
     "FACETS",

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.units import MILLIMETRE
 from softnlp.figures.mesh.rings import circle, placed, resampled
 from softnlp.model.robot import Robot
 from softnlp.results import Body
 
-Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 Indices = NDArray[np.int32]
 

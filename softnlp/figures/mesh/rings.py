@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.model.robot import Robot
 from softnlp.results import Body
 from softnlp.statics.body import turns
 from softnlp.statics.step import SectionRadii
-
-Array = NDArray[np.float64]
 
 _SMALL_TURN = 1e-4  # below it a series is more accurate than the quotient [rad]
 

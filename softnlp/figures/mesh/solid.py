@@ -2,32 +2,42 @@
 
 The polygon is made and triangulated once, so the sweep is closed and its normals point outwards by construction; where
 a shape passes through itself the solid does too, and `Solid.warnings` says so.
+
+Files hold millimetres. STL has no unit; a GLB's is the metre with y up, so its root carries that scale and turn.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
+from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.arrays import Array
 from softnlp.base.errors import InputError
+from softnlp.base.palette import colour
 from softnlp.base.units import MILLIMETRE
 from softnlp.figures.mesh.rings import circle, natural_body, placed, resampled
 from softnlp.model.robot import Robot
-from softnlp.results import Body
+from softnlp.results import Body, write_whole
 from softnlp.statics.body import fit_of, turns
 
 if TYPE_CHECKING:
     from manifold3d import CrossSection
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 FACETS = 96
 FACET_LIMITS = (8, 2000)
 HOLES = ("bore", "reinforced")
+FORMATS = (".stl", ".glb")
+_SILICONE = (0.93, 0.91, 0.88, 0.45)
+_LUMEN = (0.6, 0.6, 0.6, 0.3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +72,7 @@ def require(facets: int) -> None:
     low, high = FACET_LIMITS
     if not low <= facets <= high:
         raise InputError(f"expected a number of facets from {low} to {high}, got {facets}", key="facets")
-    _manifold3d()
+    _library("manifold3d")
 
 
 def body_solid(robot: Robot, body: Body, facets: int = FACETS) -> Solid:
@@ -149,14 +159,14 @@ def _silicone(robot: Robot, body: Body, hole: float, facets: int) -> CrossSectio
 
 def _section(outlines: list[Array]) -> CrossSection:
     """Return the union of outlines [m] as a section [mm]."""
-    return _manifold3d().CrossSection([outline / MILLIMETRE for outline in outlines])
+    return _library("manifold3d").CrossSection([outline / MILLIMETRE for outline in outlines])
 
 
 def _swept(name: str, body: Body, section: CrossSection, facets: int, chamber: int | None = None) -> Solid:
     """Sweep a section [mm] along a body."""
     loops = [np.asarray(loop, dtype=float) for loop in section.to_polygons()]
     flat = np.concatenate(loops)
-    cap = np.asarray(_manifold3d().triangulate(loops), dtype=np.int64)
+    cap = np.asarray(_library("manifold3d").triangulate(loops), dtype=np.int64)
     turned = float(np.sqrt((turns(body.rotation) ** 2).sum(axis=1)).sum())
     stations = 1 + max(1, int(np.ceil(turned * facets / (2 * np.pi))))
     axis = resampled(body, stations)
@@ -172,21 +182,79 @@ def _swept(name: str, body: Body, section: CrossSection, facets: int, chamber: i
     return Solid(name, points.reshape(-1, 3), faces, chamber=chamber)
 
 
-def _manifold3d() -> Any:
-    """Return the library that makes sections.
+# --- files -----------------------------------------------------------------------------------------------------------
+
+
+def format_of(path: str | PathLike[str]) -> str:
+    """Return ".stl" or ".glb", the format that a file name asks for.
 
     Raises
     ------
     InputError
-        Where it is not installed.
+        For another.
     """
+    kind = Path(path).suffix.lower()
+    if kind not in FORMATS:
+        raise InputError(f"expected a file name that ends in {' or '.join(FORMATS)}", source=str(path))
+    return kind
+
+
+def write_solids(solids: Sequence[Solid], robot: Robot, path: str | PathLike[str]) -> Path:
+    """Write solids to a file, whole; return its path.
+
+    An STL is one list of triangles; a GLB keeps each solid apart, with its name and colour (a chamber has its set's).
+
+    Raises
+    ------
+    InputError
+        Without the extra `mesh`, for a name that ends otherwise, or when the file cannot be written.
+    """
+    content = _stl(solids) if format_of(path) == ".stl" else _glb(solids, robot)
+    return write_whole(path, content)
+
+
+def _stl(solids: Sequence[Solid]) -> bytes:
+    trimesh = _library("trimesh")
+    return bytes(trimesh.util.concatenate([_mesh(solid) for solid in solids]).export(file_type="stl"))
+
+
+def _glb(solids: Sequence[Solid], robot: Robot) -> bytes:
+    trimesh = _library("trimesh")
+    to_metres = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+    to_metres[:3] *= MILLIMETRE
+    scene = trimesh.Scene()
+    for solid in solids:
+        mesh = _mesh(solid)
+        rgba = _colour(solid, robot)
+        mesh.visual = trimesh.visual.TextureVisuals(
+            material=trimesh.visual.material.PBRMaterial(
+                name=solid.name,
+                baseColorFactor=rgba,
+                metallicFactor=0.0,
+                roughnessFactor=0.7,
+                alphaMode="OPAQUE" if rgba[3] == 1 else "BLEND",
+            )
+        )
+        scene.add_geometry(mesh, node_name=solid.name, geom_name=solid.name, transform=to_metres)
+    return bytes(scene.export(file_type="glb"))
+
+
+def _colour(solid: Solid, robot: Robot) -> tuple[float, float, float, float]:
+    if solid.chamber is None:
+        return _SILICONE if solid.name == "body" else _LUMEN
+    word = colour(robot.set_of_chamber[solid.chamber])
+    r, g, b = (int(word[k : k + 2], 16) / 255 for k in (1, 3, 5))
+    return r, g, b, 1.0
+
+
+def _mesh(solid: Solid) -> Any:
+    return _library("trimesh").Trimesh(solid.vertices, solid.faces, process=False)
+
+
+def _library(name: str) -> Any:
+    """Return a library of the extra `mesh`, or raise `InputError` where it is not installed."""
     try:
-        import manifold3d
+        return import_module(name)
     except ImportError:
-        raise missing_extra() from None
-    return manifold3d
-
-
-def missing_extra() -> InputError:
-    """Return the error of a library that the extra brings."""
-    return InputError("solids need trimesh and manifold3d, which are not installed: pip install 'softnlp[mesh]'")
+        missing = "solids need trimesh and manifold3d, which are not installed: pip install 'softnlp[mesh]'"
+        raise InputError(missing) from None

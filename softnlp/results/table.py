@@ -1,24 +1,82 @@
-"""A run as a table for the terminal."""
+"""A run as tables: CSV, one row a step with the unit in each column's name, and a table for the terminal."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
-from typing import TYPE_CHECKING
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softnlp.base.columns import OUTPUTS, TABLES, Output, written
+from softnlp.base.files import write_whole
 from softnlp.base.units import BAR
 from softnlp.model.gravity import gravity_lines
+from softnlp.model.inputs import pressure_bar, tidy
+from softnlp.results.document import csv_text
 from softnlp.statics.step import Run, Step
-from softnlp.studies.fields import BLOCKED_FORCE, solved_pose, value
+from softnlp.studies.fields import BLOCKED_FORCE, closure_of, document_outputs, left_by_weights, solved_pose, value
 
 if TYPE_CHECKING:
     from rich.console import Group
 
 NONE = "-"
+
+
+def write_table(run: Run, path: str | PathLike[str]) -> Path:
+    """Write a run as CSV; pressures are in columns p1_bar, p2_bar, … as in a pressure file.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be written.
+    """
+    return write_whole(path, table_text(run).encode())
+
+
+def table_text(run: Run) -> str:
+    """Return the text of `write_table`."""
+    timed = any(step.time is not None for step in run.steps)
+    weighted = {line.equation: line.unit for step in run.steps for line in left_by_weights(step)}
+    header = ["step"] + ["t_s"] * timed
+    header += [f"p{k + 1}_bar" for k in range(run.robot.chamber_sets)]
+    columns = {output: output.keys({"chamber": run.robot.chambers}, "") for output in document_outputs(run)}
+    header += ["status", *(key for keys in columns.values() for key in keys)]
+    header += ["closure"] * (run.study == BLOCKED_FORCE)
+    header += ["_".join(["weighted_residual", *name.split(), unit.replace(" ", "")]) for name, unit in weighted.items()]
+    header += ["residual", "message", "warnings"]
+    rows = (list(_row(k, step, run, timed, columns, list(weighted))) for k, step in enumerate(run.steps, start=1))
+    return csv_text(header, rows)
+
+
+def _row(
+    number: int, step: Step, run: Run, timed: bool, columns: Mapping[Output, Sequence[str]], weighted: list[str]
+) -> Iterator[Any]:
+    yield number
+    if timed:
+        yield None if step.time is None else tidy(step.time)
+    yield from pressure_bar(step.pressure)
+    yield step.status.value
+    for output, keys in columns.items():
+        found = value(output, step)
+        yield from ([None] * len(keys) if found is None else map(_cell, np.ravel(found).tolist()))
+    if run.study == BLOCKED_FORCE:
+        yield closure_of(run, step)
+    left = {line.equation: line.value for line in left_by_weights(step)}
+    yield from (_cell(left.get(equation)) for equation in weighted)
+    yield _cell(step.residual)
+    yield step.message
+    yield "; ".join(step.warnings)
+
+
+def _cell(found: Any) -> Any:
+    """Return a number as CSV has it: true and false, nothing for NaN."""
+    if isinstance(found, bool):
+        return "true" if found else "false"
+    return found if found == found else None
 
 
 def table_lines(run: Run) -> Group:
