@@ -90,25 +90,24 @@ def read_columns(folder: Path, file: str, needed: Collection[str] = ()) -> Colum
     """
     label = one_line(file, LONGEST_NAME)
     try:
-        rows = list(csv_rows(read_text(folder / file)))
+        return _columns(label, list(csv_rows(read_text(folder / file))), needed)
     except InputError as error:
         raise InputError(f"{label}: {error.message}", key="file") from None
+
+
+def _columns(label: str, rows: list[tuple[int, list[str]]], needed: Collection[str]) -> Columns:
     if len(rows) < 2:
         got = "the header alone" if rows else "an empty file"
-        raise InputError(f"{label}: expected a header and rows of numbers, at least one row, got {got}", key="file")
+        raise InputError(f"expected a header and rows of numbers, at least one row, got {got}")
     header = tuple(one_line(name.strip(), LONGEST_NAME) for name in rows[0][1])
     for name in header:
         if name and header.count(name) > 1:
-            times = header.count(name)
-            raise InputError(f"{label}: expected each column once, got {shown(name)} {times} times", key="file")
+            raise InputError(f"expected each column once, got {shown(name)} {header.count(name)} times")
     for name in needed:
         if name not in header:
-            near = did_you_mean(name, header)
-            raise InputError(f"{label}: missing column {name!r}; it has {listed(header)}{near}", key="file")
+            raise InputError(f"missing column {name!r}; it has {listed(header)}{did_you_mean(name, header)}")
     for line, row in rows[1:]:
         if len(row) != len(header):
-            raise InputError(
-                f"{label}: line {line}: expected {len(header)} values as in the header, got {len(row)}", key="file"
-            )
+            raise InputError(f"line {line}: expected {len(header)} values as in the header, got {len(row)}")
     cells = tuple(tuple(row) for _, row in rows[1:])
     return Columns(label, header, cells, tuple(line for line, _ in rows[1:]))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json as json_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
-from softnlp.cli.figures import draw
+from softnlp.cli.study import Json, results_folder, show, write_results
 from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
@@ -26,7 +25,7 @@ def compare(
     closure: tuple[str, ...] = (),
     shape: str = "free",
     out: Path | None = None,
-    json: bool = False,
+    json: Json = False,
 ) -> int:
     """Compare a model with measured tips, bending angles, elongations, tilts or blocked forces.
 
@@ -53,10 +52,7 @@ def compare(
         Whether tips, angles and elongations are those of the free robot, or those of the blocked one.
     out
         Folder for the results; by default results/NAME_compare, where NAME is that of the scenario file.
-    json
-        Print one JSON document and nothing else; no files are written unless --out is given.
     """
-    from softnlp.cli.folder import require_writable
     from softnlp.results.comparison import comparison_document, require_free_names
     from softnlp.results.identify_document import document_text
     from softnlp.scenario.compare import Asked, compare_task
@@ -64,20 +60,13 @@ def compare(
 
     asked = load_scenario(scenario)
     task = compare_task(asked, measured, Asked(law, coefficients, conventions, closure, shape))
-    folder = out if out is not None or json else Path("results") / f"{scenario.stem}_compare"
+    folder = results_folder(out, json, f"{scenario.stem}_compare")
     if folder is not None:
-        require_writable(folder)
         require_free_names(task)
     found = _compared(task)
     document = document_text(comparison_document(task, found))
-    if folder is not None:
-        _write(folder, task, found, document)
-    if json:
-        say(document.rstrip("\n"))
-    else:
-        _say(task, found)
-        if folder is not None:
-            say(f"\nresults in {folder}")
+    write, table = (lambda to: _write(to, task, found, document)), (lambda: _say(task, found))
+    show(folder, json, write, lambda: document, table, gap="\n")
     lost = sum(found.lost(v) for v in range(len(found.variants)))
     return SOME_UNSOLVED if lost else SOLVED
 
@@ -151,21 +140,14 @@ def _complain_of_lost(found: Comparison) -> None:
 
 
 def _write(folder: Path, task: CompareTask, found: Comparison, document: str) -> None:
-    """Write the numbers, each file whole, after all of them are made, and then the figures."""
-    from softnlp.base.files import make_folder, write_whole
+    """Write the numbers and then the figures."""
     from softnlp.figures.compare import figure_makers
-    from softnlp.model.inputs import versions
     from softnlp.results.comparison import rows_text, summary_text
 
-    contents: dict[str, Any] = {
-        "comparison.json": document.encode(),
-        "rows.csv": rows_text(task, found).encode(),
-        "summary.csv": summary_text(found).encode(),
-        "versions.json": (json_module.dumps(versions(), indent=2) + "\n").encode(),
-        "scenario.toml": task.scenario.text.encode(),
-        "measured.csv": task.text.encode(),
+    texts = {
+        "comparison.json": document,
+        "rows.csv": rows_text(task, found),
+        "summary.csv": summary_text(found),
+        "measured.csv": task.text,
     }
-    make_folder(folder)
-    for name, content in contents.items():
-        write_whole(folder / name, content)
-    draw({folder / f"{name}.png": figure for name, figure in figure_makers(task, found).items()}, folder)
+    write_results(folder, task.scenario, texts, figure_makers(task, found))

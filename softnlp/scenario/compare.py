@@ -21,8 +21,8 @@ from softnlp.model.contact_settings import CLOSURES, ContactSettings, ContactTas
 from softnlp.model.conventions import CONVENTIONS, Coefficients, Conventions
 from softnlp.model.materials import Material, load_materials
 from softnlp.model.robot import Robot
+from softnlp.scenario.data import Scenario
 from softnlp.scenario.measured_rows import SCALARS, RobotRows, rows_by_robot
-from softnlp.scenario.read import Scenario
 from softnlp.studies.compare import SHAPES, compare
 from softnlp.studies.comparison import Comparison
 from softnlp.studies.measurements import Measurements

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
@@ -42,7 +43,7 @@ def pressure_path(table: PressureTable, sets: int, folder: Path) -> PressurePath
     InputError
         With the key (no table, no source), when not exactly one source is given or it does not fit the robot.
     """
-    given = [key for key in PressureTable.model_fields if getattr(table, key) is not None]
+    given = table.written(PressureTable.model_fields)
     if len(given) != 1:
         raise InputError(
             f"expected exactly one of {', '.join(PressureTable.model_fields)}, got {' and '.join(given) or 'none'}",
@@ -75,15 +76,18 @@ def _sequence(rows: list[list[float]], sets: int) -> Array:
     return np.array(rows, dtype=float)
 
 
+def require_sets(chosen: Sequence[int], sets: int, key: str) -> None:
+    """Refuse chamber sets, counted from 1, that the robot does not have or that are named twice."""
+    for number, one in enumerate(chosen, start=1):
+        if not 1 <= one <= sets:
+            raise InputError(f"item {number}: expected a chamber set from 1 to {sets}, got {shown(one)}", key=key)
+        if one in chosen[: number - 1]:
+            raise InputError(f"item {number}: expected each chamber set once, got {one} twice", key=key)
+
+
 def _ramp(ramp: RampTable, sets: int) -> Array:
     """Equal steps from one pressure to another in the named sets, zero in the others."""
-    for number, chosen in enumerate(ramp.sets, start=1):
-        if not 1 <= chosen <= sets:
-            raise InputError(
-                f"item {number}: expected a chamber set from 1 to {sets}, got {shown(chosen)}", key="ramp.sets"
-            )
-        if chosen in ramp.sets[: number - 1]:
-            raise InputError(f"item {number}: expected each chamber set once, got {chosen} twice", key="ramp.sets")
+    require_sets(ramp.sets, sets, "ramp.sets")
     pressures = np.zeros((ramp.steps, sets))
     pressures[:, [chosen - 1 for chosen in ramp.sets]] = np.linspace(ramp.from_bar, ramp.to_bar, ramp.steps)[:, None]
     return pressures * BAR

@@ -33,8 +33,8 @@ from softnlp.base.csv_columns import read_columns
 from softnlp.base.errors import InputError
 from softnlp.base.status import Status
 from softnlp.results.identify_document import identified_text, robot_table_text, scenario_tables
+from softnlp.scenario.identify import run_robots
 from softnlp.scenario.read import Scenario
-from softnlp.scenario.run_identify import run_robots
 from softnlp.studies.identified import Identified
 from softnlp.studies.identify_task import RobotTask
 from softnlp.studies.measurements import OBSERVABLES
