@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.base.errors import InputError, listed
+from softnlp.base.errors import InputError, listed, located
 from softnlp.base.ranges import range_of
 from softnlp.base.reading import LONGEST_NAME, did_you_mean, one_line, read_text, shown
 
@@ -79,20 +79,18 @@ class Columns:
 
     def wrong(self, row: int, name: str, message: str) -> InputError:
         """Return an error about a cell."""
-        return InputError(f"{self.file}: line {self.lines[row]}: {name}: {message}", key="file")
+        return InputError(f"line {self.lines[row]}: {name}: {message}", source=self.file)
 
 
 def read_columns(folder: Path, file: str, needed: Collection[str] = ()) -> Columns:
     """Return the columns of a CSV file.
 
-    Raises `InputError` with the key "file" for a file that cannot be read, a column that is missing or given twice, a
+    Raises `InputError` of the file for one that cannot be read, a column that is missing or given twice, a
     row of another length, or no row.
     """
     label = one_line(file, LONGEST_NAME)
-    try:
+    with located(source=label):
         return _columns(label, list(csv_rows(read_text(folder / file))), needed)
-    except InputError as error:
-        raise InputError(f"{label}: {error.message}", key="file") from None
 
 
 def _columns(label: str, rows: list[tuple[int, list[str]]], needed: Collection[str]) -> Columns:

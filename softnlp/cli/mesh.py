@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, say
-from softnlp.cli.folder import require_file
-from softnlp.cli.study import stepwise
+from softnlp.cli.study import require_file, stepwise
 
 if TYPE_CHECKING:
     from softnlp.figures.mesh import Solid

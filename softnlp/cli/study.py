@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json as json_module
+import os
+import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -12,7 +14,6 @@ from cyclopts import Parameter
 from softnlp.base.errors import InputError
 from softnlp.cli.console import STOPPED, complain, progress, say
 from softnlp.cli.figures import draw
-from softnlp.cli.folder import require_writable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,6 +48,41 @@ def results_folder(out: Path | None, json: bool, name: str) -> Path | None:
     if folder is not None:
         require_writable(folder)
     return folder
+
+
+def require_writable(folder: Path) -> None:
+    """Refuse a folder that cannot be made or written before time is spent on a solve; nothing is made yet."""
+    standing = next((p for p in (folder, *folder.parents) if os.path.lexists(p)), Path())
+    if not standing.is_dir():
+        raise InputError("expected a folder, got a file", source=str(standing))
+    for name in folder.parts[len(standing.parts) :]:
+        _require_possible(standing, name, folder)
+    if not os.access(standing, os.W_OK | os.X_OK):
+        raise InputError("this folder cannot be written", source=str(standing))
+    try:
+        with tempfile.TemporaryFile(dir=standing):  # what permissions do not tell: a kernel's folder, a full disk
+            pass
+    except OSError as error:
+        raise InputError(f"this folder cannot be written: {error.strerror}", source=str(standing)) from None
+
+
+def require_file(path: Path) -> None:
+    """Refuse a file that cannot be written, as `require_writable` does a folder."""
+    require_writable(path.parent)
+    _require_possible(path.parent, path.name, path)
+    if path.is_dir():
+        raise InputError("expected a file, got a folder", source=str(path))
+
+
+def _require_possible(standing: Path, name: str, asked: Path) -> None:
+    """Refuse a name that the file system does not take, such as one that is too long."""
+    try:
+        os.lstat(standing / name)
+    except (FileNotFoundError, NotADirectoryError):
+        return
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(f"not a possible file name: {reason}", source=str(asked)) from None
 
 
 def stepwise(

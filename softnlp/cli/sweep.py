@@ -67,7 +67,7 @@ def sweep(
     if asked.study != "workspace":
         raise InputError(f"expected a scenario of study 'workspace'; {asked.path} is of study {asked.study!r}")
     folder = out or Path("results") / scenario.stem
-    summary = _run(asked, folder, workers=workers or _processors(), cluster=cluster, resume=resume, csv=csv)
+    summary = _run(asked, folder, workers=workers, cluster=cluster, resume=resume, csv=csv)
     return _told(asked, folder, summary)
 
 
@@ -93,6 +93,7 @@ def _run(
     csv: bool = False,
 ) -> SweepSummary:
     """Run a sweep with a progress bar, and write what goes beside its result."""
+    from softnlp.results import write_whole
     from softnlp.scenario.workspace import run_sweep
     from softnlp.sweep.pool import cluster_executor
 
@@ -110,18 +111,10 @@ def _run(
             stop=stop,
             csv=csv,
         )
-    if not summary.stopped:
-        _write_beside(asked, folder, replace=bool(summary.written))
-    return summary
-
-
-def _write_beside(asked: Scenario, folder: Path, *, replace: bool) -> None:
-    """Write what was asked and what computed it beside a finished result; without `replace` only what is missing."""
-    from softnlp.results import write_whole
-
-    for name, text in beside(asked).items():
-        if replace or not (folder / name).exists():
+    for name, text in beside(asked).items():  # of a sweep that was finished already only what is missing
+        if not summary.stopped and (summary.written or not (folder / name).exists()):
             write_whole(folder / name, text.encode())
+    return summary
 
 
 def _told(asked: Scenario, folder: Path, summary: SweepSummary) -> int:

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import Columns, read_columns
-from softnlp.base.errors import InputError, located
+from softnlp.base.errors import InputError, located, of_table
 from softnlp.base.ranges import noise_note
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import Coefficients
@@ -84,7 +84,7 @@ def identify_task(given: Read) -> TensileTask | RobotTask:
             raise InputError("this table is not used by a tensile test; remove it", table=name)
         other = sorted(file.solver.model_fields_set - {"engine", "ipopt"})
         file.solver.refuse(other, "not used by a tensile test; remove it", "solver")
-        with located(table="tensile"):
+        with of_table("tensile"):
             return tensile_task(given, tensile)
     if measured is None or tensile is not None:
         got = "neither" if measured is None else "both"
@@ -96,7 +96,7 @@ def identify_task(given: Read) -> TensileTask | RobotTask:
     if wall.mode != "blocked" or wall.closure == "weighted":
         key = "mode" if wall.mode != "blocked" else "closure"
         raise InputError("expected a wall and the closure free, compliant or rigid", table="contact", key=key)
-    with located(table="measurements"):
+    with of_table("measurements"):
         return _robots(given, measured)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.csv_columns import TIME_COLUMN, csv_rows
-from softnlp.base.errors import InputError
+from softnlp.base.errors import InputError, located
 from softnlp.base.ranges import READING, TIME, noise_note, without_noise
 from softnlp.base.reading import LONGEST_NAME, did_you_mean, one_line, read_text, shown
 from softnlp.base.units import BAR
@@ -54,10 +54,8 @@ def pressure_path(table: PressureTable, sets: int, folder: Path) -> PressurePath
     if table.ramp is not None:
         return PressurePath(_ramp(table.ramp, sets), None)
     assert table.file is not None
-    try:
+    with located(source=one_line(table.file, LONGEST_NAME)):
         return _csv(read_text(folder / table.file), sets)
-    except InputError as error:
-        raise InputError(f"{one_line(table.file, LONGEST_NAME)}: {error.message}", key="file") from None
 
 
 def _path(readings: Array, times: Array | None = None) -> PressurePath:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from softnlp.base.errors import InputError
+from softnlp.base.errors import InputError, of_table
 from softnlp.base.reading import LARGEST_TOML, LONGEST_NAME, one_line, read_text, toml_tables
 from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
 from softnlp.model.conventions import COEFFICIENT_SETS, CONVENTIONS, Coefficients
@@ -145,15 +145,11 @@ def _steps(file: ScenarioFile, sets: int, folder: Path) -> PressurePath:
 def _attempt(errors: list[InputError], table: str, build: Callable[[], T]) -> T | None:
     """Return what is built, or None with the error added to the others."""
     try:
-        return build()
+        with of_table(table):
+            return build()
     except InputError as error:
-        errors.append(error.located(table=table) if error.source is None else _quoted(error, table))
+        errors.append(error)
         return None
-
-
-def _quoted(error: InputError, table: str) -> InputError:
-    """Quote an error that names another file, as one of the key that names that file."""
-    return type(error)(str(error), table=table, key="file")
 
 
 def placed(error: InputError, source: str) -> InputError:
