@@ -41,7 +41,7 @@ from softnlp.batch.chunk import ChunkSolver
 from softnlp.batch.plan import Plan, cells
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.quantities import Model
-from softnlp.scenario.run_workspace import run_sweep
+from softnlp.scenario.workspace import run_sweep
 from softnlp.sweep.dataset import data_hash
 from softnlp.sweep.run import WORKSPACE_FILE
 

@@ -21,9 +21,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from softnlp.batch.plan import Plan
-from softnlp.scenario.planning import plan_of
 from softnlp.scenario.read import scenario_from_text
-from softnlp.scenario.run_workspace import run_sweep
+from softnlp.scenario.workspace import plan_of, run_sweep
 from softnlp.sweep.dataset import data_hash
 from softnlp.sweep.run import WORKSPACE_FILE, SweepProgress
 

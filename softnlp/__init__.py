@@ -52,10 +52,10 @@ if TYPE_CHECKING:
     from softnlp.results import save as save
     from softnlp.results import to_dataset as to_dataset
     from softnlp.results import to_json as to_json
+    from softnlp.scenario.design import run_design as run_design
     from softnlp.scenario.read import load_scenario as load_scenario
     from softnlp.scenario.run import run_scenario as run_scenario
-    from softnlp.scenario.run_design import run_design as run_design
-    from softnlp.scenario.run_workspace import run_sweep as run_sweep
+    from softnlp.scenario.workspace import run_sweep as run_sweep
     from softnlp.statics.answer import Answer as Answer
     from softnlp.statics.answer import follow as follow
     from softnlp.statics.answer import solve as solve
@@ -111,8 +111,8 @@ _HOMES = {
     "results": ("save", "to_dataset", "to_json"),
     "scenario.read": ("load_scenario",),
     "scenario.run": ("run_scenario",),
-    "scenario.run_design": ("run_design",),
-    "scenario.run_workspace": ("run_sweep",),
+    "scenario.design": ("run_design",),
+    "scenario.workspace": ("run_sweep",),
     "statics.answer": ("Answer", "follow", "solve"),
     "statics.case": ("case",),
     "statics.posed": ("Problem", "problem"),

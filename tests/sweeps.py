@@ -15,8 +15,8 @@ import numpy as np
 from softnlp.base.status import Status
 from softnlp.batch.plan import Plan, cells
 from softnlp.batch.poses import STATUSES, Block, unsolved_rows
-from softnlp.scenario.planning import plan_of
 from softnlp.scenario.read import Scenario, scenario_from_text
+from softnlp.scenario.workspace import plan_of
 
 HEAD = """study = "workspace"
 [robot]

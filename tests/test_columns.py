@@ -201,8 +201,8 @@ def homes(key: str) -> set[str]:
 
 def test_the_scan_finds_a_home() -> None:
     """The test below would pass without reading anything; these are known."""
-    assert "scenario/schema_inverse.py" in homes("tip_position_mm")
-    assert "scenario/schema_design.py" in homes("pressure_bar")
+    assert "scenario/inverse.py" in homes("tip_position_mm")
+    assert "scenario/design.py" in homes("pressure_bar")
     assert len(SAID) > 25
 
 

@@ -37,16 +37,16 @@ from softnlp.cli import main
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import AS_PRINTED
 from softnlp.model.quantities import Model
-from softnlp.scenario.read import scenario_from_text
-from softnlp.scenario.run_design import run_design
-from softnlp.scenario.schema_design import (
+from softnlp.scenario.design import (
     ActuationTable,
     LimitsTable,
     MaterialChoices,
     ObjectiveTable,
     RequirementsTable,
     RobotChoices,
+    run_design,
 )
+from softnlp.scenario.read import scenario_from_text
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.wall import standing_wall

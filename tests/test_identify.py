@@ -36,8 +36,8 @@ from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.materials import Material
 from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
+from softnlp.scenario.identify import run_robots
 from softnlp.scenario.read import load_scenario, scenario_from_text
-from softnlp.scenario.run_identify import run_robots
 from softnlp.statics.blocked_grid import BlockedGrid
 from softnlp.studies import predicted_force, predicted_pose
 from softnlp.studies.blocked_force import blocked_force
@@ -586,6 +586,12 @@ GOOD = "p1_bar,p2_bar,p3_bar,bending_angle_deg\n1,0,0,80\n"
         (GOOD, 'free = ["k_b"]\nbounds = { k_e = [0, 1] }', ONE, "bounds.k_e"),
         (GOOD, 'free = ["k_b"]\nbounds = { k_b = [1, 0] }', ONE, "lower and an upper"),
         (GOOD, 'free = ["k_b"]', '[robots.mine]\nnam = "D25L60"\n', "did you mean 'name'"),
+        (
+            GOOD,
+            'free = ["k_b"]',
+            '[robots.allow]\nnam = "D25L60"\n',
+            "[robots] allow.nam: unknown key; did you mean 'name'",
+        ),
         ("robot," + GOOD.replace("\n1", "\nD25L6,1"), 'free = ["k_b"]', "", "did you mean 'D25L60'"),
         (GOOD, 'free = ["k_b"]', ONE + '[contact]\nclosure = "weighted"\n', "closure free, compliant or rigid"),
         (GOOD, 'free = ["k_b"]', ONE + "[contact]\ntarget_force_N = 1\n", "target_force_N"),

@@ -11,8 +11,8 @@ from sybil import Document, Example
 from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser
 
 from softnlp.cli import main
+from softnlp.scenario.identify import MeasurementsTable, SigmaTable, TensileTable
 from softnlp.scenario.read import scenario_from_text
-from softnlp.scenario.schema_identify import MeasurementsTable, SigmaTable, TensileTable
 from softnlp.studies.free_constants import COEFFICIENTS
 
 ROOT = Path(__file__).parents[1]

@@ -28,7 +28,7 @@ import threading, time
 from dataclasses import replace
 from softnlp import BAR, DesignTask, Material, at_most, design, function_law, material, robot, run_sweep
 from softnlp.scenario.read import scenario_from_text
-from softnlp.scenario.planning import plan_of
+from softnlp.scenario.workspace import plan_of
 threading.Thread(target=time.sleep, args=(60,), daemon=True).start()
 print("top level", flush=True)
 asked = scenario_from_text({TABLES!r}, "x.toml")

@@ -55,7 +55,7 @@ from softnlp.results import (
     write_table,
     write_whole,
 )
-from softnlp.scenario.contact import contact_settings
+from softnlp.scenario.blocked_force import contact_settings
 from softnlp.scenario.schema import ContactTable
 from softnlp.statics.step import Run, WeightSensitivity
 

@@ -13,9 +13,9 @@ from sweeps import QUICK, plan, scenario
 import softnlp
 from softnlp import InputError, load_scenario, run_design, run_scenario, run_sweep
 from softnlp.scenario.check import SCHEMAS
-from softnlp.scenario.planning import plan_of
 from softnlp.scenario.read import Scenario, scenario_from_text
 from softnlp.scenario.run import STUDIES
+from softnlp.scenario.workspace import plan_of
 from softnlp.sweep.read import Workspace, load_workspace, read_column
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"

@@ -600,7 +600,7 @@ def test_every_output_and_quantity_is_documented() -> None:
 
 def test_every_key_of_a_target_is_documented() -> None:
     from softnlp.base.columns import outputs
-    from softnlp.scenario.schema_inverse import BoundsTable, TargetTable
+    from softnlp.scenario.inverse import BoundsTable, TargetTable
 
     text = (ROOT / "docs" / "inverse.md").read_text()
     for key in (*TargetTable.model_fields, *BoundsTable.model_fields, *(output.key for output in outputs("target"))):

@@ -31,7 +31,7 @@ from softnlp.batch.poses import Block
 from softnlp.cli import main
 from softnlp.model.rod import Loads
 from softnlp.scenario.read import load_scenario
-from softnlp.scenario.run_workspace import run_sweep
+from softnlp.scenario.workspace import run_sweep
 from softnlp.statics.solver import PoseSolver
 from softnlp.sweep import pool
 from softnlp.sweep.audit import Audit

@@ -19,9 +19,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # benchmarks/ is not install
 from benchmarks import sweep_kill
 from softnlp import __version__
 from softnlp.batch.chunk import ChunkSolver
-from softnlp.scenario.planning import plan_of
 from softnlp.scenario.read import load_scenario
-from softnlp.scenario.run_workspace import run_sweep
+from softnlp.scenario.workspace import plan_of, run_sweep
 from softnlp.sweep.dataset import data_hash
 from softnlp.sweep.journal import Journal
 from softnlp.sweep.run import JOURNAL_FILE, WORKSPACE_FILE
@@ -56,7 +55,7 @@ def test_ctrl_c_keeps_what_was_solved(tmp_path: Path) -> None:
     out = tmp_path / "out"
     words = [sys.executable, "-m", "softnlp", "sweep", str(path), "--out", str(out), "--workers", "2"]
     code = (
-        "import sys, softnlp.scenario.planning as planning; from softnlp.cli import main; "
+        "import sys, softnlp.scenario.workspace as planning; from softnlp.cli import main; "
         "from dataclasses import replace; own = planning.plan_of; "
         "planning.plan_of = lambda asked: replace(own(asked), chunk=8); sys.exit(main(sys.argv[1:]))"
     )

@@ -18,7 +18,7 @@ from matplotlib.text import Text
 
 from softnlp.cli import main
 from softnlp.cli.console import say_rows
-from softnlp.cli.sweep import _bar
+from softnlp.cli.sweep import _Bar
 from softnlp.figures import run_figure
 from softnlp.figures.canvas import MissingGlyphs, OwnFigure
 from softnlp.figures.style import user_text
@@ -242,6 +242,6 @@ def test_the_bar_of_a_sweep_shows_any_title(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(screen, "isatty", lambda: True)
     monkeypatch.setattr(sys, "stderr", screen)
     news = SweepProgress(done=1, poses=2, already=0, failed=1, seconds=1.0)
-    with _bar("[red]{x} %s") as bar:
+    with _Bar("[red]{x} %s") as bar:
         bar.show(news)
     assert "[red]{x} %s" in screen.getvalue()

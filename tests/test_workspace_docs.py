@@ -12,10 +12,8 @@ from sweeps import HEAD, QUICK, made_up, plan
 
 from softnlp import load_scenario
 from softnlp.base.units import BAR
-from softnlp.scenario.planning import plan_of
 from softnlp.scenario.read import scenario_from_text
-from softnlp.scenario.run_workspace import run_sweep
-from softnlp.scenario.schema_workspace import WorkspaceTable
+from softnlp.scenario.workspace import WorkspaceTable, plan_of, run_sweep
 from softnlp.sweep.columns import columns
 from softnlp.sweep.dataset import write_workspace
 from softnlp.sweep.journal import Journal

@@ -23,8 +23,7 @@ from softnlp.batch.plan import CHUNK, Plan, cells
 from softnlp.model.laws import Law, formula_law, function_law
 from softnlp.model.materials import Material
 from softnlp.model.robot import ROBOTS, check
-from softnlp.scenario.planning import plan_of
-from softnlp.scenario.workspace import MOST_POSES
+from softnlp.scenario.workspace import MOST_POSES, plan_of
 from softnlp.sweep.manufacture import check_many
 from softnlp.sweep.task import unit_samples
 
@@ -224,7 +223,7 @@ def test_a_fingerprint_is_the_same_in_another_process_and_after_pickling() -> No
     plan = planned(GRID, formula)
     assert pickle.loads(pickle.dumps(plan)).fingerprint() == plan.fingerprint()
     code = (
-        "import sys; from softnlp.scenario.planning import plan_of; "
+        "import sys; from softnlp.scenario.workspace import plan_of; "
         "from softnlp.scenario.read import scenario_from_text; "
         "print(plan_of(scenario_from_text(sys.stdin.read(), 'x.toml')).fingerprint())"
     )

@@ -16,7 +16,7 @@ from docs.paper.text import NONE, figure, fixed, page_text, scenario_link, table
 from softnlp import BAR, DEGREE, Design
 from softnlp.figures.design import design_figure
 from softnlp.figures.style import colour
-from softnlp.scenario.run_design import run_design
+from softnlp.scenario.design import run_design
 from softnlp.statics.step import Step
 from softnlp.studies.design_candidate import Candidate
 from softnlp.studies.design_task import DesignTask

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from softnlp.model.contact_settings import ContactSettings, ContactTask
 from softnlp.model.rod import Loads
-from softnlp.scenario.partial import run_of
+from softnlp.scenario.data import run_of
 from softnlp.scenario.read import Scenario
 from softnlp.statics.arc import arc_pose, unloaded_arc
 from softnlp.statics.blocked import BlockedSolver

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.base.errors import InputError, listed
+from softnlp.base.errors import InputError, listed, located
 from softnlp.base.ranges import range_of
 from softnlp.base.reading import LONGEST_NAME, did_you_mean, one_line, read_text, shown
 
@@ -79,36 +79,33 @@ class Columns:
 
     def wrong(self, row: int, name: str, message: str) -> InputError:
         """Return an error about a cell."""
-        return InputError(f"{self.file}: line {self.lines[row]}: {name}: {message}", key="file")
+        return InputError(f"line {self.lines[row]}: {name}: {message}", source=self.file)
 
 
 def read_columns(folder: Path, file: str, needed: Collection[str] = ()) -> Columns:
     """Return the columns of a CSV file.
 
-    Raises `InputError` with the key "file" for a file that cannot be read, a column that is missing or given twice, a
+    Raises `InputError` of the file for one that cannot be read, a column that is missing or given twice, a
     row of another length, or no row.
     """
     label = one_line(file, LONGEST_NAME)
-    try:
-        rows = list(csv_rows(read_text(folder / file)))
-    except InputError as error:
-        raise InputError(f"{label}: {error.message}", key="file") from None
+    with located(source=label):
+        return _columns(label, list(csv_rows(read_text(folder / file))), needed)
+
+
+def _columns(label: str, rows: list[tuple[int, list[str]]], needed: Collection[str]) -> Columns:
     if len(rows) < 2:
         got = "the header alone" if rows else "an empty file"
-        raise InputError(f"{label}: expected a header and rows of numbers, at least one row, got {got}", key="file")
+        raise InputError(f"expected a header and rows of numbers, at least one row, got {got}")
     header = tuple(one_line(name.strip(), LONGEST_NAME) for name in rows[0][1])
     for name in header:
         if name and header.count(name) > 1:
-            times = header.count(name)
-            raise InputError(f"{label}: expected each column once, got {shown(name)} {times} times", key="file")
+            raise InputError(f"expected each column once, got {shown(name)} {header.count(name)} times")
     for name in needed:
         if name not in header:
-            near = did_you_mean(name, header)
-            raise InputError(f"{label}: missing column {name!r}; it has {listed(header)}{near}", key="file")
+            raise InputError(f"missing column {name!r}; it has {listed(header)}{did_you_mean(name, header)}")
     for line, row in rows[1:]:
         if len(row) != len(header):
-            raise InputError(
-                f"{label}: line {line}: expected {len(header)} values as in the header, got {len(row)}", key="file"
-            )
+            raise InputError(f"line {line}: expected {len(header)} values as in the header, got {len(row)}")
     cells = tuple(tuple(row) for _, row in rows[1:])
     return Columns(label, header, cells, tuple(line for line, _ in rows[1:]))

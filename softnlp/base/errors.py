@@ -97,3 +97,14 @@ def located(*, source: str | None = None, table: str | None = None) -> Iterator[
         yield
     except InputError as error:
         raise error.located(source=source, table=table) from None
+
+
+@contextmanager
+def of_table(table: str) -> Iterator[None]:
+    """Place an `InputError` from within in a table; one that names another file is quoted at the key for that file."""
+    try:
+        yield
+    except InputError as error:
+        if error.source is None:
+            raise error.located(table=table) from None
+        raise type(error)(str(error), table=table, key="file") from None

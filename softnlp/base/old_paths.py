@@ -11,13 +11,13 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
 
-# Package of then, package of now, the modules that went from one to the other; then those with a new name of their own.
+# Package of then, package of now, the modules that went from one to the other; then those of today that came of others.
 _MOVED = (
     ("", "base", "errors palette processes ranges reading status units"),
     ("", "model", "contact_settings conventions formula gravity laws material_reading materials numerics quantities"),
     ("", "model", "robot rod rules section tip"),
     ("", "nlp", "continuation implicit optimality problem solver transcription"),
-    ("", "scenario", "measured_rows pressures schema_design schema_identify schema_inverse schema_workspace"),
+    ("", "scenario", "measured_rows pressures"),
     ("", "statics", "body branch condensed loadcase stability unloaded"),
     ("evaluation", "base", "statistics"),
     ("evaluation", "studies", "compare comparison observed simulated variants"),
@@ -28,50 +28,44 @@ _MOVED = (
     ("studies", "statics", "arc attempts blocked blocked_grid blocked_step free_shape multistart pose pose_grid step"),
     ("studies", "statics", "wall weighted"),
     ("workspace", "batch", "blocked_lane chunk plan pose_lane poses"),
-    ("workspace", "scenario", "planning"),
 )
-_RENAMED = {
-    "columns": "base.csv_columns",
-    "mesh.export": "figures.mesh.solid",
-    "plots.abscissa": "figures.series",
-    "plots.blocked": "figures.run",
-    "plots.boxes": "figures.compare_parts",
-    "plots.cloud": "figures.space",
-    "plots.compare_tips": "figures.compare",
-    "plots.dexterity": "figures.workspace",
-    "plots.inverse": "figures.run",
-    "results.csv_table": "results.table",
-    "results.targets": "studies.fields",
-    "results.terminal": "results.table",
-    "results.view": "results.folder",
-    "runner": "scenario.run",
-    "runner_blocked": "scenario.run_blocked",
-    "runner_compare": "scenario.compare",
-    "runner_design": "scenario.run_design",
-    "runner_identify": "scenario.run_identify",
-    "runner_inverse": "scenario.run_inverse",
-    "runner_run": "scenario.partial",
-    "scenario_check": "scenario.check",
-    "scenario_contact": "scenario.contact",
-    "scenario_design": "scenario.design",
-    "scenario_identify": "scenario.identify",
-    "scenario_inverse": "scenario.inverse",
-    "scenario_schema": "scenario.schema",
-    "scenario_workspace": "scenario.workspace",
-    "studies.implicit": "nlp.directions",
-    "studies.statics": "statics.solver",
-    "workspace.again": "sweep.comparison",
-    "workspace.export": "sweep.read",
-    "workspace.sink": "sweep.dataset",
-    "workspace.table": "sweep.task",
-    "workspace.worker": "sweep.pool",
+_MERGED = {
+    "base.csv_columns": "columns",
+    "figures.compare": "plots.compare_tips",
+    "figures.compare_parts": "plots.boxes",
+    "figures.mesh.solid": "mesh.export",
+    "figures.run": "plots.blocked plots.inverse",
+    "figures.series": "plots.abscissa",
+    "figures.space": "plots.cloud",
+    "figures.workspace": "plots.dexterity",
+    "nlp.directions": "studies.implicit",
+    "results.folder": "results.view",
+    "results.table": "results.csv_table results.terminal",
+    "scenario.blocked_force": "runner_blocked scenario_contact",
+    "scenario.check": "scenario_check",
+    "scenario.compare": "runner_compare",
+    "scenario.data": "runner_run",
+    "scenario.design": "runner_design scenario_design schema_design",
+    "scenario.identify": "runner_identify scenario_identify schema_identify",
+    "scenario.inverse": "runner_inverse scenario_inverse schema_inverse",
+    "scenario.run": "runner",
+    "scenario.schema": "scenario_schema",
+    "scenario.workspace": "scenario_workspace schema_workspace workspace.planning",
+    "statics.solver": "studies.statics",
+    "studies.fields": "results.targets",
+    "sweep.comparison": "workspace.again",
+    "sweep.dataset": "workspace.sink",
+    "sweep.pool": "workspace.worker",
+    "sweep.read": "workspace.export",
+    "sweep.task": "workspace.table",
 }
+_RENAMED = {old: now for now, modules in _MERGED.items() for old in modules.split()}
 _FOLDERS = {"workspace": "sweep", "plots": "figures", "mesh": "figures.mesh", "evaluation": "studies"}
 # Names that left a module which is still there.
 _NAMES = {
     "loadcase": {"Equation": "nlp.case"},
     "quantities": {"Quantity": "base.quantity", "quantity": "base.quantity"},
-    "workspace.run": {"run_sweep": "scenario.run_workspace"},
+    "workspace.run": {"run_sweep": "scenario.workspace"},
 }
 
 _NEW = {f"{before}.{m}".lstrip("."): f"{now}.{m}" for before, now, modules in _MOVED for m in modules.split()}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 from softnlp.cli.console import BAD_INPUT, SOLVED, STOPPED, complain, say
@@ -54,19 +55,11 @@ def _app() -> App:
     from cyclopts import App, Parameter
 
     from softnlp import __version__
-    from softnlp.cli.compare import compare
-    from softnlp.cli.design import design
-    from softnlp.cli.example import example
-    from softnlp.cli.gui import gui
-    from softnlp.cli.identify import identify
-    from softnlp.cli.inverse import inverse
-    from softnlp.cli.library import materials, robots
-    from softnlp.cli.mesh import mesh
-    from softnlp.cli.plot import plot_material, plot_run, plot_section
-    from softnlp.cli.run import run
-    from softnlp.cli.sensitivity import sensitivity
-    from softnlp.cli.sweep import sweep
-    from softnlp.cli.workspace import workspace
+
+    def add(to: App, commands: str, module: str = "", prefix: str = "") -> None:
+        for name in commands.split():
+            home = import_module(f"softnlp.cli.{module or name}")
+            to.command(getattr(home, prefix + name), name=name)
 
     app = App(
         name="softnlp",
@@ -77,22 +70,9 @@ def _app() -> App:
         suppress_keyboard_interrupt=False,
         default_parameter=Parameter(negative=()),
     )
-    app.command(run)
-    app.command(workspace)
-    app.command(sweep)
-    app.command(inverse)
-    app.command(sensitivity)
-    app.command(identify)
-    app.command(compare)
-    app.command(design)
-    app.command(gui)
-    app.command(mesh)
-    app.command(example)
-    app.command(robots)
-    app.command(materials)
+    add(app, "run workspace sweep inverse sensitivity identify compare design gui mesh example")
+    add(app, "robots materials", "library")
     plot = App(name="plot", help="Draw a cross-section, silicones, or the results of a run.")
-    plot.command(plot_section, name="section")
-    plot.command(plot_material, name="material")
-    plot.command(plot_run, name="run")
+    add(plot, "section material run", "plot", "plot_")
     app.command(plot)
     return app

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
-from softnlp.cli.figures import draw
+from softnlp.cli.study import Json, results_folder, show, write_results
 from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def compare(
     closure: tuple[str, ...] = (),
     shape: str = "free",
     out: Path | None = None,
-    json: bool = False,
+    json: Json = False,
 ) -> int:
     """Compare a model with measured tips, bending angles, elongations, tilts or blocked forces.
 
@@ -52,10 +52,7 @@ def compare(
         Whether tips, angles and elongations are those of the free robot, or those of the blocked one.
     out
         Folder for the results; by default results/NAME_compare, where NAME is that of the scenario file.
-    json
-        Print one JSON document and nothing else; no files are written unless --out is given.
     """
-    from softnlp.cli.folder import require_writable
     from softnlp.results.comparison import comparison_document, require_free_names
     from softnlp.results.document import document_text
     from softnlp.scenario.compare import Asked, compare_task
@@ -63,20 +60,13 @@ def compare(
 
     asked = load_scenario(scenario)
     task = compare_task(asked, measured, Asked(law, coefficients, conventions, closure, shape))
-    folder = out if out is not None or json else Path("results") / f"{scenario.stem}_compare"
+    folder = results_folder(out, json, f"{scenario.stem}_compare")
     if folder is not None:
-        require_writable(folder)
         require_free_names(task)
     found = _compared(task)
     document = document_text(comparison_document(task, found), compact=False)
-    if folder is not None:
-        _write(folder, task, found, document)
-    if json:
-        say(document.rstrip("\n"))
-    else:
-        _say(task, found)
-        if folder is not None:
-            say(f"\nresults in {folder}")
+    write, table = (lambda to: _write(to, task, found, document)), (lambda: _say(task, found))
+    show(folder, json, write, lambda: document, table, gap="\n")
     lost = sum(found.lost(v) for v in range(len(found.variants)))
     return SOME_UNSOLVED if lost else SOLVED
 
@@ -150,10 +140,9 @@ def _complain_of_lost(found: Comparison) -> None:
 
 
 def _write(folder: Path, task: CompareTask, found: Comparison, document: str) -> None:
-    """Write the numbers, each file whole, after all of them are made, and then the figures."""
+    """Write the numbers and then the figures."""
     from softnlp.figures.compare import figure_makers
     from softnlp.results.comparison import rows_text, summary_text
-    from softnlp.results.folder import write_files
 
     texts = {
         "comparison.json": document,
@@ -161,5 +150,4 @@ def _write(folder: Path, task: CompareTask, found: Comparison, document: str) ->
         "summary.csv": summary_text(found),
         "measured.csv": task.text,
     }
-    write_files(folder, texts, task.scenario.text)
-    draw({folder / f"{name}.png": figure for name, figure in figure_makers(task, found).items()}, folder)
+    write_results(folder, task.scenario, texts, figure_makers(task, found))

@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
 from softnlp.base.errors import InputError
 from softnlp.base.reading import one_line
@@ -46,7 +47,12 @@ def complain(message: str) -> None:
 
 
 def say_rows(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print aligned columns of plain text, which pipes well; numbers to the right, a row a line whatever is in it."""
+    """Print aligned columns of plain text, which pipes well."""
+    say("\n".join(aligned(header, rows)))
+
+
+def aligned(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return the lines of a table: columns of numbers to the right, a row a line whatever is in it."""
     table = [[one_line(cell) for cell in row] for row in (header, *rows)]
     widths = [max(len(row[k]) for row in table) for k in range(len(header))]
     numeric = [all(_is_number(row[k]) for row in rows) for k in range(len(header))]
@@ -54,15 +60,29 @@ def say_rows(header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     for row in table:
         cells = (c.rjust(w) if n else c.ljust(w) for c, w, n in zip(row, widths, numeric, strict=True))
         lines.append("  ".join(cells).rstrip())
-    say("\n".join(lines))
+    return lines
 
 
 def _is_number(text: str) -> bool:
     try:
-        float(text)
+        float(text.replace(",", ""))
     except ValueError:
         return False
     return True
+
+
+def rich_text(heading: str, lines: Any, width: int) -> str:
+    """Return a heading and what rich prints below it as text, coloured on a terminal, of at least a width."""
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console(highlight=False)
+    if not console.is_terminal or console.width < width:
+        console = Console(highlight=False, width=width)
+    with console.capture() as shown:
+        console.print(Text(heading, "bold"))
+        console.print(lines)
+    return shown.get().rstrip("\n")
 
 
 @contextmanager

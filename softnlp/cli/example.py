@@ -9,7 +9,7 @@ from typing import Any
 
 from softnlp.base.errors import InputError, nearest
 from softnlp.cli.console import say, say_rows
-from softnlp.cli.folder import require_writable
+from softnlp.cli.study import require_writable
 
 
 def example(name: str | None = None, /, *, out: Path = Path("scenarios"), all: bool = False) -> None:

@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say, say_rows
-from softnlp.cli.figures import draw
+from softnlp.cli.study import Json, Out, Stopped, results_folder, scenario_for, show, write_results
 from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from softnlp.scenario.read import Scenario
     from softnlp.studies.identified import Identified
     from softnlp.studies.identify_task import TensileTask
     from softnlp.studies.tensile import TensileFit
 
-
-class _Stop(Exception):
-    """Ends an identification between two evaluations."""
+_GUESS = 40  # evaluations; nobody knows how many there will be
 
 
-def identify(scenario: Path, /, *, out: Path | None = None, json: bool = False) -> int:
+def identify(scenario: Path, /, *, out: Out = None, json: Json = False) -> int:
     """Find constants from a tensile test or from measurements of robots, as a scenario of study "identify" asks.
 
     Prints the constants with their standard errors and what is left of the data; writes identified.json, table.csv,
@@ -37,58 +31,41 @@ def identify(scenario: Path, /, *, out: Path | None = None, json: bool = False) 
     ----------
     scenario
         TOML file; docs/identify.md lists what it may hold.
-    out
-        Folder for the results; by default results/NAME, where NAME is that of the scenario file.
-    json
-        Print one JSON document and nothing else; no files are written unless --out is given.
     """
-    from softnlp.scenario.read import load_scenario
-
-    asked = load_scenario(scenario)
-    if asked.study != "identify":
-        raise InputError(
-            f"expected 'identify', got {asked.study!r}; softnlp run runs it", source=str(scenario), key="study"
-        )
-    return run_study(asked, out, json)
+    return run_study(scenario_for(scenario, "identify", "expected 'identify', got {}; softnlp run runs it"), out, json)
 
 
 def run_study(asked: Scenario, out: Path | None, json: bool) -> int:
     """Identify what a scenario asks for, print it and write the results; return the exit status."""
-    from softnlp.cli.folder import require_writable
     from softnlp.studies.identify_task import TensileTask
 
-    folder = out if out is not None or json else Path("results") / asked.path.stem
-    if folder is not None:
-        require_writable(folder)
+    folder = results_folder(out, json, asked.path.stem)
     tensile = isinstance(asked.task, TensileTask)
     return _tensile(asked, folder, json) if tensile else _robots(asked, folder, json)
 
 
 def _tensile(asked: Scenario, folder: Path | None, json: bool) -> int:
+    from softnlp.results import identify_document as results
     from softnlp.results.document import document_text
-    from softnlp.results.identify_document import material_file_text, tensile_document, tensile_table_text
-    from softnlp.scenario.run_identify import run_tensile
+    from softnlp.scenario.tensile import run_tensile
     from softnlp.studies.identify_task import TensileTask
 
     task = asked.task
     assert isinstance(task, TensileTask)
     fit = run_tensile(asked)
-    document = document_text(tensile_document(asked, task, fit), compact=False)
-    if folder is not None:
+    document = document_text(results.tensile_document(asked, task, fit), compact=False)
+
+    def write(to: Path) -> None:
         from softnlp.figures import tensile_figure
 
-        texts = {
-            "identified.json": document,
-            "table.csv": tensile_table_text(task, fit),
-            "material.toml": material_file_text(task, fit),
+        tables = {
+            "table.csv": results.tensile_table_text(task, fit),
+            "material.toml": results.material_file_text(task, fit),
         }
-        _write(folder, asked, texts, partial(tensile_figure, fit, task.name, task.before))
-    if json:
-        say(document.rstrip("\n"))
-    else:
-        _say_tensile(task, fit)
-        if folder is not None:
-            say(f"results in {folder}")
+        figure = partial(tensile_figure, fit, task.name, task.before)
+        write_results(to, asked, {"identified.json": document, **tables}, {"figure": figure})
+
+    show(folder, json, write, lambda: document, lambda: _say_tensile(task, fit))
     for problem in fit.problems:
         complain(f"{asked.path.name}: [tensile] {problem}")
     return SOME_UNSOLVED if fit.problems else SOLVED
@@ -123,52 +100,45 @@ def _say_tensile(task: TensileTask, fit: TensileFit) -> None:
 
 def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
     from softnlp.base.status import Status
+    from softnlp.results import identify_document as results
     from softnlp.results.document import document_text
-    from softnlp.results.identify_document import identified_text, robot_document, robot_table_text
     from softnlp.studies.identify_task import RobotTask
 
     task = asked.task
     assert isinstance(task, RobotTask)
     try:
         found = _identified(asked)
-    except _Stop:
+    except Stopped:
         complain("stopped; an identification that is not finished leaves no constants")
         return STOPPED
     solved = found.status is Status.SOLVED
-    document = document_text(robot_document(asked, task, found), compact=False)
-    if folder is not None:
-        texts = {"identified.json": document, "table.csv": robot_table_text(task, found)}
-        figure = None
-        if solved:
-            from softnlp.figures import identified_figure
+    document = document_text(results.robot_document(asked, task, found), compact=False)
 
-            texts["identified.toml"] = identified_text(asked, found)
-            figure = partial(identified_figure, found, asked.title)
-        _write(folder, asked, texts, figure)
-    if json:
-        say(document.rstrip("\n"))
-    else:
-        _say_robots(asked, found)
-        if folder is not None:
-            say(f"results in {folder}")
+    def write(to: Path) -> None:
+        from softnlp.figures import identified_figure
+
+        texts = {"identified.json": document, "table.csv": results.robot_table_text(task, found)}
+        if solved:
+            texts["identified.toml"] = results.identified_text(asked, found)
+        figures = {"figure": partial(identified_figure, found, asked.title)}
+        write_results(to, asked, texts, figures if solved else {})
+
+    show(folder, json, write, lambda: document, lambda: _say_robots(asked, found))
     return SOLVED if solved else SOME_UNSOLVED
 
 
 def _identified(asked: Scenario) -> Identified:
     """Identify with a progress bar, which counts evaluations up to a guess of how many there will be."""
-    from softnlp.scenario.run_identify import run_robots
+    from softnlp.scenario.identify import run_robots
 
     with progress(_GUESS, asked.title) as (advance, stop_asked):
 
         def tell(evaluations: int, error: float) -> None:
             advance(min(evaluations, _GUESS - 1))
             if stop_asked():
-                raise _Stop
+                raise Stopped
 
         return run_robots(asked, tell)
-
-
-_GUESS = 40
 
 
 def _say_robots(asked: Scenario, found: Identified) -> None:
@@ -218,12 +188,3 @@ def _sigma_text(found: Identified, key: str) -> str:
     used = OUTPUTS[key].shown(np.concatenate(parts))
     low, high = float(np.min(used)), float(np.max(used))
     return f"{low:.3g}" if high <= low * 1.0001 else f"{low:.3g} to {high:.3g}"
-
-
-def _write(folder: Path, asked: Scenario, texts: Mapping[str, str], figure: Callable[[], Figure] | None) -> None:
-    """Write the numbers, each file whole, after all of them are made, and then the figure."""
-    from softnlp.results.folder import write_files
-
-    write_files(folder, texts, asked.text)
-    if figure is not None:
-        draw({folder / "figure.png": figure}, folder)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from softnlp.base.errors import InputError
+from softnlp.cli.run import run_steps
+from softnlp.cli.study import Json, Out, scenario_for
 
 
-def inverse(scenario: Path, /, *, out: Path | None = None, json: bool = False) -> int:
+def inverse(scenario: Path, /, *, out: Out = None, json: Json = False) -> int:
     """Find the pressures that bring the tip to the targets of a scenario file of study "inverse", in order.
 
     What `softnlp run` does with it, refusing other studies. A target that no pressure within the bounds reaches has
@@ -18,15 +19,5 @@ def inverse(scenario: Path, /, *, out: Path | None = None, json: bool = False) -
     ----------
     scenario
         TOML file; docs/inverse.md lists what it may hold.
-    out
-        Folder for the results; by default results/NAME, where NAME is that of the scenario file.
-    json
-        Print one JSON document and nothing else; no files are written unless --out is given.
     """
-    from softnlp.cli.run import run
-    from softnlp.scenario.read import load_scenario
-
-    asked = load_scenario(scenario)
-    if asked.study != "inverse":
-        raise InputError(f"expected study 'inverse', got {asked.study!r}", source=str(scenario), key="study")
-    return run(scenario, out=out, json=json)
+    return run_steps(scenario_for(scenario, "inverse", "expected study 'inverse', got {}"), out, json)

@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softnlp.base.errors import InputError
-from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say
-from softnlp.cli.folder import require_file
+from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, say
+from softnlp.cli.study import require_file, stepwise
 
 if TYPE_CHECKING:
     from softnlp.figures.mesh import Solid
     from softnlp.model.robot import Robot
     from softnlp.results import RunView
-    from softnlp.scenario.read import Scenario
-    from softnlp.statics.step import Step
-
-_WITH_STEPS = ("forward", "blocked-force", "inverse")
-
-
-class _Enough(Exception):
-    """Ends a run once the step asked for is there."""
 
 
 def mesh(
@@ -129,23 +120,22 @@ def _robot(path: Path) -> Robot:
 def _view_of(path: Path, step: int | None) -> tuple[RunView | None, int]:
     """Return the view up to a step, and its number; None where Ctrl-C came before it."""
     from softnlp.results import load_run, view_of_run
-    from softnlp.scenario.run import partial_run
+    from softnlp.scenario.read import load_scenario
+    from softnlp.scenario.run import STUDIES, partial_run, solve_steps
 
     if _is_run(path):
         view = load_run(path)
         return view, _number(step, len(view.bodies))
-    from softnlp.scenario.read import load_scenario
-
     asked = load_scenario(path)
-    if asked.study not in _WITH_STEPS:
+    if asked.study not in STUDIES:
         raise InputError(
-            f"expected {', '.join(map(repr, _WITH_STEPS))} for the body of a step, got {asked.study!r}; --undeformed "
+            f"expected {', '.join(map(repr, STUDIES))} for the body of a step, got {asked.study!r}; --undeformed "
             "needs none",
             source=str(path),
             key="study",
         )
     number = _number(step, asked.step_count)
-    steps = _solved(asked, number)
+    steps, _ = stepwise(asked, number, lambda keep: solve_steps(asked, keep), to_end=False)
     return (view_of_run(partial_run(asked, steps)) if len(steps) == number else None), number
 
 
@@ -154,21 +144,3 @@ def _number(step: int | None, count: int) -> int:
     if not 1 <= number <= count:
         raise InputError(f"expected a step from 1 to {count}, got {number}", key="--step")
     return number
-
-
-def _solved(asked: Scenario, number: int) -> list[Step]:
-    """Solve the steps up to a number, each from the last, with a progress bar."""
-    from softnlp.scenario.run import solve_steps
-
-    steps: list[Step] = []
-    with progress(number, asked.title) as (advance, stop_asked):
-
-        def keep(index: int, step: Step) -> None:
-            steps.append(step)
-            advance(len(steps))
-            if len(steps) == number or stop_asked():
-                raise _Enough
-
-        with suppress(_Enough):
-            solve_steps(asked, keep)
-    return steps

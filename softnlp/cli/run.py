@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softnlp.base.errors import InputError
-from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say
+from softnlp.cli.console import SOLVED, SOME_UNSOLVED, rich_text, say
 from softnlp.cli.figures import draw
-from softnlp.cli.folder import require_writable
+from softnlp.cli.study import Json, Out, results_folder, show, stepwise, stopped_after
 from softnlp.model.contact_settings import ContactTask
 
 if TYPE_CHECKING:
     from softnlp.scenario.read import Scenario
-    from softnlp.statics.step import Run, Step
+    from softnlp.statics.step import Run
 
 _COMMANDS: Mapping[str, str] = {
     "workspace": "sweep",
@@ -29,13 +29,7 @@ _TABLE_WIDTH = 100
 _SET_WIDTH = 12  # of what each chamber set beyond the third adds to the table
 
 
-class _StopRun(Exception):
-    """Ends a run between two steps."""
-
-
-def run(
-    scenario: Path, /, *, out: Path | None = None, json: bool = False, branches: int = 0, ipopt_log: bool = False
-) -> int:
+def run(scenario: Path, /, *, out: Out = None, json: Json = False, branches: int = 0, ipopt_log: bool = False) -> int:
     """Solve every step of a scenario file in order, each started from the last.
 
     Prints a table and writes results.nc, table.csv, results.json, versions.json, figure.png and a copy of the scenario.
@@ -45,17 +39,12 @@ def run(
     ----------
     scenario
         TOML file; docs/scenario.md lists what it may hold.
-    out
-        Folder for the results; by default results/NAME, where NAME is that of the scenario file.
-    json
-        Print one JSON document and nothing else; no files are written unless --out is given.
     branches
         Of a blocked force only: start each step from so many other places as well, and warn where that finds another
         equilibrium. The result stays the one followed from zero pressure.
     ipopt_log
         Print the log of IPOPT on standard error.
     """
-    from softnlp.results import json_text
     from softnlp.scenario.read import load_scenario
 
     asked = load_scenario(scenario)
@@ -64,21 +53,20 @@ def run(
     _require_branches(asked, branches)
     if asked.study in _COMMANDS:
         return int(import_module(f"softnlp.cli.{_COMMANDS[asked.study]}").run_study(asked, out, json))
-    folder = out if out is not None or json else Path("results") / scenario.stem
-    if folder is not None:
-        require_writable(folder)
-    done, stopped = _solve(asked, branches)
-    try:
-        if folder is not None:
-            _write(done, folder, asked)
-    finally:  # the numbers are shown even where they cannot be written
-        say(json_text(done).rstrip("\n") if json else _table(done))
-    if folder is not None and not json:
-        say(f"results in {folder}")
-    if stopped:
-        kept = "" if folder is None else f"; those are in {folder}"
-        complain(f"stopped after {len(done.steps)} of {asked.step_count} steps{kept}")
-        return STOPPED
+    return run_steps(asked, out, json, branches)
+
+
+def run_steps(asked: Scenario, out: Path | None, json: bool, branches: int = 0) -> int:
+    """Run a scenario whose study is a list of steps; see `run`."""
+    from softnlp.results import json_text
+    from softnlp.scenario.run import partial_run, solve_steps
+
+    folder = results_folder(out, json, asked.path.stem)
+    steps, whole = stepwise(asked, asked.step_count, lambda keep: solve_steps(asked, keep, branches))
+    done = partial_run(asked, steps) if whole is None else whole
+    show(folder, json, lambda to: _write(done, to, asked), lambda: json_text(done), lambda: say(_table(done)))
+    if whole is None:
+        return stopped_after(len(steps), asked.step_count, "steps", folder)
     return SOME_UNSOLVED if done.failed else SOLVED
 
 
@@ -109,26 +97,6 @@ def _require_branches(asked: Scenario, branches: int) -> None:
         )
 
 
-def _solve(asked: Scenario, branches: int) -> tuple[Run, bool]:
-    """Run a scenario with a progress bar; return the steps that were done and whether it was stopped before the end."""
-    from softnlp.scenario.run import partial_run, solve_steps
-
-    total = asked.step_count
-    steps: list[Step] = []
-    with progress(total, asked.title) as (advance, stop_asked):
-
-        def keep(index: int, step: Step) -> None:
-            steps.append(step)
-            advance(len(steps))
-            if stop_asked() and len(steps) < total:
-                raise _StopRun
-
-        try:
-            return solve_steps(asked, keep, branches), False
-        except _StopRun:
-            return partial_run(asked, steps), True
-
-
 def _write(done: Run, folder: Path, asked: Scenario) -> None:
     """Write results and figure."""
     from softnlp.figures import run_figure
@@ -139,18 +107,8 @@ def _write(done: Run, folder: Path, asked: Scenario) -> None:
 
 
 def _table(done: Run) -> str:
-    """Return the table of a run as text, coloured on a terminal; never narrower than its numbers need."""
-    from rich.console import Console
-    from rich.text import Text
-
+    """Return the table of a run as text; never narrower than its numbers need."""
     from softnlp.results import table_lines
 
-    console = Console(highlight=False)
-    needed = _TABLE_WIDTH + _SET_WIDTH * max(0, done.robot.chamber_sets - 3)
-    if not console.is_terminal or console.width < needed:
-        console = Console(highlight=False, width=needed)
-    with console.capture() as shown:
-        heading = f"{done.title}: {done.robot.name}, {done.material.name} ({done.material.law.name})"
-        console.print(Text(heading, "bold"))
-        console.print(table_lines(done))
-    return shown.get().rstrip("\n")
+    heading = f"{done.title}: {done.robot.name}, {done.material.name} ({done.material.law.name})"
+    return rich_text(heading, table_lines(done), _TABLE_WIDTH + _SET_WIDTH * max(0, done.robot.chamber_sets - 3))

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
 from softnlp.cli.figures import draw
-from softnlp.cli.folder import require_writable
+from softnlp.cli.study import Json, Out, results_folder, scenario_for
 from softnlp.model.gravity import gravity_lines
 
 
@@ -21,8 +21,8 @@ def sensitivity(
     step: int | None = None,
     tolerance: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
     samples: int = 200,
-    out: Path | None = None,
-    json: bool = False,
+    out: Out = None,
+    json: Json = False,
 ) -> int:
     """Differentiate the tip and shape of one step of a forward scenario, and draw what follows from it.
 
@@ -42,28 +42,19 @@ def sensitivity(
         inertia, bore_fraction, pressure_bar (each set), tip force (force_N) and moment (moment_Nmm, each component).
     samples
         Draws of the check; 0 leaves it out.
-    out
-        Folder for the results; by default results/NAME, where NAME is that of the scenario file.
-    json
-        Print one JSON document and nothing else; no files are written unless --out is given.
     """
     from softnlp.results.document import document_text
     from softnlp.results.sensitivity import sensitivity_document, table_rows
-    from softnlp.scenario.read import load_scenario
     from softnlp.studies.report import named_tolerances, sensitivity_report
 
-    asked = load_scenario(scenario)
-    if asked.study != "forward":
-        raise InputError(f"expected study 'forward', got {asked.study!r}", source=str(scenario), key="study")
+    asked = scenario_for(scenario, "forward", "expected study 'forward', got {}")
     count = len(asked.pressures)
     chosen = count if step is None else step
     if not 1 <= chosen <= count:
         raise InputError(f"expected a step from 1 to {count}, got {chosen}", key="--step")
     if samples < 0 or samples == 1:
         raise InputError(f"expected 0, or at least 2 samples, got {samples}", key="--samples")
-    folder = out if out is not None or json else Path("results") / scenario.stem
-    if folder is not None:
-        require_writable(folder)
+    folder = results_folder(out, json, scenario.stem)
     pressure = asked.pressures[chosen - 1]
     model = (asked.robot, asked.material, asked.coefficients)
     tolerances = named_tolerances(tolerance, *model, pressure)
@@ -73,12 +64,9 @@ def sensitivity(
             asked.material,
             pressure,
             tolerances,
-            loads=asked.loads,
-            coefficients=asked.coefficients,
-            conventions=asked.conventions,
-            numerics=asked.numerics,
             samples=samples,
             progress=advance,
+            **asked.settings,
         )
     document = sensitivity_document(report, asked.title, chosen, asked.warnings)
     if folder is not None:

@@ -8,14 +8,14 @@ import os
 import shlex
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softnlp.base.errors import InputError
 from softnlp.base.units import MILLIMETRE
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, interrupt_asked, say
+from softnlp.cli.study import beside
 from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def sweep(
     if asked.study != "workspace":
         raise InputError(f"expected a scenario of study 'workspace'; {asked.path} is of study {asked.study!r}")
     folder = out or Path("results") / scenario.stem
-    summary = _run(asked, folder, workers=workers or _processors(), cluster=cluster, resume=resume, csv=csv)
+    summary = _run(asked, folder, workers=workers, cluster=cluster, resume=resume, csv=csv)
     return _told(asked, folder, summary)
 
 
@@ -93,12 +93,13 @@ def _run(
     csv: bool = False,
 ) -> SweepSummary:
     """Run a sweep with a progress bar, and write what goes beside its result."""
-    from softnlp.scenario.run_workspace import run_sweep
+    from softnlp.results import write_whole
+    from softnlp.scenario.workspace import run_sweep
     from softnlp.sweep.pool import cluster_executor
 
     with ExitStack() as stack:
         executor: Executor | None = None if cluster is None else stack.enter_context(cluster_executor(cluster))
-        bar = stack.enter_context(_bar(asked.title))
+        bar = stack.enter_context(_Bar(asked.title))
         stop = stack.enter_context(interrupt_asked(bar.stopping))
         summary = run_sweep(
             asked,
@@ -110,23 +111,10 @@ def _run(
             stop=stop,
             csv=csv,
         )
-    if not summary.stopped:
-        _write_beside(asked, folder, replace=bool(summary.written))
+    for name, text in beside(asked).items():  # of a sweep that was finished already only what is missing
+        if not summary.stopped and (summary.written or not (folder / name).exists()):
+            write_whole(folder / name, text.encode())
     return summary
-
-
-def _write_beside(asked: Scenario, folder: Path, *, replace: bool) -> None:
-    """Write what was asked and what computed it beside a finished result; without `replace` only what is missing."""
-    from softnlp.model.inputs import versions
-    from softnlp.results import write_whole
-
-    contents = {
-        "scenario.toml": asked.text.encode(),
-        "versions.json": (json_module.dumps(versions(), indent=2) + "\n").encode(),
-    }
-    for name, content in contents.items():
-        if replace or not (folder / name).exists():
-            write_whole(folder / name, content)
 
 
 def _told(asked: Scenario, folder: Path, summary: SweepSummary) -> int:
@@ -199,20 +187,22 @@ def _processors() -> int:
         return os.cpu_count() or 1
 
 
-class _Bar:
-    """A progress bar that begins with the first news: its thread must not run yet when worker processes are forked."""
+class _Bar(ExitStack):
+    """A progress bar on a terminal, which begins with the first news: no thread may run when processes are forked."""
 
-    def __init__(self, stack: ExitStack, begin: Callable[[], Any]) -> None:
-        self._stack = stack
-        self._begin = begin
+    def __init__(self, title: str) -> None:
+        super().__init__()
+        self._title = title
         self._shown: Any = None
         self._task: Any = None
         self._note = ""
 
     def show(self, news: SweepProgress) -> None:
         """Show how far the sweep is."""
+        if not sys.stderr.isatty():
+            return
         if self._shown is None:
-            self._shown = self._stack.enter_context(self._begin())
+            self._shown = self.enter_context(self._begun())
             self._task = self._shown.add_task("", total=news.poses, completed=news.already, failed="", rate="")
         rate = (news.done - news.already) / news.seconds if news.seconds > 0 else 0.0
         self._shown.update(
@@ -229,46 +219,18 @@ class _Bar:
         if self._shown is not None:
             self._shown.update(self._task, description=self._note)
 
-
-class _NoBar:
-    """In place of a bar where standard error is no terminal."""
-
-    def show(self, news: SweepProgress) -> None:
-        """Show nothing."""
-
-    def stopping(self, _: str) -> None:
-        """Say nothing."""
-
-
-@contextmanager
-def _bar(title: str) -> Iterator[_Bar | _NoBar]:
-    """Yield a progress bar on standard error when that is a terminal."""
-    if not sys.stderr.isatty():
-        yield _NoBar()
-        return
-
-    def begin() -> Any:
+    def _begun(self) -> Any:
+        from rich import progress as rich
         from rich.console import Console
-        from rich.progress import (
-            BarColumn,
-            MofNCompleteColumn,
-            Progress,
-            RenderableColumn,
-            TextColumn,
-            TimeRemainingColumn,
-        )
         from rich.text import Text
 
         columns = (
-            RenderableColumn(Text(title)),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[rate]}"),
-            TimeRemainingColumn(),
-            TextColumn("[red]{task.fields[failed]}"),
-            TextColumn("{task.description}"),
+            rich.RenderableColumn(Text(self._title)),
+            rich.BarColumn(),
+            rich.MofNCompleteColumn(),
+            rich.TextColumn("{task.fields[rate]}"),
+            rich.TimeRemainingColumn(),
+            rich.TextColumn("[red]{task.fields[failed]}"),
+            rich.TextColumn("{task.description}"),
         )
-        return Progress(*columns, console=Console(stderr=True), transient=True)
-
-    with ExitStack() as stack:
-        yield _Bar(stack, begin)
+        return rich.Progress(*columns, console=Console(stderr=True), transient=True)

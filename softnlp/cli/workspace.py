@@ -12,7 +12,7 @@ import numpy as np
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, MILLIMETRE
-from softnlp.cli.console import SOLVED, SOME_UNSOLVED, progress, say
+from softnlp.cli.console import SOLVED, SOME_UNSOLVED, aligned, progress, say
 from softnlp.cli.figures import draw
 from softnlp.model.gravity import gravity_lines
 
@@ -84,7 +84,9 @@ def workspace(
         voxel=None if voxel_mm is None else voxel_mm * MILLIMETRE,
     )
     cloud, others = _places(found, out)
-    say("\n".join(_aligned(_summary_rows(found, summary))))
+    rows = list(_summary_rows(found, summary))
+    width = max(len(name) for name, _ in rows)
+    say("\n".join(f"{name.ljust(width)}  {value}" for name, value in rows))
     written = [] if compared is None else [_write_comparison(*compared, others("comparison", ".csv"))]
     if csv is not None:
         written.append(export_csv(found, csv))
@@ -99,25 +101,17 @@ def workspace(
     return SOME_UNSOLVED if asked_in_vain else SOLVED
 
 
-class _Places:
-    """Where the other files go: in the folder of the figure, named after it unless it has its usual name."""
+def _places(found: Workspace, out: Path | None) -> tuple[Path, Callable[[str, str], Path]]:
+    """Return the file of the figure, and what names the others: in its folder, and after it where it has a name.
 
-    def __init__(self, cloud: Path, own_name: bool) -> None:
-        self._folder, self._stem = cloud.parent, f"{cloud.stem}-" if own_name else ""
-
-    def __call__(self, name: str, suffix: str) -> Path:
-        return self._folder / f"{self._stem}{name}{suffix}"
-
-
-def _places(found: Workspace, out: Path | None) -> tuple[Path, _Places]:
-    """Return the file of the figure, and what names the others; a folder is made where it is missing."""
+    A folder is made where it is missing.
+    """
     from softnlp.base.files import make_folder
 
     if out is not None and out.suffix.lower() in _FIGURES and not out.is_dir():
-        return out, _Places(out, True)
+        return out, lambda name, suffix: out.with_name(f"{out.stem}-{name}{suffix}")
     folder = make_folder(found.file.parent if out is None else out)
-    cloud = folder / "workspace.png"
-    return cloud, _Places(cloud, False)
+    return folder / "workspace.png", lambda name, suffix: folder / f"{name}{suffix}"
 
 
 def _compared(found: Workspace, against: Path, within_bar: float) -> tuple[Comparison, Measured | None]:
@@ -155,12 +149,6 @@ def _write_comparison(compared: Comparison, measured: Measured | None, table: Pa
         writer.writerow(header)
         writer.writerows(rows)
     return table
-
-
-def _aligned(rows: Iterator[tuple[str, str]]) -> list[str]:
-    listed = list(rows)
-    width = max(len(name) for name, _ in listed)
-    return [f"{name.ljust(width)}  {value}" for name, value in listed]
 
 
 def _summary_rows(found: Workspace, s: Summary) -> Iterator[tuple[str, str]]:
@@ -225,16 +213,13 @@ def _comparison_lines(compared: Comparison) -> list[str]:
     from softnlp.base.statistics import groups, statistics
 
     every = np.ones(len(compared.row), bool)
-    table = [["pressurised", "pairs", "mean", "median", "RMSE", "max [mm]", "mean [%]"]]
+    table = []
     for name, mask in [*groups(compared.pressure), ("all", every)]:
         s = statistics(compared.distance[mask] / MILLIMETRE)
         numbers = [s.mean, s.median, s.rmse, s.largest, 100 * s.mean * MILLIMETRE / compared.length]
         table.append([name, f"{s.count:,}", *(f"{v:.3f}" for v in numbers)])
-    widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
     lines = [f"tip against {compared.against}; % of the length {compared.length / MILLIMETRE:.4g} mm"]
-    for row in table:
-        cells = [row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))]
-        lines.append("  ".join(cells))
+    lines += aligned(["pressurised", "pairs", "mean", "median", "RMSE", "max [mm]", "mean [%]"], table)
     if compared.angle is not None:
         s = statistics(BENDING.shown(compared.angle))
         lines.append(

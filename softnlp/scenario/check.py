@@ -11,11 +11,11 @@ from pydantic_core import ErrorDetails
 from softnlp.base.errors import InputError, nearest
 from softnlp.base.ranges import numbers_outside
 from softnlp.base.reading import choices, did_you_mean, one_line, shown
+from softnlp.scenario.design import DesignFile
+from softnlp.scenario.identify import IdentifyFile
+from softnlp.scenario.inverse import InverseFile
 from softnlp.scenario.schema import BlockedForceFile, ForwardFile, ScenarioFile
-from softnlp.scenario.schema_design import DesignFile
-from softnlp.scenario.schema_identify import IdentifyFile
-from softnlp.scenario.schema_inverse import InverseFile
-from softnlp.scenario.schema_workspace import WorkspaceFile
+from softnlp.scenario.workspace import WorkspaceFile
 
 SCHEMAS: Mapping[str, type[ScenarioFile]] = {
     "forward": ForwardFile,
@@ -38,7 +38,8 @@ def parse(data: Mapping[str, Any]) -> ScenarioFile:
     InputError
         For the first key that does not fit, with the number of the others.
     """
-    schema = SCHEMAS[_study(data)]
+    study = _study(data)
+    schema = SCHEMAS[study]
     details, file = [], None
     try:
         file = schema.model_validate(data)
@@ -49,7 +50,7 @@ def parse(data: Mapping[str, Any]) -> ScenarioFile:
         if not any(loc[: len(place)] == place[: len(loc)] for loc in wrong):
             details.append({"type": "own", "loc": place, "msg": text, "input": number, "ctx": {"text": text}})
     if file is None or details:
-        raise first_of(list(_errors(schema, details)))
+        raise first_of(list(_errors(study, details)))
     return file
 
 
@@ -72,15 +73,16 @@ def _study(data: Mapping[str, Any]) -> str:
     return study
 
 
-def _errors(schema: type[ScenarioFile], details: list[ErrorDetails]) -> Iterator[InputError]:
+def _errors(study: str, details: list[ErrorDetails]) -> Iterator[InputError]:
     """Yield an error of ours for each of pydantic's: unknown keys first, they explain missing ones."""
+    schema = SCHEMAS[study]
     meant = set()
     for detail in (d for d in details if d["type"] == "extra_forbidden"):
         *place, key = detail["loc"]
         if not place and key in _TABLES:
-            yield _placed(detail, f"this table is not used by study {_study_of(schema)!r}; remove it")
+            yield _placed(detail, f"this table is not used by study {study!r}; remove it")
             continue
-        known = _keys(schema, tuple(place))
+        known = list(_model(schema, tuple(place)).model_fields)
         suggestion = nearest(str(key), known)
         meant |= {(*place, name) for name in known if suggestion == f"; did you mean {name!r}?"}
         is_table = not place and isinstance(detail["input"], dict)
@@ -88,11 +90,6 @@ def _errors(schema: type[ScenarioFile], details: list[ErrorDetails]) -> Iterator
     for detail in (d for d in details if d["type"] != "extra_forbidden"):
         if detail["type"] != "missing" or detail["loc"] not in meant:
             yield _placed(detail, _message(schema, detail))
-
-
-def _study_of(schema: type[ScenarioFile]) -> str:
-    """Return the study of a schema."""
-    return next(study for study, known in SCHEMAS.items() if known is schema)
 
 
 def _message(schema: type[ScenarioFile], detail: ErrorDetails) -> str:
@@ -107,24 +104,19 @@ def _message(schema: type[ScenarioFile], detail: ErrorDetails) -> str:
         known = get_args(_field(schema, detail["loc"]).annotation)
         hint = did_you_mean(value, known) if isinstance(value, str) else ""
         return f"expected {choices(known)}, got {shown(value)}{hint}"
-    if kind == "too_short":
-        return f"expected a list of at least {limits['min_length']}, got {shown(value)}"
-    if kind == "too_long":
-        return f"expected a list of at most {limits['max_length']}, got {shown(value)}"
     if kind == "string_too_long":
         return f"expected at most {limits['max_length']} characters, got {len(value)}"
-    if kind in _LIMITS:
-        return f"expected a number {_LIMITS[kind]} {next(iter(limits.values())):.10g}, got {shown(value)}"
-    return f"expected {_KINDS.get(kind, one_line(detail['msg']))}, got {shown(value)}"
+    expected = _EXPECTED[kind].format(**limits) if kind in _EXPECTED else one_line(detail["msg"])
+    return f"expected {expected}, got {shown(value)}"
 
 
-_LIMITS = {
-    "greater_than": "above",
-    "greater_than_equal": "of at least",
-    "less_than": "below",
-    "less_than_equal": "of at most",
-}
-_KINDS = {
+_EXPECTED = {
+    "too_short": "a list of at least {min_length}",
+    "too_long": "a list of at most {max_length}",
+    "greater_than": "a number above {gt:.10g}",
+    "greater_than_equal": "a number of at least {ge:.10g}",
+    "less_than": "a number below {lt:.10g}",
+    "less_than_equal": "a number of at most {le:.10g}",
     "float_type": "a number",
     "finite_number": "a finite number",
     "int_type": "a whole number",
@@ -157,11 +149,6 @@ def _field(schema: type[BaseModel], loc: tuple[int | str, ...]) -> Any:
     return _model(schema, tuple(path)).model_fields[key]
 
 
-def _keys(schema: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
-    """Return the keys that a table may hold."""
-    return list(_model(schema, loc).model_fields)
-
-
 def _model(schema: type[BaseModel], loc: tuple[int | str, ...]) -> type[BaseModel]:
     """Return the table at a place of the file."""
     for part in loc:
@@ -169,5 +156,5 @@ def _model(schema: type[BaseModel], loc: tuple[int | str, ...]) -> type[BaseMode
             continue  # a name that a person gave, as in [robots.NAME]
         annotation = schema.model_fields[str(part)].annotation
         candidates = (annotation, *get_args(annotation))
-        schema = next(a for a in candidates if isinstance(a, type) and issubclass(a, BaseModel))
+        schema = next((a for a in candidates if isinstance(a, type) and issubclass(a, BaseModel)), schema)
     return schema

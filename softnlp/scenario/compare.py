@@ -21,8 +21,8 @@ from softnlp.model.contact_settings import CLOSURES, ContactSettings, ContactTas
 from softnlp.model.conventions import CONVENTIONS, Coefficients, Conventions
 from softnlp.model.materials import Material, load_materials
 from softnlp.model.robot import Robot
+from softnlp.scenario.data import Scenario
 from softnlp.scenario.measured_rows import SCALARS, RobotRows, rows_by_robot
-from softnlp.scenario.read import Scenario
 from softnlp.studies.compare import SHAPES, compare
 from softnlp.studies.comparison import Comparison
 from softnlp.studies.measurements import Measurements
@@ -84,14 +84,6 @@ def compare_task(scenario: Scenario, path: str | PathLike[str], asked: Asked = A
     InputError
         For a study without steps at pressures, a file that does not fit, an unknown name.
     """
-    try:
-        return _task(scenario, path, asked)
-    except InputError as error:
-        # what reads columns speaks of a scenario's key; here the file is an argument
-        raise (InputError(error.message) if error.key == "file" else error) from None
-
-
-def _task(scenario: Scenario, path: str | PathLike[str], asked: Asked) -> CompareTask:
     _require_study(scenario)
     if asked.shape not in SHAPES:
         raise InputError(f"expected {choices(SHAPES)}, got {shown(asked.shape)}", key="--shape")

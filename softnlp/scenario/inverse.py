@@ -1,20 +1,62 @@
-"""The targets and bounds of a scenario of `inverse`, checked against each other, in SI units."""
+"""Inverse kinematics of a scenario: its tables, what they ask, checked and in SI units, and the run."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Annotated, Any
+
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ConfigDict, Field, PlainValidator, TypeAdapter
 
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, MILLIMETRE
-from softnlp.model.robot import Robot
-from softnlp.scenario.schema_inverse import BoundsTable, TargetTable
+from softnlp.scenario.data import Read, Scenario, run_of
+from softnlp.scenario.schema import MOST_STEPS, Normal, NotNegative, Positive, ScenarioFile, Table, Vector
+from softnlp.statics.step import Run, Step
+from softnlp.studies.inverse import follow_targets
+from softnlp.studies.inverse_solver import InverseSolver
 from softnlp.studies.inverse_task import InverseTask, Target
 
 Array = NDArray[np.float64]
+Rows = Annotated[list[Vector], Field(min_length=1, max_length=MOST_STEPS)]
+_STRICT = ConfigDict(strict=True, allow_inf_nan=False)
+_BOUNDS = TypeAdapter(Annotated[list[NotNegative], Field(min_length=1)], config=_STRICT)
+_PAIRS = TypeAdapter(Annotated[list[list[NotNegative]], Field(min_length=1)], config=_STRICT)
 
 
-def inverse_task(target: TargetTable, bounds: BoundsTable, robot: Robot) -> InverseTask:
+def _bounds(value: Any) -> list[float] | list[list[float]]:
+    """Return bounds as they are given: the form is chosen first, so that what is wrong is said of that form alone."""
+    pairs = isinstance(value, list) and any(isinstance(item, list) for item in value)
+    return (_PAIRS if pairs else _BOUNDS).validate_python(value)
+
+
+Bounds = Annotated[list[float] | list[list[float]], PlainValidator(_bounds)]
+Directions = Annotated[list[Normal], Field(min_length=1, max_length=MOST_STEPS)]
+
+
+class TargetTable(Table):
+    """[target]: where the tip is to be, which way it is to point, or both row by row."""
+
+    tip_position_mm: Rows | None = None
+    tip_direction: Directions | None = None
+    length_per_radian_mm: Positive | None = None
+
+
+class BoundsTable(Table):
+    """[bounds]: lowest and highest pressure, for all sets or for each."""
+
+    pressure_bar: Bounds = Field(default=[0.0, 1.5])
+
+
+class InverseFile(ScenarioFile):
+    """A whole scenario of `inverse`."""
+
+    target: TargetTable = Field(description="a table with tip_position_mm, tip_direction or both")
+    bounds: BoundsTable = BoundsTable()
+
+
+def inverse_task(given: Read) -> InverseTask:
     """Return what is asked of inverse kinematics.
 
     Raises
@@ -22,52 +64,47 @@ def inverse_task(target: TargetTable, bounds: BoundsTable, robot: Robot) -> Inve
     InputError
         With the table and the key, for rows that do not pair, and bounds that do not fit the robot.
     """
+    target: TargetTable = given.file.target
     positions, directions = target.tip_position_mm, target.tip_direction
     if positions is None and directions is None:
         raise InputError("expected tip_position_mm, tip_direction or both, got none", table="target")
-    if positions is not None and directions is not None and len(positions) != len(directions):
-        raise InputError(
-            f"expected one direction a position, got {len(directions)} for {len(positions)}",
-            table="target",
-            key="tip_direction",
-        )
-    if target.length_per_radian_mm is not None and (positions is None or directions is None):
-        raise InputError(
-            "expected only where tip_position_mm and tip_direction are both given",
-            table="target",
-            key="length_per_radian_mm",
-        )
-    lower, upper = _bounds(bounds, robot.chamber_sets)
-    count = len(positions) if positions is not None else len(directions or ())
+    if positions is None or directions is None:
+        needed = "expected only where tip_position_mm and tip_direction are both given"
+        target.refuse(["length_per_radian_mm"], needed, "target")
+    elif len(positions) != len(directions):
+        problem = f"expected one direction a position, got {len(directions)} for {len(positions)}"
+        raise InputError(problem, table="target", key="tip_direction")
+    lower, upper = _pressures(given.file.bounds, given.robot.chamber_sets)
     targets = tuple(
         Target(
             None if positions is None else np.array(positions[k]) * MILLIMETRE,
             None if directions is None else np.array(directions[k]),
         )
-        for k in range(count)
+        for k in range(len(positions or directions or ()))
     )
-    weight = float(robot.length)
+    weight = float(given.robot.length)
     if target.length_per_radian_mm is not None:
         weight = target.length_per_radian_mm * MILLIMETRE
-    return InverseTask(targets, lower, upper, weight)
+    return InverseTask(targets, lower, upper, weight, allow=tuple(given.file.robot.allow))
 
 
-def _bounds(table: BoundsTable, sets: int) -> tuple[Array, Array]:
+def _pressures(table: BoundsTable, sets: int) -> tuple[Array, Array]:
     """Return the bounds of each set [Pa]."""
     rows = table.pressure_bar
-    if any(isinstance(row, list) for row in rows):
-        if len(rows) != sets or not all(isinstance(row, list) and len(row) == 2 for row in rows):
-            raise _wrong(f"expected [lowest, highest], or {sets} such pairs, one for each chamber set")
-        pairs = np.array(rows, dtype=float)
-    else:
-        if len(rows) != 2:
-            raise _wrong(f"expected [lowest, highest], or {sets} such pairs, one for each chamber set")
-        pairs = np.tile(np.array(rows, dtype=float), (sets, 1))
-    for low, high in pairs:
-        if high < low:
-            raise _wrong(f"expected a highest pressure of at least the lowest, got [{low:g}, {high:g}]")
-    return pairs[:, 0] * BAR, pairs[:, 1] * BAR
+    pairs = rows if any(isinstance(row, list) for row in rows) else [rows] * sets
+    if len(pairs) != sets or not all(isinstance(pair, list) and len(pair) == 2 for pair in pairs):
+        problem = f"expected [lowest, highest], or {sets} such pairs, one for each chamber set"
+        raise InputError(problem, table="bounds", key="pressure_bar")
+    bounds = np.array(pairs, dtype=float)
+    for low, high in bounds[bounds[:, 1] < bounds[:, 0]][:1]:
+        problem = f"expected a highest pressure of at least the lowest, got [{low:g}, {high:g}]"
+        raise InputError(problem, table="bounds", key="pressure_bar")
+    return bounds[:, 0] * BAR, bounds[:, 1] * BAR
 
 
-def _wrong(message: str) -> InputError:
-    return InputError(message, table="bounds", key="pressure_bar")
+def run_inverse(scenario: Scenario, progress: Callable[[int, Step], None] | None, branches: int = 0) -> Run:
+    """Run inverse kinematics, a step a target; `branches` means nothing here."""
+    task = scenario.task
+    assert isinstance(task, InverseTask)
+    solver = InverseSolver(scenario.model, scenario.numerics, scenario.loads, task, "newton")
+    return run_of(scenario, follow_targets(solver, progress))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from array import array
+from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.csv_columns import TIME_COLUMN, csv_rows
-from softnlp.base.errors import InputError
+from softnlp.base.errors import InputError, located
 from softnlp.base.ranges import READING, TIME, noise_note, without_noise
 from softnlp.base.reading import LONGEST_NAME, did_you_mean, one_line, read_text, shown
 from softnlp.base.units import BAR
@@ -42,7 +43,7 @@ def pressure_path(table: PressureTable, sets: int, folder: Path) -> PressurePath
     InputError
         With the key (no table, no source), when not exactly one source is given or it does not fit the robot.
     """
-    given = [key for key in PressureTable.model_fields if getattr(table, key) is not None]
+    given = table.written(PressureTable.model_fields)
     if len(given) != 1:
         raise InputError(
             f"expected exactly one of {', '.join(PressureTable.model_fields)}, got {' and '.join(given) or 'none'}",
@@ -53,10 +54,8 @@ def pressure_path(table: PressureTable, sets: int, folder: Path) -> PressurePath
     if table.ramp is not None:
         return PressurePath(_ramp(table.ramp, sets), None)
     assert table.file is not None
-    try:
+    with located(source=one_line(table.file, LONGEST_NAME)):
         return _csv(read_text(folder / table.file), sets)
-    except InputError as error:
-        raise InputError(f"{one_line(table.file, LONGEST_NAME)}: {error.message}", key="file") from None
 
 
 def _path(readings: Array, times: Array | None = None) -> PressurePath:
@@ -75,15 +74,18 @@ def _sequence(rows: list[list[float]], sets: int) -> Array:
     return np.array(rows, dtype=float)
 
 
+def require_sets(chosen: Sequence[int], sets: int, key: str) -> None:
+    """Refuse chamber sets, counted from 1, that the robot does not have or that are named twice."""
+    for number, one in enumerate(chosen, start=1):
+        if not 1 <= one <= sets:
+            raise InputError(f"item {number}: expected a chamber set from 1 to {sets}, got {shown(one)}", key=key)
+        if one in chosen[: number - 1]:
+            raise InputError(f"item {number}: expected each chamber set once, got {one} twice", key=key)
+
+
 def _ramp(ramp: RampTable, sets: int) -> Array:
     """Equal steps from one pressure to another in the named sets, zero in the others."""
-    for number, chosen in enumerate(ramp.sets, start=1):
-        if not 1 <= chosen <= sets:
-            raise InputError(
-                f"item {number}: expected a chamber set from 1 to {sets}, got {shown(chosen)}", key="ramp.sets"
-            )
-        if chosen in ramp.sets[: number - 1]:
-            raise InputError(f"item {number}: expected each chamber set once, got {chosen} twice", key="ramp.sets")
+    require_sets(ramp.sets, sets, "ramp.sets")
     pressures = np.zeros((ramp.steps, sets))
     pressures[:, [chosen - 1 for chosen in ramp.sets]] = np.linspace(ramp.from_bar, ramp.to_bar, ramp.steps)[:, None]
     return pressures * BAR

@@ -3,116 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softnlp.base.errors import InputError, nearest
-from softnlp.base.reading import LARGEST_TOML, LONGEST_NAME, one_line, read_text, shown, toml_tables
+from softnlp.base.errors import InputError, of_table
+from softnlp.base.reading import LARGEST_TOML, LONGEST_NAME, one_line, read_text, toml_tables
 from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
-from softnlp.batch.plan import Plan
-from softnlp.model.contact_settings import ContactSettings
-from softnlp.model.conventions import COEFFICIENT_SETS, CONVENTIONS, Coefficients, Conventions
-from softnlp.model.materials import Material, material_from_table
+from softnlp.model.conventions import COEFFICIENT_SETS, CONVENTIONS, Coefficients
+from softnlp.model.materials import material_from_table
 from softnlp.model.numerics import Numerics
-from softnlp.model.quantities import Model
-from softnlp.model.robot import DIMENSIONS, ROBOTS, Robot, Violation, check, violations
+from softnlp.model.robot import Robot, Violation, violations
 from softnlp.model.rod import Loads
+from softnlp.scenario.blocked_force import contact_settings, contact_task
 from softnlp.scenario.check import first_of, parse
-from softnlp.scenario.contact import contact_settings, contact_task
+from softnlp.scenario.data import Read, Task
+from softnlp.scenario.data import Scenario as Scenario
 from softnlp.scenario.design import design_task
-from softnlp.scenario.identify import Given, identify_task
+from softnlp.scenario.identify import identify_task
 from softnlp.scenario.inverse import inverse_task
 from softnlp.scenario.pressures import PressurePath, pressure_path
-from softnlp.scenario.schema import RobotTable, ScenarioFile
+from softnlp.scenario.schema import ScenarioFile
 from softnlp.scenario.workspace import workspace_task
 from softnlp.studies.plausibility import modulus_notes
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
-
-
-class Task(Protocol):
-    """What a study is asked beyond the pressures, as frozen data in SI units."""
-
-    def step_count(self, pressures: int) -> int:
-        """Return how many steps the run has, for so many pressures of the scenario."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class Scenario:
-    """Everything that a scenario file asks for, in SI units.
-
-    Attributes
-    ----------
-    path, text
-        The file as it was named, and its content.
-    title
-        The file's stem when it gives none.
-    study
-        Which study it is.
-    robot, material, coefficients, conventions, loads
-        Of its tables, or the defaults.
-    pressures
-        (steps, sets) gauge [Pa], no steps where the study has none.
-    times
-        (steps,) [s], or None when the pressures have none.
-    numerics
-        Of its [solver], or the defaults.
-    contact
-        The wall, where there may be one, else None.
-    task
-        What else the study is asked.
-    warnings
-        Rules of manufacture that the robot breaks with leave, a silicone of an unlikely stiffness, and readings that
-        count as 0.
-    """
-
-    path: Path
-    text: str
-    title: str
-    study: str
-    robot: Robot
-    material: Material
-    coefficients: Coefficients
-    conventions: Conventions
-    loads: Loads
-    pressures: Array
-    times: Array | None
-    numerics: Numerics
-    contact: ContactSettings | None
-    task: Task | None
-    warnings: tuple[str, ...]
-
-    @property
-    def model(self) -> Model:
-        """Its robot, silicone, coefficients and conventions."""
-        return Model(self.robot, self.material, self.coefficients, self.conventions)
-
-    @property
-    def step_count(self) -> int:
-        """How many steps its run has when none is left out."""
-        return len(self.pressures) if self.task is None else self.task.step_count(len(self.pressures))
-
-
-class Read(NamedTuple):
-    """What the reader of a study's own tables may use.
-
-    file : the tables as checked. data : as they were parsed. steps : without rows where the study has no [pressure].
-    folder : where files that the scenario names are looked for.
-    """
-
-    file: Any
-    data: dict[str, Any]
-    robot: Robot
-    material: Material
-    steps: PressurePath
-    folder: Path
 
 
 def load_scenario(path: str | PathLike[str]) -> Scenario:
@@ -154,25 +72,6 @@ def scenario_from_text(text: str, path: str | PathLike[str]) -> Scenario:
         raise placed(error, fspath(path)) from None
 
 
-def scenario_of(given: object, study: str | None, function: str) -> Scenario:
-    """Return what a function was given, if that is a scenario of its study (None: of any).
-
-    Raises
-    ------
-    InputError
-        Naming the function to use instead.
-    """
-    wanted = f"{function} takes a scenario" + ("" if study is None else f" of study {study!r}")
-    if not isinstance(given, Scenario):
-        use = "softnlp.run_sweep solves a plan" if isinstance(given, Plan) else "softnlp.load_scenario reads one"
-        raise InputError(f"{wanted}, got a value of type {type(given).__name__}; {use}")
-    if study not in (None, given.study):
-        raise InputError(
-            f"{wanted}, got {given.study!r}; softnlp.run_scenario runs it", source=str(given.path), key="study"
-        )
-    return given
-
-
 def robot_of_scenario(path: str | PathLike[str]) -> tuple[Robot, tuple[Violation, ...]]:
     """Return the robot of a scenario file and the rules of manufacture that it breaks, whether allowed or not.
 
@@ -183,7 +82,7 @@ def robot_of_scenario(path: str | PathLike[str]) -> tuple[Robot, tuple[Violation
     """
     try:
         file = parse(parse_toml(read_text(Path(path), LARGEST_TOML)))
-        robot = _dimensions(file.robot)
+        robot = file.robot.described()
         return robot, violations(robot, file.robot.minimum_wall_mm * MILLIMETRE)
     except InputError as error:
         raise placed(error.located(table="robot"), fspath(path)) from None
@@ -194,7 +93,7 @@ def _scenario(text: str, path: Path) -> Scenario:
     data = parse_toml(text)
     file = parse(data)
     errors: list[InputError] = []
-    made = _attempt(errors, "robot", lambda: _robot(file.robot))
+    made = _attempt(errors, "robot", file.robot.made)
     silicone = data.get("material") or file.material.model_dump(exclude_none=True)
     chosen = _attempt(errors, "material", lambda: material_from_table(silicone, folder=path.parent))
     steps = made and _attempt(errors, "pressure", lambda: _steps(file, made[0].chamber_sets, path.parent))
@@ -210,6 +109,8 @@ def _scenario(text: str, path: Path) -> Scenario:
     if errors or made is None or chosen is None or steps is None or numerics is None:
         raise first_of(errors)
     robot, warnings = made
+    # Where constants are to be found, those given only begin the search.
+    unlikely = () if file.study == "identify" else modulus_notes(chosen.name, float(chosen.shear_modulus(1.0)))
     return Scenario(
         path=path,
         text=text,
@@ -225,13 +126,8 @@ def _scenario(text: str, path: Path) -> Scenario:
         numerics=numerics,
         contact=contact,
         task=task,
-        warnings=(*warnings, *_material_notes(file.study, chosen), *steps.notes),
+        warnings=(*warnings, *unlikely, *steps.notes),
     )
-
-
-def _material_notes(study: str, chosen: Material) -> tuple[str, ...]:
-    """Return what is unlikely of the silicone; where constants are to be found those given only begin the search."""
-    return () if study == "identify" else modulus_notes(chosen.name, float(chosen.shear_modulus(1.0)))
 
 
 def _numerics(file: ScenarioFile) -> Numerics:
@@ -249,15 +145,11 @@ def _steps(file: ScenarioFile, sets: int, folder: Path) -> PressurePath:
 def _attempt(errors: list[InputError], table: str, build: Callable[[], T]) -> T | None:
     """Return what is built, or None with the error added to the others."""
     try:
-        return build()
+        with of_table(table):
+            return build()
     except InputError as error:
-        errors.append(error.located(table=table) if error.source is None else _quoted(error, table))
+        errors.append(error)
         return None
-
-
-def _quoted(error: InputError, table: str) -> InputError:
-    """Quote an error that names another file, as one of the key that names that file."""
-    return type(error)(str(error), table=table, key="file")
 
 
 def placed(error: InputError, source: str) -> InputError:
@@ -274,53 +166,12 @@ def parse_toml(text: str) -> dict[str, Any]:
     return toml_tables(text)
 
 
-def _robot(table: RobotTable) -> tuple[Robot, tuple[str, ...]]:
-    """Return the robot and its warnings."""
-    robot = _dimensions(table)
-    try:
-        return robot, check(robot, allow=table.allow, minimum_wall=table.minimum_wall_mm * MILLIMETRE)
-    except InputError as error:
-        file_keys = {d.field: d.file_key for d in DIMENSIONS}
-        raise type(error)(error.message, key=file_keys.get(error.key or "", error.key)) from None
-
-
-def _dimensions(table: RobotTable) -> Robot:
-    """Return the robot of the table, whether it can be made or not."""
-    given: dict[str, Any] = {}
-    for dimension in DIMENSIONS:
-        value = getattr(table, dimension.file_key)
-        if value is not None:
-            given[dimension.field] = value if dimension.scale is None else value * dimension.scale
-    missing = [d.file_key for d in DIMENSIONS if d.field not in given]
-    if table.name is not None and table.name in ROBOTS:
-        changed = any(getattr(ROBOTS[table.name], key) != value for key, value in given.items())
-        return replace(ROBOTS[table.name], **given, name=f"{table.name} (modified)" if changed else table.name)
-    if not missing:
-        return Robot(name=table.name or "robot", **given)
-    if table.name is not None:
-        full = f" (missing: {', '.join(missing)})" if given else ""
-        raise InputError(
-            f"expected a robot of the library, or every dimension in full{full}, got {shown(table.name)}"
-            f"{nearest(table.name, ROBOTS)}",
-            key="name",
-        )
-    if given:
-        raise InputError("missing; without a name every dimension is needed", key=", ".join(missing))
-    raise InputError("missing; expected a robot of the library, or every dimension in full", key="name")
-
-
 def _coefficients(file: ScenarioFile) -> Coefficients:
     """Take the coefficients of the named set, and the file's own where it gives them."""
-    given = {
-        "elongation": file.stiffening.elongation,
-        "bending": file.stiffening.bending,
-        "area": file.corrections.area,
-        "inertia": file.corrections.inertia,
-        "bore_fraction": file.corrections.bore_fraction,
-    }
-    if (wall := getattr(file, "contact", None)) is not None:
-        given["chamber_reaction"] = wall.chamber_reaction
-    own: dict[str, Any] = {key: value for key, value in given.items() if value is not None}
+    own = file.stiffening.model_dump(exclude={"set"}, exclude_none=True)
+    own |= file.corrections.model_dump(exclude={"conventions"}, exclude_none=True)
+    if (wall := getattr(file, "contact", None)) is not None and wall.chamber_reaction is not None:
+        own["chamber_reaction"] = wall.chamber_reaction
     return replace(COEFFICIENT_SETS[file.stiffening.set], **own)
 
 
@@ -332,34 +183,11 @@ def _loads(file: ScenarioFile) -> Loads:
     return Loads(tip_force=(float(f_x), float(f_y), float(f_z)), tip_moment=(m_x, m_y, m_z), gravity=(g_x, g_y, g_z))
 
 
-def _contact_task(given: Read) -> Task:
-    return contact_task(given.file.contact, given.steps.pressures)
-
-
-def _workspace_task(given: Read) -> Task:
-    return workspace_task(given.file, given.robot, given.material, given.steps.pressures)
-
-
-def _inverse_task(given: Read) -> Task:
-    task = inverse_task(given.file.target, given.file.bounds, given.robot)
-    return replace(task, allow=tuple(given.file.robot.allow))
-
-
-def _identify_task(given: Read) -> Task:
-    return identify_task(
-        Given(given.file, given.data, given.robot, given.material, given.folder, lambda table: _robot(table)[0])
-    )
-
-
-def _design_task(given: Read) -> Task:
-    return design_task(given.file, given.data, given.robot, given.material, given.folder)
-
-
 TASKS: Mapping[str, tuple[str, Callable[[Read], Task]]] = {
-    "blocked-force": ("contact", _contact_task),
-    "workspace": ("workspace", _workspace_task),
-    "inverse": ("target", _inverse_task),
-    "identify": ("measurements", _identify_task),
-    "design": ("choices", _design_task),
+    "blocked-force": ("contact", contact_task),
+    "workspace": ("workspace", workspace_task),
+    "inverse": ("target", inverse_task),
+    "identify": ("measurements", identify_task),
+    "design": ("choices", design_task),
 }
 """For each study with tables of its own: the table that its errors are about, and what reads them."""

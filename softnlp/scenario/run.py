@@ -8,10 +8,12 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from softnlp.base.errors import InputError
-from softnlp.scenario.partial import run_of
-from softnlp.scenario.read import Scenario, scenario_of
-from softnlp.scenario.run_blocked import run_blocked
-from softnlp.scenario.run_inverse import run_inverse
+from softnlp.scenario.blocked_force import run_blocked
+from softnlp.scenario.data import Scenario, run_of, scenario_of
+from softnlp.scenario.design import run_design
+from softnlp.scenario.identify import run_identify
+from softnlp.scenario.inverse import run_inverse
+from softnlp.scenario.workspace import run_workspace
 from softnlp.statics.step import Run, Step
 from softnlp.studies.forward import forward
 
@@ -61,16 +63,10 @@ def run_scenario(
     if folder is not None and study != "workspace":
         raise InputError(f"only study 'workspace' takes one, not {study!r}; softnlp.save writes a run", key="folder")
     if study == "identify":
-        from softnlp.scenario.run_identify import run_identify
-
         return run_identify(scenario, progress)
     if study == "design":
-        from softnlp.scenario.run_design import run_design
-
         return run_design(scenario, progress, workers)
     if study == "workspace":
-        from softnlp.scenario.run_workspace import run_workspace
-
         return run_workspace(scenario, progress, workers, folder)
     return solve_steps(scenario, progress, branches)
 
@@ -87,18 +83,9 @@ def partial_run(scenario: Scenario, steps: Sequence[Step]) -> Run:
 
 
 def _forward(scenario: Scenario, progress: Progress | None, branches: int) -> Run:
-    return forward(
-        scenario.robot,
-        scenario.material,
-        scenario.pressures,
-        loads=scenario.loads,
-        coefficients=scenario.coefficients,
-        conventions=scenario.conventions,
-        numerics=scenario.numerics,
-        times=None if scenario.times is None else scenario.times.tolist(),
-        title=scenario.title,
-        progress=progress,
-    )
+    asked = {"title": scenario.title, "progress": progress, **scenario.settings}
+    times = None if scenario.times is None else scenario.times.tolist()
+    return forward(scenario.robot, scenario.material, scenario.pressures, times=times, **asked)
 
 
 STUDIES: Mapping[str, Callable[[Scenario, Progress | None, int], Run]] = {

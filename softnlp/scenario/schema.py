@@ -1,13 +1,14 @@
 """The tables of a scenario file, in the units of the file.
 
 Every key that a scenario may hold is a field here, so the file format can be read off this module. `ranges` has the
-range of each number; `scenario_check` words what does not fit; what needs more than one key, or another file, is
-checked in `scenario` and `pressures`.
+range of each number; `check` words what does not fit; what needs more than one key, or another file, is checked where
+it is read.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import partial
 from math import hypot
 from typing import Annotated, Any, Literal
@@ -16,12 +17,13 @@ from unicodedata import category
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator, create_model
 from pydantic_core import PydanticCustomError
 
+from softnlp.base.errors import InputError, nearest
 from softnlp.base.reading import BACKSLASH_HINT, as_typed, choices, shown
 from softnlp.base.units import MILLIMETRE
 from softnlp.model.gravity import DIRECTIONS, unknown_direction
 from softnlp.model.ipopt_options import IPOPT_OPTIONS
 from softnlp.model.numerics import EngineName, Numerics, Transcribing
-from softnlp.model.robot import MINIMUM_WALL
+from softnlp.model.robot import DIMENSIONS, MINIMUM_WALL, ROBOTS, Robot, check
 
 MOST_INTERVALS = 2000
 LARGEST_COMPONENT = 1e300
@@ -103,10 +105,19 @@ class Table(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
+    def written(self, keys: Iterable[str]) -> list[str]:
+        """Return which of some keys the file has, in their order."""
+        return [key for key in keys if key in self.model_fields_set]
 
-def optional_keys(kind: Any, keys: Iterable[str]) -> Any:
-    """Return a table whose keys may each be left out and are all of one kind."""
-    fields: dict[str, Any] = dict.fromkeys(keys, (kind | None, None))
+    def refuse(self, keys: Iterable[str], message: str, table: str | None = None) -> None:
+        """Raise `InputError` for the first of some keys that the file has."""
+        for key in self.written(keys):
+            raise InputError(message, table=table, key=key)
+
+
+def optional_keys(kinds: Mapping[str, Any]) -> Any:
+    """Return a table whose keys may each be left out; kinds : of each."""
+    fields: dict[str, Any] = {key: (kind | None, None) for key, kind in kinds.items()}
     return create_model("OptionalKeys", __base__=Table, **fields)
 
 
@@ -125,6 +136,36 @@ class RobotTable(Table):
     chamber_angle_deg: NotNegative | None = None
     allow: list[str] = []
     minimum_wall_mm: Positive = MINIMUM_WALL / MILLIMETRE
+
+    def made(self) -> tuple[Robot, tuple[str, ...]]:
+        """Return the robot and its warnings; raises `InputError` where it cannot be made."""
+        robot = self.described()
+        try:
+            return robot, check(robot, allow=self.allow, minimum_wall=self.minimum_wall_mm * MILLIMETRE)
+        except InputError as error:
+            file_keys = {d.field: d.file_key for d in DIMENSIONS}
+            raise type(error)(error.message, key=file_keys.get(error.key or "", error.key)) from None
+
+    def described(self) -> Robot:
+        """Return the robot, whether it can be made or not."""
+        given: dict[str, Any] = {}
+        for dimension in DIMENSIONS:
+            value = getattr(self, dimension.file_key)
+            if value is not None:
+                given[dimension.field] = value if dimension.scale is None else value * dimension.scale
+        missing = [d.file_key for d in DIMENSIONS if d.field not in given]
+        if self.name is not None and self.name in ROBOTS:
+            changed = any(getattr(ROBOTS[self.name], key) != value for key, value in given.items())
+            return replace(ROBOTS[self.name], **given, name=f"{self.name} (modified)" if changed else self.name)
+        if not missing:
+            return Robot(name=self.name or "robot", **given)
+        if self.name is None and given:
+            raise InputError("missing; without a name every dimension is needed", key=", ".join(missing))
+        expected = "expected a robot of the library, or every dimension in full"
+        if self.name is None:
+            raise InputError(f"missing; {expected}", key="name")
+        full = f" (missing: {', '.join(missing)})" if given else ""
+        raise InputError(f"{expected}{full}, got {shown(self.name)}{nearest(self.name, ROBOTS)}", key="name")
 
 
 class MaterialTable(Table):

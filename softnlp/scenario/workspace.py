@@ -1,38 +1,71 @@
-"""[workspace] of a scenario, checked against the robot, the silicone and the loads, in SI units."""
+"""A workspace sweep: the tables of a scenario, what they ask, checked and in SI units, its plan and the sweep."""
 
 from __future__ import annotations
 
+import json
 import sys
-from collections.abc import Mapping
-from typing import Any
+import tempfile
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
+from contextlib import ExitStack
+from os import PathLike
+from typing import TYPE_CHECKING, Annotated, Any
+from weakref import finalize
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from softnlp.base.errors import InputError, located, nearest
 from softnlp.base.reading import shown
 from softnlp.base.units import BAR, MILLIMETRE
+from softnlp.batch.plan import CHUNK, Plan, cells
 from softnlp.model.contact_settings import require_in_front
 from softnlp.model.materials import Material
 from softnlp.model.robot import Robot
-from softnlp.scenario.contact import contact_settings
-from softnlp.scenario.schema_workspace import WorkspaceFile, WorkspaceTable
+from softnlp.scenario.blocked_force import SEVERAL, contact_settings
+from softnlp.scenario.data import Read, Scenario, scenario_of
+from softnlp.scenario.pressures import require_sets
+from softnlp.scenario.schema import ContactTable, NotNegative, PressureTable, ScenarioFile, Table
 from softnlp.sweep.manufacture import check_many
-from softnlp.sweep.task import Axis, WorkspaceTask, combinations, varied_quantities, varied_table
+from softnlp.sweep.task import Axis, WorkspaceTask, combinations, pressure_table, varied_quantities, varied_table
+
+if TYPE_CHECKING:  # imported where needed: to read a sweep starts no process
+    from softnlp.sweep.read import Workspace
+    from softnlp.sweep.run import Report, Stop, SweepSummary
 
 Array = NDArray[np.float64]
 
+MOST_LEVELS = 20_000_000
 MOST_POSES = 20_000_000
-_CONTACT_OF_STEPS = ("offsets_mm", "offset_ramp", "target_force_N")
 _MATERIALS_AT_ONCE = 10_000
 
 
-def workspace_task(file: WorkspaceFile, robot: Robot, material: Material, pressures: Array) -> WorkspaceTask:
-    """Return what is asked of a sweep.
+class WorkspaceTable(Table):
+    """[workspace]: a grid or samples of pressures, and what else differs between poses.
 
-    Parameters
-    ----------
-    pressures : (steps, sets) of [pressure], no steps without it [Pa].
+    `vary` holds a table for each varied key, which `_axes` reads.
+    """
+
+    levels: Annotated[int, Field(ge=1, le=MOST_LEVELS)] | None = None
+    samples: Annotated[int, Field(ge=1)] | None = None
+    from_bar: NotNegative = 0.0
+    to_bar: NotNegative | None = None
+    sets: Annotated[list[int], Field(min_length=1)] | None = None
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
+    vary: dict[str, Any] = Field(default_factory=dict)
+
+
+class WorkspaceFile(ScenarioFile):
+    """A whole scenario of `workspace`."""
+
+    workspace: WorkspaceTable = WorkspaceTable()
+    pressure: PressureTable | None = None
+    contact: ContactTable | None = None
+
+
+def workspace_task(given: Read) -> WorkspaceTask:
+    """Return what is asked of a sweep.
 
     Raises
     ------
@@ -40,82 +73,58 @@ def workspace_task(file: WorkspaceFile, robot: Robot, material: Material, pressu
         With the key (and the table where it is not [workspace]), for keys that do not go together, more than 20 million
         poses, or a varied robot that breaks a rule of manufacture.
     """
-    table = file.workspace
-    _check_contact(file)
+    file: WorkspaceFile = given.file
+    table, wall, robot = file.workspace, file.contact, given.robot
+    if wall is not None and wall.mode != "blocked":
+        raise InputError(f"expected 'blocked' in a sweep, got {shown(wall.mode)}", table="contact", key="mode")
+    if wall is not None:
+        other = 'not in a sweep, which finds the force at every pressure; use study = "blocked-force"'
+        wall.refuse(SEVERAL, other, "contact")
     _check_source(file)
+    sets = list(range(1, robot.chamber_sets + 1)) if table.sets is None else table.sets
+    require_sets(sets, robot.chamber_sets, "sets")
     task = WorkspaceTask(
         levels=table.levels,
         samples=table.samples,
-        sets=_sets(table, robot.chamber_sets),
+        sets=tuple(one - 1 for one in sets),
         lowest=table.from_bar * BAR,
         highest=(table.to_bar or 0.0) * BAR,
         seed=table.seed,
-        vary=_axes(file, material),
+        vary=_axes(file, given.material),
     )
-    poses = task.step_count(len(pressures))
+    poses = task.step_count(len(given.steps.pressures))
     if poses > MOST_POSES:
-        raise InputError(
-            f"expected at most {MOST_POSES} poses, got {poses}",
-            key="samples" if table.samples is not None else "levels" if table.levels is not None else "vary",
-        )
-    _check_varied(task, file, robot, material)
-    if file.contact is not None:
+        source = [*table.written(("samples", "levels")), "vary"][0]
+        raise InputError(f"expected at most {MOST_POSES} poses, got {poses}", key=source)
+    _check_varied(task, file, robot, given.material)
+    if wall is not None:
         lengths = [v for axis in task.vary if axis.quantity == "robot.length" for v in axis.values.tolist()]
         with located(table="contact"):
-            require_in_front(contact_settings(file.contact), lengths)
+            require_in_front(contact_settings(wall), lengths)
     return task
-
-
-def _check_contact(file: WorkspaceFile) -> None:
-    """Refuse what a wall of a sweep cannot do: one force, at one place, for every pose."""
-    wall = file.contact
-    if wall is None:
-        return
-    if wall.mode != "blocked":
-        raise InputError(f"expected 'blocked' in a sweep, got {shown(wall.mode)}", table="contact", key="mode")
-    for key in _CONTACT_OF_STEPS:
-        if getattr(wall, key) is not None:
-            raise InputError(
-                'not in a sweep, which finds the force at every pressure; use study = "blocked-force"',
-                table="contact",
-                key=key,
-            )
 
 
 def _check_source(file: WorkspaceFile) -> None:
     """Require exactly one source of pressures, and the keys that go with it."""
     table = file.workspace
-    sources = [key for key in ("levels", "samples") if getattr(table, key) is not None]
+    sources = table.written(("levels", "samples"))
     if file.pressure is not None:
         sources.append("[pressure]")
     if len(sources) != 1:
         raise InputError(
             f"expected exactly one of levels, samples or [pressure], got {' and '.join(sources) or 'none'}",
-            key=sources[0] if sources and sources[0] != "[pressure]" else None,
+            key=sources[0] if sources else None,
         )
     if sources == ["[pressure]"]:
-        for key in ("to_bar", "from_bar", "sets"):
-            if key in table.model_fields_set:
-                raise InputError("expected only with levels or samples, not with [pressure]", key=key)
+        table.refuse(("to_bar", "from_bar", "sets"), "expected only with levels or samples, not with [pressure]")
     elif table.to_bar is None:
         raise InputError(f"missing; expected with {sources[0]}: the highest pressure in bar", key="to_bar")
     elif table.to_bar < table.from_bar:
         raise InputError(f"expected at least from_bar = {table.from_bar:g}, got {table.to_bar:g}", key="to_bar")
     if table.levels == 1:
         raise InputError("expected a whole number of at least 2, got 1", key="levels")
-    if table.samples is None and "seed" in table.model_fields_set:
-        raise InputError("expected only with samples", key="seed")
-
-
-def _sets(table: WorkspaceTable, sets: int) -> tuple[int, ...]:
-    """Return the swept chamber sets, counted from 0."""
-    chosen = list(range(1, sets + 1)) if table.sets is None else table.sets
-    for number, one in enumerate(chosen, start=1):
-        if not 1 <= one <= sets:
-            raise InputError(f"item {number}: expected a chamber set from 1 to {sets}, got {shown(one)}", key="sets")
-        if one in chosen[: number - 1]:
-            raise InputError(f"item {number}: expected each chamber set once, got {one} twice", key="sets")
-    return tuple(one - 1 for one in chosen)
+    if table.samples is None:
+        table.refuse(["seed"], "expected only with samples")
 
 
 def _axes(file: WorkspaceFile, material: Material) -> tuple[Axis, ...]:
@@ -214,3 +223,135 @@ def _check_varied(task: WorkspaceTask, file: WorkspaceFile, robot: Robot, materi
             Material(material.name, material.law, constants, material.density, material.fitted_stretch)
         except InputError as error:
             raise InputError(error.message, key="vary") from None
+
+
+def plan_of(scenario: Scenario) -> Plan:
+    """Return the plan of a scenario of study "workspace".
+
+    Poses are numbered as `softnlp.sweep.task` lists them. Grids and samples are walked cell by cell, so that
+    neighbours are solved together; pressures of the scenario's own in the order in which they are given.
+
+    Raises
+    ------
+    InputError
+        For anything else.
+    """
+    task = scenario_of(scenario, "workspace", "plan_of").task
+    assert isinstance(task, WorkspaceTask)
+    model = scenario.model
+    pressures = pressure_table(task, scenario.robot.chamber_sets, scenario.pressures)
+    varied, columns = _varied(task, scenario, len(pressures))
+    values = np.ascontiguousarray(np.concatenate([pressures, *columns], axis=1))
+    own_order = task.levels is None and task.samples is None
+    return Plan(
+        model=model,
+        loads=scenario.loads,
+        numerics=scenario.numerics,
+        contact=scenario.contact,
+        varied=("pressure", *varied),
+        values=values,
+        order=np.arange(len(values), dtype=np.int64) if own_order else cells(values, CHUNK),
+        times=None if scenario.times is None else np.tile(scenario.times, len(values) // len(scenario.times)),
+    )
+
+
+def _varied(task: WorkspaceTask, scenario: Scenario, poses: int) -> tuple[list[str], list[Array]]:
+    """Return the quantities that differ besides the pressures, and the columns of each as (poses, size), SI."""
+    if not task.vary:
+        return [], []
+    table = varied_table(task, len(scenario.pressures))
+    columns: dict[str, Array] = {}
+    for axis, values in zip(task.vary, table.T, strict=True):
+        if axis.place is None:
+            columns[axis.quantity] = values[:, None]
+        elif isinstance(axis.place, tuple):
+            columns[axis.quantity] = values[:, None] * np.asarray(axis.place)
+        else:
+            nominal = np.asarray(getattr(scenario.loads, axis.quantity), float)
+            vector = columns.setdefault(axis.quantity, np.tile(nominal, (poses, 1)))
+            vector[:, axis.place] = values
+    return list(columns), list(columns.values())
+
+
+def run_sweep(
+    scenario: Scenario | Plan,
+    folder: str | PathLike[str],
+    *,
+    executor: Executor | None = None,
+    workers: int = 1,
+    resume: bool = False,
+    progress: Report | None = None,
+    stop: Stop | None = None,
+    about: Mapping[str, str] | None = None,
+    csv: bool = False,
+) -> SweepSummary:
+    """Solve every pose of a workspace and write `workspace.nc`: the same, whoever solves what and in how many runs.
+
+    Parameters
+    ----------
+    scenario
+        Of study "workspace", or a plan of one.
+    folder
+        Made where missing, for the journal and the result.
+    executor
+        Solves the chunks, such as that of a Dask client; None takes processes of this machine.
+    workers
+        Processes, which do not run a script again; this one alone for one worker or very few poses.
+    resume
+        Continue the sweep that has begun in the folder, if one has.
+    progress
+        Called where poses were confirmed, the first time after the workers have started.
+    stop
+        Asked now and then whether to stop; what is being solved is finished and kept.
+    about
+        Attributes of the result file beside those of a scenario, such as a title.
+    csv
+        Write `workspace.csv` as well; one that is there is replaced in any case.
+
+    Returns
+    -------
+    SweepSummary
+        Counts and files; `softnlp.sweep.read.load_workspace` reads the poses.
+
+    Raises
+    ------
+    InputError
+        For anything but such a scenario or a plan; where the folder holds another sweep, or cannot be written.
+    SweepError
+        Where workers die again and again, or a chunk cannot be solved. What was confirmed before is kept.
+    """
+    from softnlp.sweep.run import sweep
+
+    told: dict[str, str] = {}
+    if isinstance(scenario, Plan):
+        plan = scenario
+    else:
+        plan = plan_of(scenario_of(scenario, "workspace", "softnlp.run_sweep"))
+        warnings = json.dumps(scenario.warnings)
+        told = {"title": scenario.title, "scenario": scenario.text, "warnings": warnings}
+    return sweep(
+        plan,
+        folder,
+        {**told, **(about or {})},
+        executor=executor,
+        workers=workers,
+        resume=resume,
+        progress=progress,
+        stop=stop,
+        csv=csv,
+    )
+
+
+def run_workspace(
+    scenario: Scenario, progress: Callable[[int, Any], None] | None, workers: int, folder: str | PathLike[str] | None
+) -> Workspace:
+    """Solve every pose of a workspace and read them. folder : as `run_sweep`; None takes a temporary one."""
+    from softnlp.sweep.read import load_workspace
+
+    with ExitStack() as stack:
+        place = folder or stack.enter_context(tempfile.TemporaryDirectory(prefix="softnlp-"))
+        report = None if progress is None else lambda news: progress(news.done, news)
+        run_sweep(scenario, place, workers=workers, progress=report)
+        solved = load_workspace(place)
+        finalize(solved, stack.pop_all().close)
+    return solved

@@ -48,23 +48,17 @@ def load_measured(path: str | PathLike[str], sets: int) -> Measured:
         On one line with the file, the line and the column, when a column is missing or a value impossible.
     """
     file = Path(path)
-    try:
-        return _measured(file, sets)
-    except InputError as error:
-        raise InputError(error.message) from None  # which names the file
-
-
-def _measured(file: Path, sets: int) -> Measured:
     needed = [*(f"p{k + 1}_bar" for k in range(sets)), *TIP_COLUMNS]
     columns = read_columns(Path(), str(file), needed)
     if (extra_set := f"p{sets + 1}_bar") in columns:
-        raise InputError(f"{columns.file}: expected pressures of {sets} chamber sets, got a column {extra_set!r}")
+        raise InputError(f"expected pressures of {sets} chamber sets, got a column {extra_set!r}", source=columns.file)
     needed += [TIME_COLUMN] * (TIME_COLUMN in columns)
     table = np.column_stack([columns.numbers(name, blank=True) for name in needed])
     full = np.isfinite(table).all(axis=1)
     skipped = int(np.sum(~full))
     if not full.any():
-        raise InputError(f"{columns.file}: expected at least one row of numbers, got none; {skipped} rows have blanks")
+        problem = f"expected at least one row of numbers, got none; {skipped} rows have blanks"
+        raise InputError(problem, source=columns.file)
     return Measured(
         file=file,
         pressure=without_noise(table[full, :sets]) * BAR,

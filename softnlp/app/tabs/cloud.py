@@ -16,9 +16,8 @@ from softnlp.app.job import Progress, Stopped
 from softnlp.base.columns import ONE, OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, MILLIMETRE
-from softnlp.scenario.planning import plan_of
 from softnlp.scenario.read import Scenario
-from softnlp.scenario.run_workspace import run_sweep
+from softnlp.scenario.workspace import plan_of, run_sweep
 from softnlp.sweep.read import Workspace, column_names, load_workspace, read_column
 from softnlp.sweep.run import WORKSPACE_FILE, SweepProgress, SweepSummary
 from softnlp.sweep.summary import Summary, summarise

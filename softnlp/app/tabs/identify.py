@@ -30,11 +30,11 @@ from softnlp.app.tabs.identify_table import (
 from softnlp.app.tabs.tensile import tensile_part
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import read_columns
-from softnlp.base.errors import InputError
+from softnlp.base.errors import InputError, of_table
 from softnlp.base.status import Status
 from softnlp.results.identify_document import identified_text, robot_table_text, scenario_tables
+from softnlp.scenario.identify import run_robots
 from softnlp.scenario.read import Scenario
-from softnlp.scenario.run_identify import run_robots
 from softnlp.studies.identified import Identified
 from softnlp.studies.identify_task import RobotTask
 from softnlp.studies.measurements import OBSERVABLES
@@ -176,7 +176,8 @@ class _Measurements:
         """Take a file of measurements; one that cannot be read leaves the scenario as it was."""
         session, before = self._session, self._table()
         kept = session.keep(name, content)
-        header = read_columns(session.folder, kept).header
+        with of_table(""):
+            header = read_columns(session.folder, kept).header
         table = {key: value for key, value in before.items() if key != "files"}
         session.change_all("measurements", {**table, "file": kept, "free": table.get("free") or first_free(header)})
         problem = session.problem

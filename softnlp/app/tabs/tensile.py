@@ -12,7 +12,7 @@ from softnlp.app.tabs.identify_table import law_rows, law_traces
 from softnlp.base.errors import InputError
 from softnlp.results.identify_document import material_file_text, material_table, tensile_table_text
 from softnlp.scenario.read import Scenario
-from softnlp.scenario.run_identify import run_tensile
+from softnlp.scenario.tensile import run_tensile
 from softnlp.studies.identify_task import TensileTask
 from softnlp.studies.tensile import LawFit, TensileFit
 
