@@ -13,6 +13,7 @@ from nicegui.testing import User
 
 from softnlp.app.document import Document
 from softnlp.app.live import LivePoses
+from softnlp.app.live_view import PoseStretch
 from softnlp.app.material_figure import MEASURES, material_figure
 from softnlp.app.material_state import (
     OWN_LAW,
@@ -28,7 +29,6 @@ from softnlp.app.material_state import (
 )
 from softnlp.app.panels.material import material_panel
 from softnlp.app.session import Session
-from softnlp.app.stretch import PoseStretch
 from softnlp.app.theme import figure_config, on_dark
 from softnlp.model.laws import LAWS
 from softnlp.model.materials import load_materials, material, material_from_table

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 
+import casadi as ca
 import numpy as np
 from nicegui import background_tasks, ui
 from numpy.typing import NDArray
 
-from softnlp.app.stage import Stage
+from softnlp.app.asking import bars
+from softnlp.app.session import Session, Stage
 from softnlp.app.view import frame_of
 from softnlp.base.errors import InputError
-from softnlp.base.units import BAR
+from softnlp.base.status import Status
+from softnlp.model.quantities import quantities
 from softnlp.results import Body
 from softnlp.scenario.read import Scenario
+from softnlp.statics.branch import branch_function, stretch_on_branch
 from softnlp.statics.step import Contact, Pose, Run, Step
 from softnlp.statics.wall import Wall
 
@@ -83,7 +87,7 @@ class LiveView:
             step = run.steps[0]
             if not step.status.has_solution and self._stays(scenario, pressure):
                 assert self._last is not None
-                self._said(f"{step.message}. The sliders stay at {_listed(self._last[1])} bar.")
+                self._said(f"{step.message}. The sliders stay at {bars(self._last[1], 3)} bar.")
                 session.set_pressure(self._last[1])
                 return
             if step.pose is not None and step.status.has_solution:
@@ -134,6 +138,27 @@ class LiveView:
         return self._last is not None and self._last[0] is scenario and not np.array_equal(self._last[1], pressure)
 
 
+class PoseStretch:
+    """Gives the stretch of a session's pose; what is compiled is kept while robot and law are of the same kind."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._kind: Hashable = None
+        self._branch: ca.Function | None = None
+
+    def __call__(self) -> float | None:
+        """Return lambda at the pressures shown, as Eq. (23) gives it; None where there is no such equilibrium."""
+        scenario, pressure = self._session.scenario, self._session.pressure
+        if scenario is None or len(pressure) != scenario.robot.chamber_sets:
+            return None
+        model = scenario.model
+        if self._branch is None or self._kind != model.kind:
+            self._branch, self._kind = branch_function(model), model.kind
+        nominal = {name: q.nominal for name, q in quantities(model).items()} | {"pressure": pressure}
+        point = stretch_on_branch(self._branch, np.concatenate([np.ravel(v) for v in nominal.values()]), pressure)
+        return point.stretch if point.status is Status.SOLVED else None
+
+
 def _body(pose: Pose) -> Body:
     return Body(pose.shape.position, pose.shape.rotation, pose.radii)
 
@@ -141,7 +166,3 @@ def _body(pose: Pose) -> Body:
 def _wall(contact: Contact | None) -> Wall | None:
     """Return the wall of a step; None where the chambers alone are held."""
     return Wall(contact.wall_point, contact.normal) if contact is not None and contact.normal.any() else None
-
-
-def _listed(pressure: Array) -> str:
-    return ", ".join(f"{p / BAR:.3g}" for p in pressure)

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
 
 from nicegui import ui
 
 from softnlp.app.files import mesh_menu, open_dialog, save
 from softnlp.app.live_view import LiveView
-from softnlp.app.panels.coefficients import coefficients_panel
-from softnlp.app.panels.loads import loads_panel
+from softnlp.app.panels.equations import coefficients_panel, loads_panel, solver_panel
 from softnlp.app.panels.material import material_panel
 from softnlp.app.panels.pressure import pressure_panel
 from softnlp.app.panels.results import ResultsPanel
 from softnlp.app.panels.robot import robot_panel
-from softnlp.app.panels.solver import solver_panel
-from softnlp.app.session import Session
-from softnlp.app.stage import Stage
+from softnlp.app.session import Session, Stage
 from softnlp.app.tabs.blocked import blocked_tab
 from softnlp.app.tabs.identify import identify_tab
 from softnlp.app.tabs.inverse import inverse_tab
@@ -28,24 +24,15 @@ from softnlp.app.tabs.workspace import workspace_tab
 from softnlp.app.theme import style_page
 from softnlp.app.view import RobotView
 
-
-@dataclass(frozen=True)
-class Study:
-    """A tab of the page. study : of the scenario while it is open."""
-
-    label: str
-    study: str
-    build: Callable[[Stage], None]
-
-
-STUDIES: Mapping[str, Study] = {
-    "kinematics": Study("Kinematics", "forward", sequence_tab),
-    "blocked": Study("Blocked force", "blocked-force", blocked_tab),
-    "workspace": Study("Workspace", "workspace", workspace_tab),
-    "inverse": Study("Inverse", "inverse", inverse_tab),
-    "identify": Study("Identification", "identify", identify_tab),
+STUDIES = {
+    "kinematics": ("Kinematics", "forward", sequence_tab),
+    "blocked": ("Blocked force", "blocked-force", blocked_tab),
+    "workspace": ("Workspace", "workspace", workspace_tab),
+    "inverse": ("Inverse", "inverse", inverse_tab),
+    "identify": ("Identification", "identify", identify_tab),
 }
-_TAB_OF = {study.study: name for name, study in STUDIES.items()}
+"""The tabs: label, study of the scenario while it is open, and what builds it."""
+_TAB_OF = {study: name for name, (_, study, _) in STUDIES.items()}
 SCENARIO = "scenario"
 _LINE = "border-neutral-300 dark:border-neutral-700"
 _HEADER = f"h-12 px-3 py-0 items-center no-wrap gap-2 border-b softnlp-surface {_LINE}"
@@ -62,9 +49,8 @@ def build_page(session: Session) -> None:
     with ui.header(elevated=False).classes(_HEADER):
         ui.label("softnlp").classes("text-lg font-semibold mr-2")
         with ui.tabs().props("dense no-caps inline-label shrink").classes("min-w-0") as tabs:
-            for name, study in STUDIES.items():
-                ui.tab(name, label=study.label).props(f"data-testid=tab-{name}")
-            ui.tab(SCENARIO, label="Scenario").props("data-testid=tab-scenario")
+            for name, label in (*((name, label) for name, (label, *_) in STUDIES.items()), (SCENARIO, "Scenario")):
+                ui.tab(name, label=label).props(f"data-testid=tab-{name}")
         tabs.set_value(chosen)
         ui.space()
         exports = _files(session, dark)
@@ -110,7 +96,7 @@ def build_page(session: Session) -> None:
 def awaits_data(session: Session) -> bool:
     """Whether all that is missing is the file that an identification starts from."""
     tables = ("measurements", "tensile")
-    return session.document.study == "identify" and not any(session.document.table(name) for name in tables)
+    return session.document.study == "identify" and not any(map(session.table, tables))
 
 
 def _files(session: Session, dark: ui.dark_mode) -> ui.menu:
@@ -185,12 +171,13 @@ def _studies(stage: Stage, tabs: ui.tabs, chosen: str) -> None:
 
     def opened() -> None:
         name = str(panels.value)
-        if name in STUDIES:
-            stage.session.choose(STUDIES[name].study)
+        _, study, build = STUDIES.get(name, ("", None, scenario_tab))
+        if study is not None:
+            stage.session.choose(study)
         if name not in built:
             built.add(name)
             with slots[name]:
-                STUDIES[name].build(stage) if name in STUDIES else scenario_tab(stage)
+                build(stage)
 
     panels.on_value_change(opened)
     opened()

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from math import inf
 from typing import Any
 
+from softnlp.app.asking import sentence
 from softnlp.app.document import Document
 from softnlp.base.errors import RobotError
 from softnlp.base.ranges import SIZE
@@ -29,23 +30,12 @@ from softnlp.model.robot import (
 OWN = "own robot"
 """The name that a robot of one's own starts with."""
 
+_WALLS = ("outer_diameter_mm", "lumen_diameter_mm")
+_CHAMBERS = ("chamber_circle_diameter_mm", "chamber_diameter_mm", "chamber_wall_mm")
 RULE_FIELDS: Mapping[str, tuple[str, ...]] = {
-    "wall_thickness": ("outer_diameter_mm", "lumen_diameter_mm", "chamber_diameter_mm", "minimum_wall_mm"),
-    "chamber_overlap": (
-        "chamber_circle_diameter_mm",
-        "chamber_diameter_mm",
-        "chamber_wall_mm",
-        "chamber_angle_deg",
-        "chamber_sets",
-        "chambers_per_set",
-    ),
-    "chambers_inside_wall": (
-        "chamber_circle_diameter_mm",
-        "chamber_diameter_mm",
-        "chamber_wall_mm",
-        "outer_diameter_mm",
-        "lumen_diameter_mm",
-    ),
+    "wall_thickness": (*_WALLS, "chamber_diameter_mm", "minimum_wall_mm"),
+    "chamber_overlap": (*_CHAMBERS, "chamber_angle_deg", "chamber_sets", "chambers_per_set"),
+    "chambers_inside_wall": (*_CHAMBERS, *_WALLS),
 }
 """The keys of [robot] that each rule of manufacture depends on, the most likely one first."""
 
@@ -92,8 +82,8 @@ class RobotState:
                 continue
             fields = RULE_FIELDS[violation.rule]
             key = latest if latest in fields else fields[0]
-            message = f"{violation.message[0].upper()}{violation.message[1:]}."
-            messages[key] = f"{messages[key]}\n{message}" if key in messages else message
+            known = [messages[key]] if key in messages else []
+            messages[key] = "\n".join([*known, sentence(violation.message)])
         return messages
 
 
@@ -111,10 +101,8 @@ def robot_state(document: Document) -> RobotState:
     if any(d.file_key in said for d in DIMENSIONS):
         return RobotState(None, said, (), allowed)
     name = table.get("name")
-    robot = Robot(
-        name=name if isinstance(name, str) else OWN,
-        **{d.field: values[d.field] * (d.scale or 1) for d in DIMENSIONS},
-    )
+    sizes = {d.field: values[d.field] * (d.scale or 1) for d in DIMENSIONS}
+    robot = Robot(name=name if isinstance(name, str) else OWN, **sizes)
     try:
         return RobotState(robot, said, violations(robot, wall * MILLIMETRE), allowed)
     except RobotError as error:  # two dimensions that do not go together
@@ -139,11 +127,7 @@ def library_value(table: Mapping[str, Any], dimension: Dimension) -> float | Non
 
 def changed_keys(table: Mapping[str, Any]) -> list[str]:
     """Return the dimensions that differ from those of the library's robot."""
-    return [
-        d.file_key
-        for d in DIMENSIONS
-        if library_value(table, d) is not None and effective(table, d) != library_value(table, d)
-    ]
+    return [d.file_key for d in DIMENSIONS if library_value(table, d) not in (None, effective(table, d))]
 
 
 def library_table(table: Mapping[str, Any], name: str) -> dict[str, Any]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
+from functools import partial
 from typing import Any
 
 from nicegui import ui
 
-from softnlp.app.fields import typed
+from softnlp.app.fields import BOX, button, is_number, named, number_box, typed
 from softnlp.app.material_state import constants_of_rows
 
 LONGEST_NAME = 40
 MOST_ROWS = 30
+_ROUND = "flat dense round size=sm"
 
 
 class ConstantRows:
@@ -22,8 +24,7 @@ class ConstantRows:
         self._changed = changed
         self._rows: list[tuple[ui.element, ui.input, ui.number]] = []
         self._table = ui.column().classes("w-full gap-1").props("data-testid=material-rows")
-        add = ui.button("Add constant", icon="add", on_click=self._added)
-        add.props("flat dense no-caps size=sm data-testid=material-add").mark("material.add")
+        button("Add constant", "add", "material.add", self._added, test="material-add")
 
     def show(self, constants: Mapping[str, Any]) -> None:
         """Show other constants; rows that say this already stay as they are, also while a person types in one."""
@@ -32,32 +33,28 @@ class ConstantRows:
         self._table.clear()
         self._rows.clear()
         for name, value in constants.items():
-            self._row(str(name), value if isinstance(value, int | float) and not isinstance(value, bool) else None)
+            self._row(str(name), value if is_number(value) else None)
 
     def values(self) -> tuple[dict[str, float], str]:
         """Return the constants, and what is wrong with the rows."""
         return constants_of_rows([(typed(name.value).strip(), value.value) for _, name, value in self._rows])
 
-    def say(self, name: str, message: str) -> bool:
-        """Put a message beside the row of a constant; return whether there is one."""
-        found = False
+    def say(self, names: Collection[str]) -> None:
+        """Mark the rows of constants with which something is wrong."""
         for _, field, _ in self._rows:
-            mine = bool(message) and typed(field.value).strip() == name
-            field.props.set_bool("error", mine)
-            found = found or mine
-        return found
+            field.props.set_bool("error", typed(field.value).strip() in names)
 
     def _row(self, name: str, value: float | None) -> None:
         with self._table, ui.row().classes("w-full no-wrap gap-2 items-center") as row:
-            look = "dense outlined debounce=300 hide-bottom-space no-error-icon"
-            name_field = ui.input("Name", value=name, on_change=self._tell).without_auto_validation()
-            name_field.props(f"{look} maxlength={LONGEST_NAME} data-testid=material-constant-name").classes("w-24")
-            value_field = ui.number("Value", value=value, on_change=self._tell).without_auto_validation()
-            value_field.props(f"{look} data-testid=material-constant-value").classes("grow")
-            entry = (row, name_field.mark("material.constant-name"), value_field.mark("material.constant-value"))
-            remove = ui.button(icon="close", on_click=lambda: self._removed(entry))
-            remove.props('flat dense round size=sm data-testid=material-remove aria-label="remove this constant"')
-            remove.mark("material.remove")
+            look = f"{BOX} debounce=300 no-error-icon"
+            name_field = ui.input("Name", value=name, on_change=self._tell).without_auto_validation().classes("w-24")
+            named(name_field, "material.constant-name", "material-constant-name")
+            name_field.props(f"{look} maxlength={LONGEST_NAME}")
+            value_field = number_box("Value", "material.constant-value", look=look, test="material-constant-value")
+            entry = (row, name_field, value_field.classes("grow"))
+            value_field.set_value(value).on_value_change(self._tell)
+            remove = button("", "close", "material.remove", partial(self._removed, entry), _ROUND, "material-remove")
+            remove.props('aria-label="remove this constant"')
         self._rows.append(entry)
 
     def _added(self) -> None:

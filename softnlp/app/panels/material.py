@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, TypeVar
 
 from nicegui import ui
 
-from softnlp.app.fields import number_field, say_beside, typed
+from softnlp.app.fields import BOX, dashed, number_box, number_field, say_beside, select_box, toggle, typed
+from softnlp.app.live_view import PoseStretch
 from softnlp.app.material_figure import LAW_NAMES, MEASURES, law_name, mark_pose, material_figure
 from softnlp.app.material_state import (
     Form,
@@ -23,16 +25,14 @@ from softnlp.app.material_state import (
     material_state,
 )
 from softnlp.app.panels.constant_rows import ConstantRows
-from softnlp.app.redraw import Redraw
 from softnlp.app.session import Session
-from softnlp.app.stretch import PoseStretch
-from softnlp.app.theme import darkness, on_dark
+from softnlp.app.theme import Redraw, darkness, on_dark
 from softnlp.model.formula import MAX_LENGTH
 from softnlp.model.laws import LAWS
 from softnlp.model.materials import DENSITY, FITTED_STRETCH, MaterialEntry
 
 _FORMS: Mapping[Form, str] = {"library": "Library", "constants": "Own constants", "formula": "Own formula"}
-_LOOK = "dense outlined hide-bottom-space"
+T = TypeVar("T", ui.input, ui.textarea)
 _SMALL = "text-xs opacity-80 w-full"
 
 
@@ -57,14 +57,13 @@ class _MaterialPanel:
         self.read_from: Any = None
         self.state = self._read()
         with ui.column().classes("w-full gap-2").props("data-testid=material-panel") as self.root:
-            self.form = ui.toggle(dict(_FORMS), on_change=self._form_chosen)
-            self.form.props("dense no-caps spread unelevated size=sm data-testid=material-form").classes("w-full")
-            self.form.mark("material.form")
+            self.form = self._toggle(dict(_FORMS), "form", self._form_chosen)
             self._identity()
-            self._own_constants()
+            self.constants_box = ui.element("div").classes("grid grid-cols-2 gap-2 w-full items-start")
+            self.constants_law = ""
             self._own_formula()
             self.error = ui.label().classes("text-xs text-red-700 dark:text-red-300 leading-tight")
-            self.error.props("data-testid=material-said role=alert").mark("material.said")
+            dashed(self.error.props("role=alert"), "material.said")
             self._numbers()
             self._curves()
         self.redraw = Redraw(self.root, self._draw)
@@ -78,60 +77,59 @@ class _MaterialPanel:
     # --- controls -----------------------------------------------------------------------------------------------------
 
     def _identity(self) -> None:
-        self.silicone = ui.select(list(self.entries), label="Silicone", on_change=self._silicone_chosen)
-        self.silicone.props(f"{_LOOK} options-dense data-testid=material-name").classes("w-full")
-        self.silicone.without_auto_validation().mark("material.name")
-        self.own_name = ui.input("Silicone", on_change=lambda event: self._text("name", event.value))
-        self.own_name.props(f"{_LOOK} debounce=300 maxlength=200 data-testid=material-own_name").classes("w-full")
-        self.own_name.without_auto_validation().mark("material.own_name")
-        self.law = ui.select(dict(LAW_NAMES), label="Law", on_change=self._law_chosen)
-        self.law.props(f"{_LOOK} options-dense data-testid=material-model").classes("w-full")
-        self.law.without_auto_validation().mark("material.model")
-        self.own_law = ui.input("Name of the law", on_change=lambda event: self._text("model", event.value))
-        self.own_law.props(f"{_LOOK} debounce=300 maxlength=200 data-testid=material-own_model").classes("w-full")
-        self.own_law.without_auto_validation().mark("material.own_model")
+        self.silicone = self._select(list(self.entries), "name", "Silicone", self._silicone_chosen)
+        self.own_name = self._box(ui.input, "Silicone", "name", "own_name", "maxlength=200")
+        self.law = self._select(dict(LAW_NAMES), "model", "Law", self._law_chosen)
+        self.own_law = self._box(ui.input, "Name of the law", "model", "own_model", "maxlength=200")
 
-    def _own_constants(self) -> None:
-        self.constants_box = ui.element("div").classes("grid grid-cols-2 gap-2 w-full items-start")
-        self.constants_law = ""
+    @staticmethod
+    def _select(options: Any, key: str, label: str, act: Callable[[Any], None]) -> ui.select:
+        return select_box(options, f"material.{key}", label, test=f"material-{key}", on_change=act)
+
+    def _box(self, kind: type[T], label: str, key: str, name: str, look: str) -> T:
+        """Show a text of [material] that is a person's own."""
+        box = dashed(kind(label, on_change=lambda event: self._text(key, event.value)), f"material.{name}")
+        return box.props(f"{BOX} debounce=300 {look}").classes("w-full").without_auto_validation()
 
     def _own_formula(self) -> None:
         with ui.column().classes("w-full gap-2") as self.formula_box:
-            self.formula = ui.textarea(
-                "Engineering stress [MPa] =", on_change=lambda event: self._text("formula", event.value)
-            )
-            look = f"{_LOOK} autogrow debounce=300 maxlength={MAX_LENGTH} spellcheck=false input-class=font-mono"
-            self.formula.props(f"{look} data-testid=material-formula")
-            self.formula.classes("w-full").without_auto_validation().mark("material.formula")
+            look = f"autogrow maxlength={MAX_LENGTH} spellcheck=false input-class=font-mono"
+            self.formula = self._box(ui.textarea, "Engineering stress [MPa] =", "formula", "formula", look)
             ui.label("Of stretch and the constants below; 0 at stretch 1, rising.").classes(_SMALL)
             self.rows = ConstantRows(self._rows_changed)
 
     def _numbers(self) -> None:
+        density, test = "density_kg_m3", "material-density_kg_m3"
         self.density = number_field(
-            self.session, "material", "density_kg_m3", "Density", "kg/m³", default=lambda: self._density(), step=10
+            self.session, "material", density, "Density", default=self._density, step=10, test=test
         )
-        self.density.props("data-testid=material-density_kg_m3")
         with ui.row().classes("w-full no-wrap gap-2") as self.fitted_box:
-            self.fitted: list[ui.number] = []
-            for k, label in enumerate(("Fitted from stretch", "to stretch")):
-                end = ui.number(label, step=0.1, on_change=self._fitted_changed).without_auto_validation()
-                end.props(f"{_LOOK} debounce=300 no-error-icon data-testid=material-fitted_stretch-{k}")
-                self.fitted.append(end.classes("w-1/2").mark(f"material.fitted_stretch.{k}"))
+            self.fitted = [
+                self._number(label, f"fitted_stretch.{k}", step=0.1, on_change=self._fitted_changed).classes("w-1/2")
+                for k, label in enumerate(("Fitted from stretch", "to stretch"))
+            ]
+
+    @staticmethod
+    def _number(label: str, name: str, unit: str = "", test: str = "", **more: Any) -> ui.number:
+        test = test or f"material-{name.replace('.', '-')}"
+        return number_box(label, f"material.{name}", unit, "debounce=300 no-error-icon", test, **more)
 
     def _curves(self) -> None:
         names = {measure: label for measure, (label, _) in MEASURES.items()}
-        choice = ui.toggle(names, value=self.measure, on_change=self._measure_chosen)
-        choice.props("dense no-caps spread unelevated size=sm data-testid=material-measure").classes("w-full")
-        choice.mark("material.measure")
-        self.plot = ui.plotly(self._figure()).classes("self-center").props("data-testid=material-plot")
-        self.plot.mark("material.plot")
-        self.caption = ui.label().classes(_SMALL).props("data-testid=material-caption").mark("material.caption")
+        self._toggle(names, "measure", self._measure_chosen, self.measure)
+        self.plot = dashed(ui.plotly(self._figure()).classes("self-center"), "material.plot")
+        self.caption = dashed(ui.label().classes(_SMALL), "material.caption")
+
+    @staticmethod
+    def _toggle(options: Any, name: str, act: Callable[[Any], None], value: str | None = None) -> ui.toggle:
+        choice = toggle(options, f"material.{name}", value).on_value_change(act)
+        return choice.props(f"size=sm data-testid=material-{name}")
 
     # --- what a person does -------------------------------------------------------------------------------------------
 
     @property
     def _table(self) -> dict[str, Any]:
-        return self.session.document.table("material")
+        return self.session.table("material")
 
     def _entry(self) -> MaterialEntry | None:
         name = self._table.get("name")
@@ -144,15 +142,14 @@ class _MaterialPanel:
         if wanted == before:
             return
         self.left[before] = table
-        kept = self.left.get(wanted)
+        kept, entry, model = self.left.get(wanted), self._entry(), table.get("model")
         if kept is None and wanted == "library":
-            entry = self._entry()
             name = entry.name if entry is not None else next(iter(self.entries))
-            kept = library_form(table, name, law_or_default(table.get("model"), self.entries[name].models))
+            kept = library_form(table, name, law_or_default(model, self.entries[name].models))
         elif kept is None and wanted == "constants":
-            kept = constants_form(table, law_or_default(table.get("model"), LAWS), self._entry())
+            kept = constants_form(table, law_or_default(model, LAWS), entry)
         elif kept is None:
-            kept = formula_form(table, self._entry())
+            kept = formula_form(table, entry)
         if "constants" in kept:
             kept = kept | {"constants": inline(kept["constants"])}
         self.session.change_all("material", kept)
@@ -178,8 +175,8 @@ class _MaterialPanel:
             return
         self.session.change("material", key, text)
 
-    def _constant_changed(self, key: str, value: float | None) -> None:
-        constants = self._table.get("constants")
+    def _constant_changed(self, key: str, event: Any) -> None:
+        constants, value = self._table.get("constants"), event.value
         if form_of(self._table) != "constants" or not isinstance(constants, dict) or constants.get(key) == value:
             return
         constants = {k: v for k, v in constants.items() if k != key} | ({} if value is None else {key: value})
@@ -250,11 +247,11 @@ class _MaterialPanel:
         self._show_names(table, form)
         self._show_constants(table, form)
         if form == "formula":
-            _put(self.formula, table.get("formula", ""))
+            self.formula.set_value(table.get("formula", ""))
             constants = table.get("constants", {})
             self.rows.show(constants if isinstance(constants, dict) else {})
         for field, value in zip(self.fitted, self._fitted_shown(), strict=True):
-            _put(field, value)
+            field.set_value(value)
         self._say()
 
     def _show_names(self, table: Mapping[str, Any], form: Form) -> None:
@@ -262,9 +259,9 @@ class _MaterialPanel:
         if form == "library":
             self.silicone.set_options(list(self.entries), value=name if name in self.entries else None)
         else:
-            _put(self.own_name, name or "")
+            self.own_name.set_value(name or "")
         if form == "formula":
-            _put(self.own_law, model or "")
+            self.own_law.set_value(model or "")
             return
         entry = self._entry()
         laws = list(entry.models) if form == "library" and entry is not None else list(LAWS)
@@ -279,17 +276,13 @@ class _MaterialPanel:
             self.constants = {}
             with self.constants_box:
                 for constant in LAWS[law].constants if law in LAWS else ():
-                    self.constants[constant.file_key] = self._constant(constant.file_key, constant.name, constant.unit)
+                    key, unit = constant.file_key, "" if constant.unit == "1" else constant.unit
+                    field = self._number(constant.name, f"constants.{key}", unit, f"material-{key}").props("step=any")
+                    field.on_value_change(partial(self._constant_changed, key))
+                    self.constants[key] = field.classes("w-full")
         given = table.get("constants")
         for key, field in self.constants.items():
-            _put(field, given.get(key) if isinstance(given, dict) else None)
-
-    def _constant(self, key: str, name: str, unit: str) -> ui.number:
-        field = ui.number(name, on_change=lambda event: self._constant_changed(key, event.value))
-        field.props(f"{_LOOK} debounce=300 no-error-icon step=any data-testid=material-{key}").classes("w-full")
-        if unit != "1":
-            field.props(f"suffix={unit}")
-        return field.without_auto_validation().mark(f"material.constants.{key}")
+            field.set_value(given.get(key) if isinstance(given, dict) else None)
 
     def _say(self) -> None:
         """Put what is wrong beside its field; what has none stands below them all."""
@@ -305,17 +298,11 @@ class _MaterialPanel:
         )
         for element, key in beside:
             say_beside(element, said.pop(key, "") if element.visible else "")
-        left = []
-        for key, message in said.items():
-            name = key.removeprefix("constants.")
-            left.append(f"{name}: {message}" if name not in ("", "constants") else message)
-        if self.state.form == "constants":
-            for key, field in self.constants.items():
-                field.props.set_bool("error", f"constants.{key}" in said)
-        self.rows.say("", "")
-        for key, message in said.items():
-            if self.state.form == "formula" and key.startswith("constants."):
-                self.rows.say(key.removeprefix("constants."), message)
+        names = [(key.removeprefix("constants."), message) for key, message in said.items()]
+        left = [message if name in ("", "constants") else f"{name}: {message}" for name, message in names]
+        for key, field in self.constants.items():
+            field.props.set_bool("error", f"constants.{key}" in said)
+        self.rows.say({key.removeprefix("constants.") for key in said if key.startswith("constants.")})
         for end in self.fitted:
             end.props.set_bool("error", "fitted_stretch" in said)
         self.error.set_text(" ".join(left))
@@ -344,9 +331,3 @@ class _MaterialPanel:
         if stretch is not None:
             words += f" The pose has {stretch:.4g}{'' if low <= stretch <= high else ', outside it'}."
         self.caption.set_text(words)
-
-
-def _put(field: Any, value: Any) -> None:
-    """Show a value; a field that shows it already keeps what a person is typing."""
-    if field.value != value:
-        field.set_value(value)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from math import inf
 from typing import Any
 
 from nicegui import ui
 
-from softnlp.app.fields import number_field, say_beside, tell_problem, typed
-from softnlp.app.redraw import Redraw
+from softnlp.app.asking import sentence
+from softnlp.app.fields import BOX, button, dashed, number_field, say_beside, select_box, tell_problem, typed
+from softnlp.app.live_view import PoseStretch
 from softnlp.app.robot_state import (
     OWN,
     RobotState,
@@ -21,12 +24,13 @@ from softnlp.app.robot_state import (
 )
 from softnlp.app.section_svg import section_svg
 from softnlp.app.session import Session
-from softnlp.app.stretch import PoseStretch
+from softnlp.app.theme import Redraw
 from softnlp.base.errors import InputError
 from softnlp.base.units import MILLIMETRE
-from softnlp.model.robot import ALLOWABLE, DIMENSIONS, MINIMUM_WALL, ROBOTS, Dimension
+from softnlp.model.robot import ALLOWABLE, DIMENSIONS, ROBOTS
 
-_LABELS = {
+_WALL = "minimum_wall_mm"
+_FIELDS = {
     "outer_diameter_mm": ("Outer diameter", 0.5),
     "lumen_diameter_mm": ("Lumen diameter", 0.5),
     "chamber_circle_diameter_mm": ("Chamber circle", 0.5),
@@ -36,9 +40,10 @@ _LABELS = {
     "chamber_sets": ("Chamber sets", 1.0),
     "chambers_per_set": ("Chambers a set", 1.0),
     "chamber_angle_deg": ("Chamber angle", 1.0),
+    _WALL: ("Thinnest wall", 0.1),
 }
-"""Label and step of each dimension."""
-_WALL = "minimum_wall_mm"
+"""Label and step of each field, two in a row."""
+_DIMENSIONS = {d.file_key: d for d in DIMENSIONS}
 _RULES = {
     "wall_thickness": "Allow thin walls",
     "chamber_overlap": "Allow chambers that overlap",
@@ -46,6 +51,7 @@ _RULES = {
 }
 _STRETCHED = "At the stretch of the pose"
 _RESTING = 1.0 + 1e-9  # below it a section looks as made
+_RED, _ORANGE = "text-xs text-red-700 dark:text-red-300", "text-xs text-orange-800 dark:text-orange-300"
 
 
 def robot_panel(session: Session) -> None:
@@ -65,13 +71,23 @@ class _RobotPanel:
         self.lines: dict[str, ui.label] = {}
         with ui.column().classes("w-full gap-2").props("data-testid=robot-panel") as self.root:
             self._choice()
-            self._drawing()
+            self.picture = dashed(ui.html(sanitize=False).classes("w-full"), "robot.section")
+            self.caption = dashed(ui.label().classes("text-xs opacity-80 w-full"), "robot.caption")
+            self.stretched = self._switch(_STRETCHED, "robot.stretched", lambda _: self._draw())
             with ui.element("div").classes("grid grid-cols-2 gap-x-2 gap-y-2 w-full items-start"):
-                self._dimensions()
-            self._allowed()
+                keys = list(_FIELDS)
+                for pair in zip(keys[::2], keys[1::2], strict=True):
+                    for build in (self._field, self._line):
+                        for key in pair:
+                            build(key)
+            self.rules = {
+                rule: self._switch(_RULES[rule], f"robot.allow.{rule}", partial(self._allow, rule))
+                for rule in ALLOWABLE
+            }
+            self.warning = dashed(ui.label().classes(f"{_ORANGE} leading-tight"), "robot.warning")
         self.redraw = Redraw(self.root, self._draw)
         session.on_scenario(self._changed)
-        session.on_pressure(self._pose_changed)
+        session.on_pressure(lambda: self.redraw() if self.stretched.value else None)
         self._show()
         self._draw()
 
@@ -79,100 +95,34 @@ class _RobotPanel:
 
     def _choice(self) -> None:
         options = {name: name for name in ROBOTS} | {OWN: "Own dimensions"}
-        self.choice = ui.select(options, label="Robot", on_change=self._chosen)
-        self.choice.props("dense outlined options-dense hide-bottom-space data-testid=robot-name")
-        self.choice.without_auto_validation().classes("w-full").mark("robot.name")
-        self.own_name = ui.input("Name", on_change=self._named)
-        self.own_name.props("dense outlined debounce=250 hide-bottom-space maxlength=200 data-testid=robot-own_name")
-        self.own_name.without_auto_validation().classes("w-full").mark("robot.own_name")
+        self.choice = select_box(options, "robot.name", "Robot", test="robot-name", on_change=self._chosen)
+        self.own_name = dashed(ui.input("Name", on_change=self._named).without_auto_validation(), "robot.own_name")
+        self.own_name.props(f"{BOX} debounce=250 maxlength=200").classes("w-full")
         with ui.row().classes("w-full items-center justify-between no-wrap gap-2") as self.changed_row:
             self.changed_text = ui.label().classes("text-xs opacity-80").props("data-testid=robot-changed")
-            reset = ui.button("Library values", icon="restart_alt", on_click=self._reset)
-            reset.props("flat dense no-caps size=sm data-testid=robot-reset").mark("robot.reset")
+            button("Library values", "restart_alt", "robot.reset", self._reset, test="robot-reset")
 
-    def _drawing(self) -> None:
-        self.picture = ui.html(sanitize=False).classes("w-full").props("data-testid=robot-section")
-        self.picture.mark("robot.section")
-        self.caption = (
-            ui.label().classes("text-xs opacity-80 w-full").props("data-testid=robot-caption").mark("robot.caption")
-        )
-        self.stretched = ui.switch(_STRETCHED, on_change=lambda: self._draw())
-        self.stretched.props("dense size=sm data-testid=robot-stretched").classes("text-xs").mark("robot.stretched")
+    @staticmethod
+    def _switch(words: str, name: str, act: Callable[[bool], None]) -> ui.switch:
+        switch = dashed(ui.switch(words, on_change=lambda event: act(event.value)), name)
+        return switch.props("dense size=sm").classes("text-xs")
 
-    def _dimensions(self) -> None:
-        rows: list[list[Dimension]] = [list(DIMENSIONS[i : i + 2]) for i in range(0, len(DIMENSIONS), 2)]
-        for row in rows:
-            for dimension in row:
-                self._field(dimension)
-            if len(row) == 1:
-                self._wall()
-            for dimension in row:
-                self._line(dimension.file_key)
-        self._line(_WALL)
-
-    def _field(self, dimension: Dimension) -> None:
-        key = dimension.file_key
-        label, step = _LABELS[key]
-        unit = "" if dimension.scale is None else "mm" if key.endswith("_mm") else "°"
-
-        def default() -> float | None:
-            return library_value(self.session.document.table("robot"), dimension)
-
-        field = number_field(
-            self.session,
-            "robot",
-            key,
-            label,
-            unit,
-            default=default,
-            step=step,
-            whole=dimension.scale is None,
-        )
-        self._keep(key, field)
-
-    def _wall(self) -> None:
-        field = number_field(
-            self.session,
-            "robot",
-            _WALL,
-            "Thinnest wall",
-            "mm",
-            default=lambda: MINIMUM_WALL / MILLIMETRE,
-            step=0.1,
-        )
-        self._keep(_WALL, field)
-
-    def _keep(self, key: str, field: ui.number) -> None:
-        field.props(f"data-testid=robot-{key} no-error-icon")
-        self.fields[key] = field
+    def _field(self, key: str) -> None:
+        label, step = _FIELDS[key]
+        dimension = _DIMENSIONS.get(key)
+        default = None if dimension is None else lambda: library_value(self._table, dimension)
+        field = number_field(self.session, "robot", key, label, default=default, step=step, test=f"robot-{key}")
+        self.fields[key] = field.props("no-error-icon")
 
     def _line(self, key: str) -> None:
-        line = (
-            ui.label()
-            .classes("col-span-2 text-xs text-red-700 dark:text-red-300 leading-tight whitespace-pre-line -mt-1")
-            .mark(f"robot.{key}.said")
-        )
-        line.props(f"data-testid=robot-{key}-said role=alert")
-        self.lines[key] = line
-
-    def _allowed(self) -> None:
-        self.rules = {}
-        for rule in ALLOWABLE:
-            switch = ui.switch(_RULES[rule], on_change=lambda event, rule=rule: self._allow(rule, event.value))
-            switch.props(f"dense size=sm data-testid=robot-allow-{rule}").classes("text-xs")
-            self.rules[rule] = switch.mark(f"robot.allow.{rule}")
-        self.warning = (
-            ui.label()
-            .classes("text-xs text-orange-800 dark:text-orange-300 leading-tight")
-            .props("data-testid=robot-warning")
-        )
-        self.warning.mark("robot.warning")
+        look = f"col-span-2 {_RED} leading-tight whitespace-pre-line -mt-1"
+        self.lines[key] = dashed(ui.label().classes(look).props("role=alert"), f"robot.{key}.said")
 
     # --- what a person does -------------------------------------------------------------------------------------------
 
     @property
     def _table(self) -> dict[str, Any]:
-        return self.session.document.table("robot")
+        return self.session.table("robot")
 
     def _chosen(self, event: Any) -> None:
         if event.value is None or event.value == self._shown_choice():
@@ -210,7 +160,7 @@ class _RobotPanel:
         self.choice.set_value(chosen)
         self.own_name.set_visibility(chosen == OWN)
         name = self._table.get("name", "")
-        if chosen == OWN and self.own_name.value != name and isinstance(name, str):
+        if chosen == OWN and isinstance(name, str):
             self.own_name.set_value(name)
         self.changed_row.set_visibility(bool(changed))
         self.changed_text.set_text(f"{len(changed)} dimension{'s' if len(changed) > 1 else ''} of {chosen} changed")
@@ -232,42 +182,32 @@ class _RobotPanel:
         messages = state.said_beside(self.latest)
         for key, line in self.lines.items():
             message = messages.get(key, "")
-            line.set_text(f"{_LABELS.get(key, ('Thinnest wall',))[0]}: {message}" if message else "")
+            line.set_text(f"{_FIELDS[key][0]}: {message}" if message else "")
             line.set_visibility(bool(message))
             say_beside(self.fields[key], "")  # the line has room for it, the field has not
             self.fields[key].props.set_bool("error", bool(message))
         tell_problem(self.session, self.own_name, "robot", "name")
         if messages or state.broken:  # then that is what stands below
             say_beside(self.own_name, "")
-        allowed = [v.message for v in state.broken if v.rule in state.allowed]
-        self.warning.set_text(" ".join(f"{m[0].upper()}{m[1:]}." for m in allowed))
+        allowed = [sentence(v.message) for v in state.broken if v.rule in state.allowed]
+        self.warning.set_text(" ".join(allowed))
         self.warning.set_visibility(bool(allowed))
-
-    def _pose_changed(self) -> None:
-        if self.stretched.value:
-            self.redraw()
 
     def _draw(self) -> None:
         state = robot_state(self.session.document)
-        stretch = self._drawn_stretch()
+        stretch = self.stretch() if self.stretched.value else None
+        if stretch is None or not stretch > _RESTING:
+            stretch = 1.0
         self.stretched.set_text(_STRETCHED if stretch == 1.0 else f"{_STRETCHED}, {stretch:.3g}")
-        if state.robot is None:
-            self._no_drawing("")
-            return
-        try:
-            drawing = section_svg(state.robot, state.red_chambers(stretch), stretch)
-        except InputError as error:
-            self._no_drawing(error.message)
-            return
+        drawing, caption = '<div class="text-center text-xs opacity-70 py-8">No section to draw</div>', ""
+        if (robot := state.robot) is not None:
+            try:
+                drawing = section_svg(robot, state.red_chambers(stretch), stretch)
+            except InputError as error:
+                caption = error.message
+            else:
+                wall = (robot.chamber_wall + robot.outer_wall) / MILLIMETRE
+                touch = f" · chambers touch from stretch {state.touching:.3g}" if 1.0 <= state.touching < inf else ""
+                caption = f"Wall {wall:.3g} mm{touch}"
         self.picture.set_content(drawing)
-        wall = (state.robot.chamber_wall + state.robot.outer_wall) / MILLIMETRE
-        touch = f" · chambers touch from stretch {state.touching:.3g}" if 1.0 <= state.touching < inf else ""
-        self.caption.set_text(f"Wall {wall:.3g} mm{touch}")
-
-    def _no_drawing(self, why: str) -> None:
-        self.picture.set_content('<div class="text-center text-xs opacity-70 py-8">No section to draw</div>')
-        self.caption.set_text(why)
-
-    def _drawn_stretch(self) -> float:
-        value = self.stretch() if self.stretched.value else None
-        return value if value is not None and value > _RESTING else 1.0
+        self.caption.set_text(caption)

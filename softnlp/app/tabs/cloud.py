@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,9 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.app.job import Progress, Stopped
+from softnlp.app.asking import Progress, Stopped, few_enough
 from softnlp.base.columns import ONE, OUTPUTS
-from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.scenario.planning import plan_of
 from softnlp.scenario.read import Scenario
@@ -61,14 +59,6 @@ class Line(NamedTuple):
     unit: str
 
 
-def processors() -> int:
-    """Return how many processors this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on Linux
-        return os.cpu_count() or 1
-
-
 def sweep(asked: Scenario, folder: Path, workers: int, progress: Progress) -> Swept:
     """Run a sweep in worker processes. Stopped, it keeps what is solved, and goes on from there when run again.
 
@@ -81,12 +71,7 @@ def sweep(asked: Scenario, folder: Path, workers: int, progress: Progress) -> Sw
     SweepError
         As `run_sweep`.
     """
-    if asked.step_count > MOST_POSES:
-        raise InputError(
-            f"{asked.step_count} poses are too many for this page, which runs {MOST_POSES}; save the scenario and "
-            "use softnlp sweep",
-            table="workspace",
-        )
+    few_enough(asked, MOST_POSES, "poses", "softnlp sweep", table="workspace")
     plan = plan_of(asked)
     if plan.contact is not None:  # a force takes a hundred times as long: pieces that a person can wait for
         plan = replace(plan, chunk=_CHUNK_OF_FORCES)
@@ -201,29 +186,28 @@ def lines(swept: Swept) -> list[Line]:
         found += [Line("Time", f"{news.seconds:.2f}", "s"), Line("Rate", f"{news.rate:.0f}", "poses/s")]
     if not summary.solved:
         return found
-    if summary.unstable:
-        found.append(Line("Not stable", str(summary.unstable), ""))
-    if summary.undefined:
-        found.append(Line("Stability undefined", str(summary.undefined), ""))
-    if summary.self_intersecting:
-        found.append(Line("Pass through themselves", str(summary.self_intersecting), ""))
-    reach, boundary, hull = summary.reach, summary.boundary, summary.hull
-    found += [
+    reach, boundary, hull, dexterity = summary.reach, summary.boundary, summary.hull, summary.dexterity
+    counts = {
+        "Not stable": summary.unstable,
+        "Stability undefined": summary.undefined,
+        "Pass through themselves": summary.self_intersecting,
+    }
+    measures = (
+        ("Volume", boundary.volume / _CUBIC_CENTIMETRE, "cm³"),
+        ("Volume of the convex hull", hull.volume / _CUBIC_CENTIMETRE, "cm³"),
+        ("Area", boundary.area / _SQUARE_CENTIMETRE, "cm²"),
+    )
+    return [
+        *found,
+        *(Line(label, str(count), "") for label, count in counts.items() if count),
         Line("Distance from the axis", _range(reach.nearest_to_axis, reach.farthest_from_axis), "mm"),
         Line("Distance from the base", _range(reach.nearest_to_base, reach.farthest_from_base), "mm"),
         Line("Height", _range(reach.lowest, reach.highest), "mm"),
         Line("Shape of the workspace", boundary.extent.meaning, ""),
+        *(Line(label, f"{size:.4g}", unit) for label, size, unit in measures if size),
+        *([] if dexterity is None else [Line("Directions of the tip", f"{100 * dexterity.overall:.3g}", "% of all")]),
+        Line("Largest residual", f"{summary.worst_residual:.1e}", ""),
     ]
-    if boundary.volume:
-        found.append(Line("Volume", f"{boundary.volume / _CUBIC_CENTIMETRE:.4g}", "cm³"))
-    if hull.volume:
-        found.append(Line("Volume of the convex hull", f"{hull.volume / _CUBIC_CENTIMETRE:.4g}", "cm³"))
-    if boundary.area:
-        found.append(Line("Area", f"{boundary.area / _SQUARE_CENTIMETRE:.4g}", "cm²"))
-    if summary.dexterity is not None:
-        found.append(Line("Directions of the tip", f"{100 * summary.dexterity.overall:.3g}", "% of all"))
-    found.append(Line("Largest residual", f"{summary.worst_residual:.1e}", ""))
-    return found
 
 
 def _range(low: float, high: float) -> str:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import base64
-import io
 import sys
-import zipfile
 from asyncio.subprocess import PIPE, STDOUT, Process
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from nicegui import ui
 
-from softnlp.app.stage import Stage
+from softnlp.app.fields import named
+from softnlp.app.files import zipped
+from softnlp.app.session import Stage
 from softnlp.app.theme import darkness, on_dark
 from softnlp.base.errors import SoftnlpError
 
@@ -31,33 +33,25 @@ def scenario_tab(stage: Stage) -> None:
     with ui.column().classes("w-full gap-2 p-2"):
         ui.label("The file behind the screen. Edit it and apply, or run it as the command does.").classes("text-sm")
         editor = ui.codemirror(session.text(), language="TOML", theme="basicLight").classes("w-full h-80 text-xs")
-        editor.props("data-testid=scenario-text").mark("scenario.text")
+        named(editor, "scenario.text", "scenario-text")
         with ui.row().classes("w-full gap-2"):
-            ui.button("Apply", on_click=lambda: apply()).props("no-caps unelevated dense data-testid=scenario-apply")
-            ui.button("Back", on_click=lambda: editor.set_value(session.text())).props(
-                "no-caps flat dense data-testid=scenario-back"
-            ).tooltip("Forget what was typed here")
+            _button("Apply", None, "apply", "unelevated dense", lambda: apply())
+            back = _button("Back", None, "back", "flat dense", lambda: editor.set_value(session.text()))
+            back.tooltip("Forget what was typed here")
             ui.space()
-            run_button = ui.button("Run", icon="play_arrow", on_click=lambda: start()).props(
-                "no-caps unelevated dense data-testid=scenario-run"
-            )
-            stop_button = ui.button("Stop", icon="stop", on_click=lambda: stop()).props(
-                "no-caps outline dense data-testid=scenario-stop"
-            )
+            run_button = _button("Run", "play_arrow", "run", "unelevated dense", lambda: start())
+            stop_button = _button("Stop", "stop", "stop", "outline dense", lambda: stop())
         stop_button.set_visibility(False)
         output = ui.log(max_lines=400).classes("w-full h-40 text-xs").props("data-testid=scenario-output")
         figure = ui.image().classes("w-full").props("data-testid=scenario-figure")
         figure.set_visibility(False)
-        result = ui.button("Results", icon="download", on_click=lambda: offer()).props(
-            "no-caps flat dense data-testid=scenario-results"
-        )
+        result = _button("Results", "download", "results", "flat dense", lambda: offer())
         result.set_visibility(False)
 
     out = session.folder / "results"
 
     def follow() -> None:
-        if editor.value != session.text():
-            editor.set_value(session.text())
+        editor.set_value(session.text())
 
     def apply() -> bool:
         if editor.value == session.text():
@@ -98,7 +92,8 @@ def scenario_tab(stage: Stage) -> None:
             process.terminate()
 
     def offer() -> None:
-        ui.download.content(zipped(out), f"{Path(session.name).stem}_results.zip")
+        found = {str(file.relative_to(out)): file for file in sorted(out.rglob("*")) if file.is_file()}
+        ui.download.content(zipped(found), f"{Path(session.name).stem}_results.zip")
 
     def _switch(on: bool) -> None:
         run_button.set_visibility(not on)
@@ -116,14 +111,8 @@ def scenario_tab(stage: Stage) -> None:
     ui.context.client.on_delete(stop)
 
 
-def zipped(folder: Path) -> bytes:
-    """Return the files of a folder as a zip archive."""
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        for file in sorted(folder.rglob("*")):
-            if file.is_file():
-                archive.write(file, file.relative_to(folder))
-    return packed.getvalue()
+def _button(words: str, icon: str | None, test: str, look: str, act: Callable[[], Any]) -> ui.button:
+    return ui.button(words, icon=icon, on_click=act).props(f"no-caps {look} data-testid=scenario-{test}")
 
 
 def _data_url(image: Path) -> str:

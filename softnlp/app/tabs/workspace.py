@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from nicegui import ui
 
-from softnlp.app.asking import scenario_with
-from softnlp.app.fields import number_field
-from softnlp.app.parts import NumberTable, RunRow, number_text, plain_words
-from softnlp.app.session import Session
-from softnlp.app.stage import Stage
+from softnlp.app.asking import Progress, bars, scenario_with
+from softnlp.app.fields import heading, named, number_box, number_field, select_box, toggle
+from softnlp.app.parts import NumberTable, RunRow, downloads, number_text
+from softnlp.app.session import Session, Stage
 from softnlp.app.tabs import cloud
 from softnlp.base.errors import InputError
-from softnlp.base.units import BAR, MILLIMETRE
+from softnlp.base.processes import processors
+from softnlp.base.units import MILLIMETRE
 from softnlp.figures.cloud import shown
 from softnlp.sweep.export import export_csv
 
@@ -30,25 +32,29 @@ def _source(session: Session) -> None:
     """Show the keys of [workspace]."""
 
     def kind() -> str:
-        return "samples" if "samples" in session.document.table("workspace") else "levels"
+        return "samples" if "samples" in session.table("workspace") else "levels"
 
-    ui.label("Pressures").classes("text-base font-medium")
-    toggle = ui.toggle({"levels": "Grid", "samples": "Samples"}, value=kind()).mark("workspace.kind")
-    toggle.props("dense no-caps unelevated spread data-testid=workspace.kind").classes("w-full")
+    heading("Pressures")
+    kinds = toggle({"levels": "Grid", "samples": "Samples"}, "workspace.kind", kind())
     with ui.row().classes("w-full gap-2 no-wrap"):
-        levels = number_field(session, "workspace", "levels", "Levels a set", step=1, whole=True)
-        samples = number_field(session, "workspace", "samples", "Samples", step=100, whole=True)
-        number_field(session, "workspace", "from_bar", "From", "bar", default=lambda: 0.0, step=0.1)
-        number_field(session, "workspace", "to_bar", "To", "bar", step=0.1)
+        levels, samples, *_ = (
+            number_field(session, "workspace", key, label, step=step)
+            for key, label, step in (
+                ("levels", "Levels a set", 1),
+                ("samples", "Samples", 100),
+                ("from_bar", "From", 0.1),
+                ("to_bar", "To", 0.1),
+            )
+        )
     count = ui.label("").classes("text-sm opacity-70").mark("workspace.count")
-    wall = ui.switch("Push against the wall of the blocked force").props("dense data-testid=workspace.wall")
-    wall.mark("workspace.wall")
+    wall = named(ui.switch("Push against the wall of the blocked force").props("dense"), "workspace.wall")
 
     def choose(chosen: str | None) -> None:
         if chosen is None or chosen == kind():
             return
-        table = session.document.table("workspace")
-        kept = {key: value for key, value in table.items() if key not in ("levels", "samples", "seed")}
+        kept = {
+            key: value for key, value in session.table("workspace").items() if key not in ("levels", "samples", "seed")
+        }
         session.change_all("workspace", {chosen: _FIRST[chosen], **kept})
 
     def push(wanted: bool) -> None:
@@ -60,7 +66,7 @@ def _source(session: Session) -> None:
             session.reread()
 
     def refresh() -> None:
-        toggle.set_value(kind())
+        kinds.set_value(kind())
         levels.set_visibility(kind() == "levels")
         samples.set_visibility(kind() == "samples")
         wall.set_value(session.document.sweeps_wall)
@@ -68,10 +74,9 @@ def _source(session: Session) -> None:
         poses = scenario.step_count if scenario is not None and scenario.study == STUDY else None
         count.set_text("" if poses is None or session.problem is not None else f"{poses} poses")
 
-    refresh()
-    toggle.on_value_change(lambda event: choose(event.value))
+    session.follow(refresh)
+    kinds.on_value_change(lambda event: choose(event.value))
     wall.on_value_change(lambda event: push(bool(event.value)))
-    session.on_scenario(refresh)
 
 
 class _Sweep:
@@ -82,43 +87,37 @@ class _Sweep:
         self._swept: cloud.Swept | None = None
         self._drawn = False
         self._words = ""
-        self._workers = ui.number("Worker processes", value=cloud.processors(), min=1, max=64, precision=0)
-        self._workers.props("dense outlined hide-bottom-space data-testid=workspace.workers").classes("w-full")
-        self._workers.mark("workspace.workers")
+        self._workers = number_box(
+            "Worker processes", "workspace.workers", value=processors(), min=1, max=64, precision=0
+        ).classes("w-full")
         self._row = RunRow("workspace", "Run the sweep", self._begin)
         with ui.column().classes("w-full gap-2") as self._found:
-            self._what = ui.select({}, label="Colour of the points", on_change=self._draw).classes("w-full")
-            self._what.props("dense outlined options-dense data-testid=workspace.colour").mark("workspace.colour")
+            self._what = select_box({}, "workspace.colour", "Colour of the points", on_change=self._draw)
             with ui.row().classes("w-full items-center gap-2 no-wrap text-xs"):
                 self._low = ui.label("").mark("workspace.low")
                 self._bar = ui.element("div").classes("grow h-3 rounded")
                 self._high = ui.label("").mark("workspace.high")
-            self._pick = ui.switch("A click on a point takes its pressures").props("dense")
-            self._pick.props("data-testid=workspace.pick").mark("workspace.pick")
+            self._pick = named(ui.switch("A click on a point takes its pressures").props("dense"), "workspace.pick")
             self._picked = ui.label("").classes("text-sm").mark("workspace.picked")
             with ui.row().classes("gap-1"):
-                for label, name, act in (
-                    ("workspace.nc", "netcdf", self._take_netcdf),
-                    ("workspace.csv", "csv", self._take_csv),
-                ):
-                    button = ui.button(label, icon="download", on_click=act).mark(f"workspace.{name}")
-                    button.props(f"dense flat no-caps size=sm data-testid=workspace.{name}")
+                downloads(
+                    ("workspace.nc", "workspace.netcdf", self._take_netcdf),
+                    ("workspace.csv", "workspace.csv", self._take_csv),
+                )
         self._found.set_visibility(False)
         self._table = NumberTable("workspace.numbers", height="24rem")
         stage.view.on_sight(self._clicked)
         stage.session.on_scenario(self._follow)
 
+    def _asked(self) -> Callable[[Progress], cloud.Swept]:
+        workers, session = self._workers.value, self._stage.session
+        if workers is None or not 1 <= workers <= 64:
+            raise InputError("Worker processes: expected a whole number from 1 to 64")
+        asked = scenario_with(session, STUDY)
+        return lambda progress: cloud.sweep(asked, session.folder / "sweeps", int(workers), progress)
+
     async def _begin(self) -> None:
-        workers = self._workers.value
-        try:
-            if workers is None or not 1 <= workers <= 64:
-                raise InputError("Worker processes: expected a whole number from 1 to 64")
-            asked = scenario_with(self._stage.session, STUDY)
-        except InputError as error:
-            self._row.warn(plain_words(error))
-            return
-        folder = self._stage.session.folder / "sweeps"
-        swept = await self._row.do(lambda progress: cloud.sweep(asked, folder, int(workers), progress))
+        swept = await self._row.ask(self._asked)
         if swept is None:
             return
         news = swept.news
@@ -129,17 +128,16 @@ class _Sweep:
         timed = f", {news.seconds:.2f} s, {news.rate:.0f} poses/s" if news.rate else ""
         self._words = f"{news.done} poses, {news.failed} failed{timed}."
         self._row.say(self._words)
-        self._show()
+        self._show(swept)
 
-    def _show(self) -> None:
+    def _show(self, swept: cloud.Swept) -> None:
         """Show the finished sweep."""
-        assert self._swept is not None
-        choices = cloud.quantities(self._swept)
+        choices = cloud.quantities(swept)
         chosen = self._what.value if self._what.value in choices else next(iter(choices), None)
         self._what.set_options(choices, value=chosen)
         self._bar.style(f"background: {cloud.gradient()}")
         self._found.set_visibility(True)
-        rows = [list(line) for line in cloud.lines(self._swept)]
+        rows = [list(line) for line in cloud.lines(swept)]
         self._table.show(["number", "value", "unit"], rows, "workspace_numbers.csv")
         self._draw()
 
@@ -177,7 +175,7 @@ class _Sweep:
         if number is None or swept.workspace.pressure.shape[1] != len(session.pressure):
             return
         pressure = swept.workspace.pressure[number]
-        self._picked.set_text(f"Pose {number + 1}: {', '.join(f'{p / BAR:.4g}' for p in pressure)} bar")
+        self._picked.set_text(f"Pose {number + 1}: {bars(pressure)} bar")
         session.set_pressure(pressure)
 
     def _take_netcdf(self) -> None:
