@@ -16,7 +16,7 @@ from app_stage import NotedView, done, enter, field, opened, ran
 
 from softnlp.app.asking import Progress, scenario_with
 from softnlp.app.session import Session
-from softnlp.app.tabs import cloud
+from softnlp.app.tabs import workspace as cloud
 from softnlp.app.tabs.workspace import workspace_tab
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.studies.ellipsoids import manipulability

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from softnlp.app.asking import bars
 from softnlp.app.session import Session, Stage
+from softnlp.app.theme import Redraw
 from softnlp.app.view import frame_of
 from softnlp.base.errors import InputError
 from softnlp.base.status import Status
@@ -19,7 +20,7 @@ from softnlp.model.quantities import quantities
 from softnlp.results import Body
 from softnlp.scenario.read import Scenario
 from softnlp.statics.branch import branch_function, stretch_on_branch
-from softnlp.statics.step import Contact, Pose, Run, Step
+from softnlp.statics.step import Pose, Run, Step
 from softnlp.statics.wall import Wall
 
 Array = NDArray[np.float64]
@@ -38,14 +39,14 @@ class LiveView:
 
     def __init__(self, stage: Stage, shown: Callable[[Run], None], say: Callable[[str], None]) -> None:
         self._stage = stage
-        self._shown = shown
         self._say = say
         self._words = ""
         self._wanted = False
         self._working = False
         self._last: tuple[Scenario, Array] | None = None
-        self._told: Run | None = None
         self._client = ui.context.client
+        # The panels get the numbers a moment after the picture, which they would hold up in the browser.
+        self._tell = Redraw(self._client.content, lambda: shown(self._run), _NUMBERS_AFTER_S)
         stage.session.on_scenario(self.request)
         stage.session.on_pressure(self.request)
 
@@ -94,42 +95,31 @@ class LiveView:
                 self._show(scenario, pressure, step, step.pose, ghost)
             else:
                 self._said(f"{step.message}. The picture is of the last pose that was solved.")
-        self._tell(run)
+        self._run = run
+        self._tell()
 
     def _said(self, words: str) -> None:
         """Say words that stay when a later pose takes long."""
         self._words = words
         self._say(words)
 
-    def _tell(self, run: Run) -> None:
-        """Give the panels the numbers a moment after the picture, which they would hold up in the browser."""
-        telling = self._told is not None
-        self._told = run
-        if not telling:
-            asyncio.get_running_loop().call_later(_NUMBERS_AFTER_S, self._tell_now)
-
-    def _tell_now(self) -> None:
-        run, self._told = self._told, None
-        if run is not None and not self._client.is_deleted:
-            with self._client:
-                self._shown(run)
-
     def _show(self, scenario: Scenario, pressure: Array, step: Step, pose: Pose, ghost: Pose | None) -> None:
         if self._last is None or not np.array_equal(self._last[1], pressure) or self._last[0] is not scenario:
             self._said("")
-        self._last = (scenario, pressure)
+        self._last, loads, contact = (scenario, pressure), scenario.loads, step.contact
+        stands = contact is not None and contact.normal.any()  # else the chambers alone are held
         self._stage.view.show(
             frame_of(
                 scenario.robot,
                 _body(pose),
                 pressure,
                 ghost=None if ghost is None else _body(ghost),
-                tip_force=scenario.loads.tip_force,
-                tip_moment=scenario.loads.tip_moment,
-                gravity=scenario.loads.gravity,
-                wall=_wall(step.contact),
-                wall_force=0.0 if step.contact is None else step.contact.force,
-                tip_cap=0.0 if step.contact is None else step.contact.tip_cap,
+                tip_force=loads.tip_force,
+                tip_moment=loads.tip_moment,
+                gravity=loads.gravity,
+                wall=Wall(contact.wall_point, contact.normal) if contact is not None and stands else None,
+                wall_force=0.0 if contact is None else contact.force,
+                tip_cap=0.0 if contact is None else contact.tip_cap,
             )
         )
 
@@ -161,8 +151,3 @@ class PoseStretch:
 
 def _body(pose: Pose) -> Body:
     return Body(pose.shape.position, pose.shape.rotation, pose.radii)
-
-
-def _wall(contact: Contact | None) -> Wall | None:
-    """Return the wall of a step; None where the chambers alone are held."""
-    return Wall(contact.wall_point, contact.normal) if contact is not None and contact.normal.any() else None

@@ -7,6 +7,7 @@ from functools import partial
 
 from nicegui import ui
 
+from softnlp.app.controls import button
 from softnlp.app.files import mesh_menu, open_dialog, save
 from softnlp.app.live_view import LiveView
 from softnlp.app.panels.equations import coefficients_panel, loads_panel, solver_panel
@@ -102,14 +103,13 @@ def awaits_data(session: Session) -> bool:
 def _files(session: Session, dark: ui.dark_mode) -> ui.menu:
     """Build the buttons for files and return the menu of exports."""
     dialog = open_dialog(session)
-    ui.button("Open", icon="folder_open", on_click=dialog.open).props("flat dense no-caps data-testid=open")
-    ui.button("Save", icon="save", on_click=lambda: save(session)).props("flat dense no-caps data-testid=save")
-    with ui.button("Export", icon="view_in_ar").props("flat dense no-caps data-testid=export"), ui.menu() as exports:
+    look = "flat dense no-caps"
+    button("Open", "folder_open", "open", dialog.open, look)
+    button("Save", "save", "save", partial(save, session), look)
+    with ui.button("Export", icon="view_in_ar").props(f"{look} data-testid=export"), ui.menu() as exports:
         pass
-    turn = ui.button(icon="contrast", on_click=dark.toggle).props(
-        'flat dense round data-testid=dark aria-label="light or dark"'
-    )
-    turn.tooltip("Light or dark")
+    turn = button("", "contrast", "dark", dark.toggle, "flat dense round").tooltip("Light or dark")
+    turn.props('aria-label="light or dark"')
     return exports
 
 
@@ -157,10 +157,8 @@ def _view_buttons(view: RobotView) -> None:
             ("trail", "timeline", "Forget the trail of the tip", view.clear_trail),
             ("picture", "photo_camera", "Save a picture", picture),
         ):
-            button = ui.button(icon=icon, on_click=act).props(
-                f'flat dense round data-testid=view-{name} aria-label="{words}"'
-            )
-            button.tooltip(words)
+            control = button("", icon, f"view-{name}", act, "flat dense round").tooltip(words)
+            control.props(f'aria-label="{words}"')
 
 
 def _studies(stage: Stage, tabs: ui.tabs, chosen: str) -> None:

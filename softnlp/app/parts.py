@@ -6,6 +6,7 @@ import asyncio
 import csv
 import io
 from collections.abc import Awaitable, Callable, Mapping, Sequence
+from functools import partial
 from math import isfinite
 from typing import Any, TypeVar
 
@@ -14,7 +15,7 @@ from nicegui import events, ui
 from numpy.typing import NDArray
 
 from softnlp.app.asking import Progress, Stopped
-from softnlp.app.fields import HINT, button, named, plain_words
+from softnlp.app.controls import HINT, button, named, plain_words
 from softnlp.app.session import LARGEST_FILE
 from softnlp.app.theme import darkness, figure_config, figure_layout, figure_text, on_dark
 from softnlp.base.errors import InputError, SoftnlpError
@@ -75,17 +76,6 @@ class RunRow:
             self._show(False)
         return None
 
-    async def ask(
-        self, prepare: Callable[[], Callable[[Progress], T]], watch: Callable[[], None] | None = None
-    ) -> T | None:
-        """Do the work that `prepare` returns, as `do`; what is not possible is said."""
-        try:
-            work = prepare()
-        except InputError as error:
-            self.warn(plain_words(error))
-            return None
-        return await self.do(work, watch)
-
     def stop(self) -> None:
         """Ask the run to end."""
         self.progress.stop()
@@ -116,6 +106,32 @@ class RunRow:
         self.say("Stopping after this step…" if self.progress.stopping else self.progress.text or "Working…")
         if self._watch is not None:
             self._watch()
+
+
+def study_row(
+    marker: str,
+    label: str,
+    asked: Callable[[], Callable[[Progress], T]],
+    done: Callable[[T], None],
+    watch: Callable[[], None] | None = None,
+) -> RunRow:
+    """Show the row of a study: the button does the work that `asked` returns, `done` gets its result.
+
+    What is not possible is said. watch : as of `RunRow.do`.
+    """
+
+    async def begin() -> None:
+        try:
+            work = asked()
+        except InputError as error:
+            row.warn(plain_words(error))
+            return
+        found = await row.do(work, watch)
+        if found is not None:
+            done(found)
+
+    row = RunRow(marker, label, begin)
+    return row
 
 
 def number_text(value: Any, digits: int = 5) -> str:
@@ -302,10 +318,20 @@ def csv_drop(marker: str, label: str, take: Callable[[str, bytes], None]) -> ui.
     return named(box.classes("w-full softnlp-drop"), marker)
 
 
-def downloads(*files: tuple[str, str, Callable[[], Any]]) -> None:
-    """Show a button for each file to take away: its name, that of the button, and what offers it."""
-    for words, name, offer in files:
-        button(words, "download", name, offer)
+def downloads(*files: tuple[str, str, str]) -> dict[str, Callable[[], str]]:
+    """Show a button for each file to take away, and return where its text is put by name once there is one.
+
+    files : name, that of the button, and kind (text/csv).
+    """
+    texts: dict[str, Callable[[], str]] = {}
+
+    def offer(name: str, kind: str) -> None:
+        if name in texts:
+            ui.download.content(texts[name](), name, kind)
+
+    for name, mark, kind in files:
+        button(name, "download", mark, partial(offer, name, kind))
+    return texts
 
 
 # The list of files is empty at once: a dropped one is named by the tab.

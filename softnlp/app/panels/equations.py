@@ -6,7 +6,7 @@ from functools import partial
 
 from nicegui import ui
 
-from softnlp.app.fields import HINT, choice_field, dashed, number_field, vector_field
+from softnlp.app.controls import HINT, button, choice_field, dashed, number_field, vector_field
 from softnlp.app.session import Session
 from softnlp.model.conventions import COEFFICIENT_SETS, CONVENTIONS
 from softnlp.model.gravity import DIRECTIONS, gravity_named, gravity_words
@@ -65,11 +65,8 @@ def coefficients_panel(session: Session) -> None:
         standard = partial(of_set, key)
         number_field(session, table, key, label, default=standard, step=step, test=f"{table}-{key}").props("clearable")
     with ui.row().classes("w-full no-wrap gap-2"):
-        look = "flat dense no-caps size=sm"
-        off = ui.button("No stiffening", on_click=lambda: switch_off(session)).tooltip("k_e = k_b = 0")
-        off.props(f"{look} data-testid=no-stiffening")
-        back = ui.button("Back to the set", on_click=lambda: back_to_set(session))
-        back.props(f"{look} data-testid=coefficients-back")
+        button("No stiffening", None, "no-stiffening", partial(switch_off, session)).tooltip("k_e = k_b = 0")
+        button("Back to the set", None, "coefficients-back", partial(back_to_set, session))
     conventions = {name: _CONVENTIONS[name] for name in CONVENTIONS}
     choice_field(session, "corrections", "conventions", "Conventions", conventions, test="conventions")
 

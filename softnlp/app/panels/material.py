@@ -2,38 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from typing import Any, TypeVar
 
 from nicegui import ui
 
-from softnlp.app.fields import BOX, dashed, number_box, number_field, say_beside, select_box, toggle, typed
+from softnlp.app import controls, silicone
 from softnlp.app.live_view import PoseStretch
-from softnlp.app.material_figure import LAW_NAMES, MEASURES, law_name, mark_pose, material_figure
-from softnlp.app.material_state import (
-    Form,
-    MaterialState,
-    constants_form,
-    fitted_range,
-    form_of,
-    formula_form,
-    inline,
-    known_silicones,
-    law_or_default,
-    library_form,
-    material_state,
-)
-from softnlp.app.panels.constant_rows import ConstantRows
 from softnlp.app.session import Session
 from softnlp.app.theme import Redraw, darkness, on_dark
 from softnlp.model.formula import MAX_LENGTH
 from softnlp.model.laws import LAWS
 from softnlp.model.materials import DENSITY, FITTED_STRETCH, MaterialEntry
 
-_FORMS: Mapping[Form, str] = {"library": "Library", "constants": "Own constants", "formula": "Own formula"}
+_FORMS: Mapping[silicone.Form, str] = {"library": "Library", "constants": "Own constants", "formula": "Own formula"}
 T = TypeVar("T", ui.input, ui.textarea)
 _SMALL = "text-xs opacity-80 w-full"
+_LONGEST_NAME = 40
+_MOST_ROWS = 30
 
 
 def material_panel(session: Session) -> None:
@@ -49,23 +36,15 @@ class _MaterialPanel:
         self.dark = darkness()
         self.stretch = PoseStretch(session)
         self.seen = session.document
-        self.left: dict[Form, dict[str, Any]] = {}
+        self.left: dict[silicone.Form, dict[str, Any]] = {}
         self.measure = "engineering_stress"
         self.constants: dict[str, ui.number] = {}
-        self.entries: Mapping[str, MaterialEntry] = known_silicones(session.document, session.folder)
+        self.entries: Mapping[str, MaterialEntry] = silicone.known_silicones(session.document, session.folder)
         self.file = session.document.get("material", "file")
         self.read_from: Any = None
         self.state = self._read()
         with ui.column().classes("w-full gap-2").props("data-testid=material-panel") as self.root:
-            self.form = self._toggle(dict(_FORMS), "form", self._form_chosen)
-            self._identity()
-            self.constants_box = ui.element("div").classes("grid grid-cols-2 gap-2 w-full items-start")
-            self.constants_law = ""
-            self._own_formula()
-            self.error = ui.label().classes("text-xs text-red-700 dark:text-red-300 leading-tight")
-            dashed(self.error.props("role=alert"), "material.said")
-            self._numbers()
-            self._curves()
+            self._build()
         self.redraw = Redraw(self.root, self._draw)
         self.move = Redraw(self.root, self._mark, 0.25, at_rest=True)
         session.on_scenario(self._changed)
@@ -76,54 +55,54 @@ class _MaterialPanel:
 
     # --- controls -----------------------------------------------------------------------------------------------------
 
-    def _identity(self) -> None:
-        self.silicone = self._select(list(self.entries), "name", "Silicone", self._silicone_chosen)
-        self.own_name = self._box(ui.input, "Silicone", "name", "own_name", "maxlength=200")
-        self.law = self._select(dict(LAW_NAMES), "model", "Law", self._law_chosen)
-        self.own_law = self._box(ui.input, "Name of the law", "model", "own_model", "maxlength=200")
-
-    @staticmethod
-    def _select(options: Any, key: str, label: str, act: Callable[[Any], None]) -> ui.select:
-        return select_box(options, f"material.{key}", label, test=f"material-{key}", on_change=act)
-
-    def _box(self, kind: type[T], label: str, key: str, name: str, look: str) -> T:
-        """Show a text of [material] that is a person's own."""
-        box = dashed(kind(label, on_change=lambda event: self._text(key, event.value)), f"material.{name}")
-        return box.props(f"{BOX} debounce=300 {look}").classes("w-full").without_auto_validation()
-
-    def _own_formula(self) -> None:
+    def _build(self) -> None:
+        """Build the fields of every form; `_show` hides those of the others."""
+        self.form = self._toggle(dict(_FORMS), "form", self._form_chosen)
+        names = list(self.entries)
+        self.silicone = controls.select(names, "material.name", "Silicone", test="material-name")
+        self.silicone.on_value_change(self._silicone_chosen)
+        self.own_name = self._text_box(ui.input, "Silicone", "name", "own_name", "maxlength=200")
+        self.law = controls.select(dict(silicone.LAW_NAMES), "material.model", "Law", test="material-model")
+        self.law.on_value_change(self._law_chosen)
+        self.own_law = self._text_box(ui.input, "Name of the law", "model", "own_model", "maxlength=200")
+        self.constants_box = ui.element("div").classes("grid grid-cols-2 gap-2 w-full items-start")
+        self.constants_law = ""
         with ui.column().classes("w-full gap-2") as self.formula_box:
             look = f"autogrow maxlength={MAX_LENGTH} spellcheck=false input-class=font-mono"
-            self.formula = self._box(ui.textarea, "Engineering stress [MPa] =", "formula", "formula", look)
+            self.formula = self._text_box(ui.textarea, "Engineering stress [MPa] =", "formula", "formula", look)
             ui.label("Of stretch and the constants below; 0 at stretch 1, rising.").classes(_SMALL)
-            self.rows = ConstantRows(self._rows_changed)
-
-    def _numbers(self) -> None:
-        density, test = "density_kg_m3", "material-density_kg_m3"
-        self.density = number_field(
-            self.session, "material", density, "Density", default=self._density, step=10, test=test
+            self.rows = _ConstantRows(self._rows_changed)
+        self.error = ui.label().classes("text-xs text-red-700 dark:text-red-300 leading-tight")
+        controls.dashed(self.error.props("role=alert"), "material.said")
+        key, test = "density_kg_m3", "material-density_kg_m3"
+        self.density = controls.number_field(
+            self.session, "material", key, "Density", default=self._density, step=10, test=test
         )
         with ui.row().classes("w-full no-wrap gap-2") as self.fitted_box:
             self.fitted = [
-                self._number(label, f"fitted_stretch.{k}", step=0.1, on_change=self._fitted_changed).classes("w-1/2")
+                self._number(label, f"fitted_stretch.{k}", f"material-fitted_stretch-{k}", step=0.1).classes("w-1/2")
                 for k, label in enumerate(("Fitted from stretch", "to stretch"))
             ]
+        for end in self.fitted:
+            end.on_value_change(self._fitted_changed)
+        measures = {measure: label for measure, (label, _) in silicone.MEASURES.items()}
+        self._toggle(measures, "measure", self._measure_chosen, self.measure)
+        self.plot = controls.dashed(ui.plotly(self._figure()).classes("self-center"), "material.plot")
+        self.caption = controls.dashed(ui.label().classes(_SMALL), "material.caption")
+
+    def _text_box(self, kind: type[T], label: str, key: str, name: str, look: str) -> T:
+        """Show a text of [material] that is a person's own."""
+        box = controls.dashed(kind(label, on_change=lambda event: self._text(key, event.value)), f"material.{name}")
+        return box.props(f"{controls.BOX} debounce=300 {look}").classes("w-full").without_auto_validation()
 
     @staticmethod
-    def _number(label: str, name: str, unit: str = "", test: str = "", **more: Any) -> ui.number:
-        test = test or f"material-{name.replace('.', '-')}"
-        return number_box(label, f"material.{name}", unit, "debounce=300 no-error-icon", test, **more)
-
-    def _curves(self) -> None:
-        names = {measure: label for measure, (label, _) in MEASURES.items()}
-        self._toggle(names, "measure", self._measure_chosen, self.measure)
-        self.plot = dashed(ui.plotly(self._figure()).classes("self-center"), "material.plot")
-        self.caption = dashed(ui.label().classes(_SMALL), "material.caption")
+    def _number(label: str, name: str, test: str, **more: Any) -> ui.number:
+        return controls.number(label, f"material.{name}", look="debounce=300 no-error-icon", test=test, **more)
 
     @staticmethod
     def _toggle(options: Any, name: str, act: Callable[[Any], None], value: str | None = None) -> ui.toggle:
-        choice = toggle(options, f"material.{name}", value).on_value_change(act)
-        return choice.props(f"size=sm data-testid=material-{name}")
+        choice = controls.toggle(options, f"material.{name}", value, f"material-{name}").props("size=sm")
+        return choice.on_value_change(act)
 
     # --- what a person does -------------------------------------------------------------------------------------------
 
@@ -137,61 +116,65 @@ class _MaterialPanel:
 
     def _form_chosen(self, event: Any) -> None:
         table = self._table
-        before = form_of(table)
-        wanted: Form = event.value or before
+        before = silicone.form_of(table)
+        wanted: silicone.Form = event.value or before
         if wanted == before:
             return
         self.left[before] = table
         kept, entry, model = self.left.get(wanted), self._entry(), table.get("model")
         if kept is None and wanted == "library":
             name = entry.name if entry is not None else next(iter(self.entries))
-            kept = library_form(table, name, law_or_default(model, self.entries[name].models))
+            kept = silicone.library_form(table, name, silicone.law_or_default(model, self.entries[name].models))
         elif kept is None and wanted == "constants":
-            kept = constants_form(table, law_or_default(model, LAWS), entry)
+            kept = silicone.constants_form(table, silicone.law_or_default(model, LAWS), entry)
         elif kept is None:
-            kept = formula_form(table, entry)
+            kept = silicone.formula_form(table, entry)
         if "constants" in kept:
-            kept = kept | {"constants": inline(kept["constants"])}
+            kept = kept | {"constants": silicone.inline(kept["constants"])}
         self.session.change_all("material", kept)
 
     def _silicone_chosen(self, event: Any) -> None:
         if event.value is None or event.value == self._table.get("name"):
             return
-        model = law_or_default(self._table.get("model"), self.entries[event.value].models)
-        self.session.change_all("material", library_form(self._table, event.value, model))
+        model = silicone.law_or_default(self._table.get("model"), self.entries[event.value].models)
+        self.session.change_all("material", silicone.library_form(self._table, event.value, model))
 
     def _law_chosen(self, event: Any) -> None:
         if event.value is None or event.value == self._table.get("model"):
             return
-        if form_of(self._table) == "constants":
-            self.session.change_all("material", constants_form(self._table, event.value, self._entry()))
+        if silicone.form_of(self._table) == "constants":
+            self.session.change_all("material", silicone.constants_form(self._table, event.value, self._entry()))
         else:
             self.session.change("material", "model", event.value)
 
     def _text(self, key: str, value: Any) -> None:
-        text = typed(value)
-        form = form_of(self._table)
+        text = controls.typed(value)
+        form = silicone.form_of(self._table)
         if (form == "library") or (form == "constants" and key != "name") or text == self._table.get(key, ""):
             return
         self.session.change("material", key, text)
 
     def _constant_changed(self, key: str, event: Any) -> None:
         constants, value = self._table.get("constants"), event.value
-        if form_of(self._table) != "constants" or not isinstance(constants, dict) or constants.get(key) == value:
+        if (
+            silicone.form_of(self._table) != "constants"
+            or not isinstance(constants, dict)
+            or constants.get(key) == value
+        ):
             return
         constants = {k: v for k, v in constants.items() if k != key} | ({} if value is None else {key: value})
-        self.session.change("material", "constants", inline(constants))
+        self.session.change("material", "constants", silicone.inline(constants))
 
     def _rows_changed(self, constants: dict[str, float]) -> None:
-        if form_of(self._table) == "formula" and constants != self._table.get("constants"):
-            self.session.change("material", "constants", inline(constants))
+        if silicone.form_of(self._table) == "formula" and constants != self._table.get("constants"):
+            self.session.change("material", "constants", silicone.inline(constants))
         else:
             self._say()
 
     def _fitted_changed(self) -> None:
         low, high = (field.value for field in self.fitted)
-        wanted = fitted_range(low, high)
-        if form_of(self._table) != "library" and (wanted or list(FITTED_STRETCH)) != self._fitted_shown():
+        wanted = silicone.fitted_range(low, high)
+        if silicone.form_of(self._table) != "library" and (wanted or list(FITTED_STRETCH)) != self._fitted_shown():
             self.session.change("material", "fitted_stretch", wanted)
 
     def _measure_chosen(self, event: Any) -> None:
@@ -200,17 +183,17 @@ class _MaterialPanel:
 
     # --- what is shown ------------------------------------------------------------------------------------------------
 
-    def _read(self) -> MaterialState:
+    def _read(self) -> silicone.MaterialState:
         """Read the silicone again where something about it changed; most changes are of other tables."""
         problem = self.session.problem
         read_from = (self._table, str(problem) if problem is not None and problem.table == "material" else "")
         if read_from == self.read_from:
             return self.state
         self.read_from = read_from
-        return material_state(self.session.document, self.entries, self.session.folder, problem)
+        return silicone.material_state(self.session.document, self.entries, self.session.folder, problem)
 
     def _density(self) -> float:
-        models = getattr(self._entry(), "models", {}) if form_of(self._table) == "library" else {}
+        models = getattr(self._entry(), "models", {}) if silicone.form_of(self._table) == "library" else {}
         return float(next(iter(models.values())).density) if models else DENSITY
 
     def _fitted_shown(self) -> list[Any]:
@@ -230,7 +213,7 @@ class _MaterialPanel:
             self.read_from = None
         if table.get("file") != self.file or self.read_from is None:
             self.file = table.get("file")
-            self.entries = known_silicones(self.session.document, self.session.folder)
+            self.entries = silicone.known_silicones(self.session.document, self.session.folder)
         self.state = self._read()
         form = self.state.form
         self.form.set_value(form)
@@ -254,7 +237,7 @@ class _MaterialPanel:
             field.set_value(value)
         self._say()
 
-    def _show_names(self, table: Mapping[str, Any], form: Form) -> None:
+    def _show_names(self, table: Mapping[str, Any], form: silicone.Form) -> None:
         name, model = table.get("name"), table.get("model")
         if form == "library":
             self.silicone.set_options(list(self.entries), value=name if name in self.entries else None)
@@ -265,9 +248,9 @@ class _MaterialPanel:
             return
         entry = self._entry()
         laws = list(entry.models) if form == "library" and entry is not None else list(LAWS)
-        self.law.set_options({law: law_name(law) for law in laws}, value=model if model in laws else None)
+        self.law.set_options({law: silicone.law_name(law) for law in laws}, value=model if model in laws else None)
 
-    def _show_constants(self, table: Mapping[str, Any], form: Form) -> None:
+    def _show_constants(self, table: Mapping[str, Any], form: silicone.Form) -> None:
         """Show a field for each constant of the law; another law has others."""
         law = str(table.get("model")) if form == "constants" else ""
         if law != self.constants_law:
@@ -277,7 +260,8 @@ class _MaterialPanel:
             with self.constants_box:
                 for constant in LAWS[law].constants if law in LAWS else ():
                     key, unit = constant.file_key, "" if constant.unit == "1" else constant.unit
-                    field = self._number(constant.name, f"constants.{key}", unit, f"material-{key}").props("step=any")
+                    field = self._number(constant.name, f"constants.{key}", f"material-{key}", unit=unit)
+                    field.props("step=any")
                     field.on_value_change(partial(self._constant_changed, key))
                     self.constants[key] = field.classes("w-full")
         given = table.get("constants")
@@ -297,7 +281,7 @@ class _MaterialPanel:
             (self.density, "density_kg_m3"),
         )
         for element, key in beside:
-            say_beside(element, said.pop(key, "") if element.visible else "")
+            controls.say_beside(element, said.pop(key, "") if element.visible else "")
         names = [(key.removeprefix("constants."), message) for key, message in said.items()]
         left = [message if name in ("", "constants") else f"{name}: {message}" for name, message in names]
         for key, field in self.constants.items():
@@ -309,7 +293,9 @@ class _MaterialPanel:
         self.error.set_visibility(bool(left))
 
     def _figure(self) -> dict[str, Any]:
-        return material_figure(self.state.material, self.state.others, self.measure, self.stretch(), self.dark())
+        return silicone.material_figure(
+            self.state.material, self.state.others, self.measure, self.stretch(), self.dark()
+        )
 
     def _draw(self) -> None:
         self.plot.update_figure(self._figure())
@@ -317,7 +303,7 @@ class _MaterialPanel:
 
     def _mark(self) -> None:
         """Move the point of the pose; the curves stay."""
-        mark_pose(self.plot.figure, self.state.material, self.measure, self.stretch())
+        silicone.mark_pose(self.plot.figure, self.state.material, self.measure, self.stretch())
         self.plot.update()
         self._describe()
 
@@ -331,3 +317,67 @@ class _MaterialPanel:
         if stretch is not None:
             words += f" The pose has {stretch:.4g}{'' if low <= stretch <= high else ', outside it'}."
         self.caption.set_text(words)
+
+
+class _ConstantRows:
+    """Rows of a name and a value; `changed` is called with the constants whenever a person changes one."""
+
+    def __init__(self, changed: Callable[[dict[str, float]], None]) -> None:
+        """Build the table in the current slot, without rows."""
+        self._changed = changed
+        self._rows: list[tuple[ui.element, ui.input, ui.number]] = []
+        self._table = ui.column().classes("w-full gap-1").props("data-testid=material-rows")
+        controls.button("Add constant", "add", "material.add", self._added, test="material-add")
+
+    def show(self, constants: Mapping[str, Any]) -> None:
+        """Show other constants; rows that say this already stay as they are, also while a person types in one."""
+        if self.values()[0] == dict(constants):
+            return
+        self._table.clear()
+        self._rows.clear()
+        for name, value in constants.items():
+            self._row(str(name), value if controls.is_number(value) else None)
+
+    def values(self) -> tuple[dict[str, float], str]:
+        """Return the constants, and what is wrong with the rows."""
+        return silicone.constants_of_rows(
+            [(controls.typed(name.value).strip(), value.value) for _, name, value in self._rows]
+        )
+
+    def say(self, names: Collection[str]) -> None:
+        """Mark the rows of constants with which something is wrong."""
+        for _, field, _ in self._rows:
+            field.props.set_bool("error", controls.typed(field.value).strip() in names)
+
+    def _row(self, name: str, value: float | None) -> None:
+        with self._table, ui.row().classes("w-full no-wrap gap-2 items-center") as row:
+            look = f"{controls.BOX} debounce=300 no-error-icon"
+            name_field = ui.input("Name", value=name, on_change=self._tell).without_auto_validation().classes("w-24")
+            controls.dashed(name_field, "material.constant-name")
+            name_field.props(f"{look} maxlength={_LONGEST_NAME}")
+            value_field = controls.number("Value", "material.constant-value", look=look, test="material-constant-value")
+            entry = (row, name_field, value_field.classes("grow"))
+            value_field.set_value(value).on_value_change(self._tell)
+            remove = controls.button(
+                "",
+                "close",
+                "material.remove",
+                partial(self._removed, entry),
+                "flat dense round size=sm",
+                "material-remove",
+            )
+            remove.props('aria-label="remove this constant"')
+        self._rows.append(entry)
+
+    def _added(self) -> None:
+        if len(self._rows) < _MOST_ROWS:
+            self._row("", None)
+
+    def _removed(self, entry: tuple[ui.element, ui.input, ui.number]) -> None:
+        if entry in self._rows:
+            self._rows.remove(entry)
+            self._table.remove(entry[0])
+            self._tell()
+
+    def _tell(self) -> None:
+        self._changed(self.values()[0])

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from softnlp.app.fields import dashed
+from softnlp.app.controls import button, dashed
 from softnlp.app.session import Session
 from softnlp.app.theme import Redraw
 from softnlp.base.ranges import PRESSURE
@@ -61,9 +61,7 @@ def pressure_panel(session: Session) -> None:
     with ui.row().classes("w-full items-center justify-between no-wrap"):
         units = dashed(ui.toggle(list(PRESSURE_UNITS), value="bar", on_change=lambda e: turn(e.value)), "pressure.unit")
         units.props("dense no-caps unelevated size=sm")
-        ui.button("All to zero", on_click=lambda: session.set_pressure(0 * session.pressure)).props(
-            "flat dense no-caps size=sm data-testid=pressure-zero"
-        )
+        button("All to zero", None, "pressure-zero", lambda: session.set_pressure(0 * session.pressure))
     rows = ui.column().classes("w-full gap-1")
 
     def turn(name: str) -> None:

@@ -8,12 +8,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from nicegui import ui
 
-from softnlp.app.fields import named
+from softnlp.app.controls import button, named
 from softnlp.app.parts import Chart, csv_text, line
 from softnlp.base.columns import MM, OUTPUTS, PER_M, TABLES, Output, written
 from softnlp.base.units import MILLIMETRE
@@ -58,10 +59,10 @@ class ResultsPanel:
         with ui.row().classes("w-full gap-1"):
             for words, icon, act in (
                 ("Copy", "content_copy", self._copy),
-                ("CSV", "download", self._download),
-                ("JSON", "download", self._download_json),
+                ("CSV", "download", partial(self._offer, table_text, "softnlp_pose.csv")),
+                ("JSON", "download", partial(self._offer, _json, "softnlp_pose.json", "application/json")),
             ):
-                _button(words, icon, f"results-{words.lower()}", act)
+                button(words, icon, f"results-{words.lower()}", act)
 
     def details(self) -> None:
         """Build what few people look at, in the current slot: chambers, strains and forces along the rod, equations."""
@@ -72,7 +73,7 @@ class ResultsPanel:
             self._quantity = ui.select(labels, value="curvature", on_change=lambda: self._draw(force=True))
             self._quantity.props("dense outlined options-dense data-testid=along-quantity").classes("w-full")
             self._plot = Chart("along-plot", f"s [{MM}]", f"u [{PER_M}]", height="14rem")
-            _button("CSV along the rod", "download", "along-csv", self._download_along)
+            button("CSV along the rod", "download", "along-csv", self._offer_along)
         self._along.on_value_change(lambda: self._draw(force=True))
         with _part("Equations", "equations"):
             self._equations = ui.grid(columns=_GRID).classes("w-full gap-x-2 gap-y-0 text-xs")
@@ -148,17 +149,13 @@ class ResultsPanel:
         ui.clipboard.write("\n".join(rows))
         ui.notify("copied", type="positive")
 
-    def _download(self) -> None:
+    def _offer(self, text: Callable[[Run], str], name: str, kind: str = "text/csv") -> None:
         if self._run is not None:
-            ui.download.content(table_text(self._run), "softnlp_pose.csv", "text/csv")
+            ui.download.content(text(self._run), name, kind)
 
-    def _download_json(self) -> None:
-        if self._run is not None:
-            ui.download.content(json.dumps(to_json(self._run), indent=2), "softnlp_pose.json", "application/json")
-
-    def _download_along(self) -> None:
+    def _offer_along(self) -> None:
         if self._run is not None and self._run.steps[0].pose is not None:
-            ui.download.content(along_csv(self._run), "softnlp_along_the_rod.csv", "text/csv")
+            self._offer(along_csv, "softnlp_along_the_rod.csv")
 
 
 def along_csv(run: Run) -> str:
@@ -172,8 +169,8 @@ def along_csv(run: Run) -> str:
     return csv_text(header, columns.tolist())
 
 
-def _button(words: str, icon: str, test: str, act: Callable[[], None]) -> None:
-    ui.button(words, icon=icon, on_click=act).props(f"flat dense no-caps size=sm data-testid={test}")
+def _json(run: Run) -> str:
+    return json.dumps(to_json(run), indent=2)
 
 
 def _part(label: str, test: str) -> ui.expansion:

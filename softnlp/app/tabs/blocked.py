@@ -3,27 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from nicegui import ui
 from numpy.typing import NDArray
 
+from softnlp.app import controls
 from softnlp.app.asking import Progress, bars, run_steps, said, scenario_with
-from softnlp.app.fields import (
-    HINT,
-    button,
-    heading,
-    named,
-    number_box,
-    number_field,
-    select_box,
-    tell_problem,
-    toggle,
-    vector_field,
-)
-from softnlp.app.parts import Chart, NumberTable, RunRow, line
+from softnlp.app.parts import Chart, NumberTable, line, study_row
 from softnlp.app.session import Session, Stage
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
@@ -33,6 +21,8 @@ from softnlp.statics.step import Run, Step
 
 Table = dict[str, Any]
 Array = NDArray[np.float64]
+Curve = tuple[str, list[Step]]
+"""Of force against pressure: what it is of, and its steps so far."""
 
 STUDY = "blocked-force"
 MOST_CURVES = 7  # colours that can be told apart
@@ -71,12 +61,12 @@ def _contact_fields(session: Session) -> None:
     def closure() -> str:
         return str(table().get("closure", "compliant"))
 
-    heading("Contact")
-    mode = toggle({"blocked": "Blocked by a wall", "constrained": "Chambers held"}, "contact.mode")
+    controls.heading("Contact")
+    mode = controls.toggle({"blocked": "Blocked by a wall", "constrained": "Chambers held"}, "contact.mode")
     options = {key: f"{key.capitalize()}: {use}" for key, use in CLOSURES.items()}
-    select = select_box(options, "contact.closure", "Closure")
-    good_for = ui.label("").classes(f"{HINT} -mt-2")
-    reaction = number_field(
+    select = controls.select(options, "contact.closure", "Closure")
+    good_for = ui.label("").classes(f"{controls.HINT} -mt-2")
+    reaction = controls.number_field(
         session,
         "contact",
         "chamber_reaction",
@@ -86,15 +76,19 @@ def _contact_fields(session: Session) -> None:
     )
     with ui.column().classes("w-full gap-2") as weights:
         for key, label in _WEIGHTS.items():
-            number_field(session, "contact", key, label, "")
+            controls.number_field(session, "contact", key, label, "")
     with ui.column().classes("w-full gap-2") as wall:
-        number_field(session, "contact", "tip_cap_mm", "Tip cap, L_t", step=1)
-        anywhere = named(ui.switch("Wall by point and normal").props("dense"), "contact.wall")
-        offset = number_field(session, "contact", "offset_mm", "Offset of the wall, h", default=lambda: 0.0, step=1)
+        controls.number_field(session, "contact", "tip_cap_mm", "Tip cap, L_t", step=1)
+        anywhere = controls.named(ui.switch("Wall by point and normal").props("dense"), "contact.wall")
+        offset = controls.number_field(
+            session, "contact", "offset_mm", "Offset of the wall, h", default=lambda: 0.0, step=1
+        )
         with ui.column().classes("w-full gap-2") as place:
-            vector_field(session, "contact", "wall_point_mm", ("Point x", "y", "z"), "mm")
-            vector_field(session, "contact", "wall_normal", ("Normal x", "y", "z"), "", default=(1.0, 0.0, 0.0))
-            ui.label("The normal is the way in which the wall pushes the robot.").classes(HINT)
+            controls.vector_field(session, "contact", "wall_point_mm", ("Point x", "y", "z"), "mm")
+            controls.vector_field(
+                session, "contact", "wall_normal", ("Normal x", "y", "z"), "", default=(1.0, 0.0, 0.0)
+            )
+            ui.label("The normal is the way in which the wall pushes the robot.").classes(controls.HINT)
 
     def refresh() -> None:
         held = table().get("mode", "blocked") == "constrained"
@@ -113,7 +107,7 @@ def _contact_fields(session: Session) -> None:
             (offset, not placed),
         ):
             element.set_visibility(shown)
-        tell_problem(session, select, "contact", "closure", "mode")
+        controls.tell_problem(session, select, "contact", "closure", "mode")
 
     aside: Table = {}
 
@@ -143,42 +137,36 @@ def _contact_fields(session: Session) -> None:
     anywhere.on_value_change(lambda event: choose_wall(event.value))
 
 
-@dataclass(eq=False)
-class _Curve:
-    """A force-pressure curve: what it is of, and its steps so far."""
-
-    name: str
-    steps: list[Step] = field(default_factory=list)
-
-
 class _Curves:
     """The force against the pressure: run, drawn as it comes, kept for comparison."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._kept: list[_Curve] = []
-        self._last: _Curve | None = None
+        self._kept: list[Curve] = []
+        self._last: Curve | None = None
         self._pressures: list[Array] = []
-        heading("Force against pressure")
-        self._source = toggle({"ramp": "Ramp to the pose shown", "steps": "Scenario's steps"}, "blocked.source", "ramp")
-        self._count = number_box("Steps", "blocked.steps", value=11, min=2, max=1000, precision=0).classes("w-full")
+        controls.heading("Force against pressure")
+        self._source = controls.toggle(
+            {"ramp": "Ramp to the pose shown", "steps": "Scenario's steps"}, "blocked.source", "ramp"
+        )
+        self._count = controls.number("Steps", "blocked.steps", value=11, min=2, max=1000, precision=0).classes(
+            "w-full"
+        )
         self._count.bind_visibility_from(self._source, "value", value="ramp")
-        self._row = RunRow("blocked", "Run the curve", self._begin)
+        self._row = study_row("blocked", "Run the curve", self._asked, self._finish, self._draw)
         self._chart = Chart("blocked.chart", "pressure [bar]", OUTPUTS["blocked_force"].axis)
         with ui.row().classes("gap-1") as self._buttons:
-            button("Keep curve", "push_pin", "blocked.keep", self._keep)
-            button("Clear kept", "clear_all", "blocked.clear", self._clear)
+            controls.button("Keep curve", "push_pin", "blocked.keep", self._keep)
+            controls.button("Clear kept", "clear_all", "blocked.clear", self._clear)
         self._buttons.set_visibility(False)
         self._table = NumberTable("blocked.table", self._show_pressure)
 
-    async def _begin(self) -> None:
-        run = await self._row.ask(self._asked, self._draw)
-        if run is not None:
-            self._draw()
-            self._row.say(said(run))
-            forces = {OUTPUTS["blocked_force"].heading: force_points(run.steps)[1]}
-            self._table.show_steps(run, forces, "force_pressure.csv")
-            self._pressures = [step.pressure for step in run.steps]
+    def _finish(self, run: Run) -> None:
+        self._draw()
+        self._row.say(said(run))
+        forces = {OUTPUTS["blocked_force"].heading: force_points(run.steps)[1]}
+        self._table.show_steps(run, forces, "force_pressure.csv")
+        self._pressures = [step.pressure for step in run.steps]
 
     def _asked(self) -> Callable[[Progress], Run]:
         contact, count = of_a_curve(self._session.table("contact")), self._count.value
@@ -189,14 +177,14 @@ class _Curves:
             tables["pressure"] = {"sequence_bar": rising(self._session.pressure, int(count))}
         asked = scenario_with(self._session, STUDY, tables)
         held = contact.get("mode") == "constrained"
-        curve = _Curve(f"{contact.get('closure', 'compliant')}{', held' if held else ''}, {asked.robot.name}")
-        self._last = curve
-        return lambda progress: run_steps(asked, progress, curve.steps.append)
+        steps: list[Step] = []
+        self._last = f"{contact.get('closure', 'compliant')}{', held' if held else ''}, {asked.robot.name}", steps
+        return lambda progress: run_steps(asked, progress, steps.append)
 
     def _draw(self) -> None:
-        curves = [*self._kept, *([self._last] if self._last and self._last.steps else [])]
-        points = [(curve.name, *force_points(list(curve.steps))) for curve in curves]
-        self._chart.show([line(x, y, colour(k), name) for k, (name, x, y) in enumerate(points)])
+        curves = [*self._kept, *([self._last] if self._last and self._last[1] else [])]
+        lines = [line(*force_points(list(steps)), colour(k), name) for k, (name, steps) in enumerate(curves)]
+        self._chart.show(lines)
         self._buttons.set_visibility(bool(curves))
 
     def _keep(self) -> None:
@@ -220,10 +208,10 @@ class _Curves:
 
 def _target(session: Session) -> None:
     """Find the pressure of a force."""
-    heading("Pressure for a force")
+    controls.heading("Pressure for a force")
     with ui.row().classes("w-full gap-2 no-wrap"):
-        force = number_box("Force wanted", "blocked.target", "N", value=0.5, step=0.1).classes("grow")
-        highest = number_box("Highest pressure", "blocked.highest", "bar", value=1.5, step=0.1).classes("grow")
+        force = controls.number("Force wanted", "blocked.target", "N", value=0.5, step=0.1).classes("grow")
+        highest = controls.number("Highest pressure", "blocked.highest", "bar", value=1.5, step=0.1).classes("grow")
     found: list[Step] = []
 
     def asked() -> Callable[[Progress], Run]:
@@ -238,9 +226,8 @@ def _target(session: Session) -> None:
         scenario = scenario_with(session, STUDY, tables)
         return lambda progress: run_steps(scenario, progress)
 
-    async def begin() -> None:
-        run = await row.ask(asked)
-        if run is None or not run.steps:
+    def finish(run: Run) -> None:
+        if not run.steps:
             return
         step = run.steps[-1]
         if step.status.has_solution and step.contact is not None:
@@ -250,8 +237,8 @@ def _target(session: Session) -> None:
         else:
             row.warn(step.message)
 
-    row = RunRow("blocked.find", "Find the pressure", begin)
-    use = button("Use this pressure", "tune", "blocked.use", lambda: session.set_pressure(found[0].pressure))
+    row = study_row("blocked.find", "Find the pressure", asked, finish)
+    use = controls.button("Use this pressure", "tune", "blocked.use", lambda: session.set_pressure(found[0].pressure))
     use.set_visibility(False)
 
 

@@ -10,19 +10,9 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
+from softnlp.app import controls
 from softnlp.app.asking import Progress
-from softnlp.app.fields import (
-    HINT,
-    heading,
-    number_box,
-    number_field,
-    problem_label,
-    problem_of,
-    select_box,
-    toggle,
-    use_button,
-)
-from softnlp.app.parts import Chart, NumberTable, RunRow, csv_drop, downloads, marks
+from softnlp.app.parts import Chart, NumberTable, csv_drop, downloads, marks, study_row
 from softnlp.app.session import Session, Stage
 from softnlp.app.tabs.tensile import GREY, asked_with, from_files, tensile_part
 from softnlp.base.columns import OUTPUTS
@@ -87,7 +77,7 @@ def identify_tab(stage: Stage) -> None:
         session.reread()
 
     with ui.column().classes("w-full gap-3 pt-2"):
-        kinds = toggle({"measurements": "Robots", "tensile": "Tensile test"}, "identify.kind", kind())
+        kinds = controls.toggle({"measurements": "Robots", "tensile": "Tensile test"}, "identify.kind", kind())
         boxes: dict[str, ui.column] = {}
         with ui.column().classes("w-full gap-3") as boxes["measurements"]:
             _Measurements(session)
@@ -107,21 +97,21 @@ class _Measurements:
         self._session = session
         self._built: Any = None
         self._fields: dict[tuple[str, int], ui.number] = {}
-        heading("Measurements of robots")
+        controls.heading("Measurements of robots")
         self._file = ui.label("").classes("text-sm").mark("measurements.file")
         csv_drop("measurements.drop", "Drop a CSV of measurements", self._dropped)
         ui.label(
             f"Columns p1_bar, p2_bar, … and any of {', '.join(_MEASURED)}; robot, weight and sigma_… if there are."
-        ).classes(HINT)
+        ).classes(controls.HINT)
         with ui.column().classes("w-full gap-2") as self._more:
-            self._free = select_box({}, "measurements.free", "Free constants", multiple=True, look="use-chips")
+            self._free = controls.select({}, "measurements.free", "Free constants", multiple=True, look="use-chips")
             self._bounds = ui.column().classes("w-full gap-2")
             with ui.expansion("Standard deviations").classes("w-full").props("dense data-testid=sigma"):
-                ui.label("One of each kind; without any, 1 % of each number.").classes(HINT)
+                ui.label("One of each kind; without any, 1 % of each number.").classes(controls.HINT)
                 with ui.grid(columns=2).classes("w-full gap-2"):
                     for key, label in _SIGMAS.items():
-                        number_field(session, "sigma", key, label, "")
-        self._problem = problem_label("measurements.problem")
+                        controls.number_field(session, "sigma", key, label, "")
+        self._problem = controls.problem_label("measurements.problem")
         session.follow(self._refresh)
         self._free.on_value_change(lambda event: self._chosen(event.value or []))
 
@@ -146,7 +136,7 @@ class _Measurements:
         self._free.set_options(choices, value=[name for name in self._freed() if name in choices])
         if material is not None:
             self._show_bounds(bounds_of(table, material))
-        words = problem_of(self._session, "measurements", "sigma", "material", "contact")
+        words = controls.problem_of(self._session, "measurements", "sigma", "material", "contact")
         self._problem.set_text(words if table else "")
 
     def _show_bounds(self, bounds: dict[str, tuple[float | None, float | None, str]]) -> None:
@@ -161,7 +151,7 @@ class _Measurements:
                         ui.label(name).classes("w-16 text-sm shrink-0")
                         for at, (label, value) in enumerate(zip(("from", "to"), pair, strict=True)):
                             look = 'debounce=400 placeholder="open" stack-label'
-                            field = number_box(label, f"measurements.bounds.{name}.{at}", unit, look, value=value)
+                            field = controls.number(label, f"measurements.bounds.{name}.{at}", unit, look, value=value)
                             field.on_value_change(partial(self._bounded, name))
                             self._fields[name, at] = field.classes("grow min-w-0")
         for (name, at), field in self._fields.items():
@@ -200,18 +190,17 @@ class _Identification:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._done: tuple[Scenario, RobotTask, Identified] | None = None
-        self._row = RunRow("identify", "Identify", self._begin)
+        self._found: Identified | None = None
+        self._row = study_row("identify", "Identify", self._asked, self._finish)
         with ui.column().classes("w-full gap-2") as self._box:
             self._constants = NumberTable("identify.constants")
             with ui.row().classes("gap-1 items-center"):
-                use_button("Use these constants", "identify.use", self._use)
-                downloads(
-                    ("identified.toml", "identify.toml", self._take_tables),
-                    ("table.csv", "identify.csv", self._take_rows),
+                controls.use_button("Use these constants", "identify.use", self._use)
+                self._texts = downloads(
+                    ("identified.toml", "identify.toml", "text/plain"), ("table.csv", "identify.csv", "text/csv")
                 )
             self._misfits = NumberTable("identify.misfits")
-            self._what = select_box({}, "identify.observable", on_change=self._draw)
+            self._what = controls.select({}, "identify.observable", on_change=self._draw)
             self._chart = Chart("identify.chart", "measured", "model", height="18rem")
             self._warnings = ui.label("").classes("text-sm whitespace-pre-line break-words").mark("identify.warnings")
         self._box.set_visibility(False)
@@ -229,16 +218,16 @@ class _Identification:
 
         return work
 
-    async def _begin(self) -> None:
-        done = await self._row.ask(self._asked)
-        if done is None:
-            return
-        self._done, found = done, done[-1]
+    def _finish(self, done: tuple[Scenario, RobotTask, Identified]) -> None:
+        asked, task, found = done
+        self._found = found
         if found.status is not Status.SOLVED:
             self._box.set_visibility(False)
             self._row.warn(f"{found.message}.")
             return
         self._row.say(f"Found after {found.evaluations} evaluations: {found.message}.")
+        self._texts["identified.toml"] = lambda: identified_text(asked, found)
+        self._texts["table.csv"] = lambda: robot_table_text(task, found)
         self._constants.show(*constant_rows(found), "constants.csv")
         self._misfits.show(*misfit_rows(found), "misfit.csv")
         choices = {key: OUTPUTS[key].axis for key in found.errors(False)}
@@ -248,29 +237,20 @@ class _Identification:
         self._draw()
 
     def _draw(self) -> None:
-        if self._done is not None and self._what.value in OBSERVABLES:
+        if self._found is not None and self._what.value in OBSERVABLES:
             key = str(self._what.value)
             label = OUTPUTS[key].axis
-            self._chart.show(compared(self._done[-1], key), x_label=f"measured {label}", y_label=f"model {label}")
+            self._chart.show(compared(self._found, key), x_label=f"measured {label}", y_label=f"model {label}")
 
     def _use(self) -> None:
         """Write the constants into the scenario."""
-        if self._done is None:
+        if self._found is None:
             return
         document = self._session.document
-        for table, values in scenario_tables(self._done[-1]).items():
+        for table, values in scenario_tables(self._found).items():
             document.replace(table, values if table == "material" else {**document.table(table), **values})
         self._session.reread()
         ui.notify("The scenario has these constants now", position="bottom-right", timeout=2000)
-
-    def _take_tables(self) -> None:
-        if self._done is not None:
-            asked, _, found = self._done
-            ui.download.content(identified_text(asked, found), "identified.toml", "text/plain")
-
-    def _take_rows(self) -> None:
-        if self._done is not None:
-            ui.download.content(robot_table_text(*self._done[1:]), "table.csv", "text/csv")
 
 
 def free_choices(material: Material | None) -> dict[str, str]:

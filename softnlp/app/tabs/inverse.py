@@ -10,19 +10,9 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
+from softnlp.app import controls
 from softnlp.app.asking import Progress, bars, run_steps, said, scenario_with, sentence
-from softnlp.app.fields import (
-    button,
-    heading,
-    named,
-    number_box,
-    number_field,
-    problem_label,
-    problem_of,
-    toggle,
-    use_button,
-)
-from softnlp.app.parts import NumberTable, RunRow
+from softnlp.app.parts import NumberTable, study_row
 from softnlp.app.session import Session, Stage
 from softnlp.base.columns import OUTPUTS
 from softnlp.statics.step import Run, Step
@@ -62,16 +52,18 @@ class _Targets:
         self._fields: dict[tuple[str, int, int], ui.number] = {}
         self._built: tuple[str, int] | None = None
         self._marked: list[list[float]] | None = None
-        heading("Targets of the tip")
-        self._kind = toggle({"position": "Position", "direction": "Direction", "both": "Both"}, "target.kind")
+        controls.heading("Targets of the tip")
+        self._kind = controls.toggle({"position": "Position", "direction": "Direction", "both": "Both"}, "target.kind")
         self._rows = ui.column().classes("w-full gap-2")
         with ui.row().classes("w-full items-center gap-2 no-wrap"):
-            self._add = button("Add a target", "add", "target.add", lambda: self._put(with_added(self._table())))
-            self._pick = named(ui.switch("Pick in the view").props("dense"), "target.pick")
-        self._weight = number_field(
+            self._add = controls.button(
+                "Add a target", "add", "target.add", lambda: self._put(with_added(self._table()))
+            )
+            self._pick = controls.named(ui.switch("Pick in the view").props("dense"), "target.pick")
+        self._weight = controls.number_field(
             self._session, "target", "length_per_radian_mm", "A radian counts as", default=self._length
         )
-        self._problem = problem_label("target.problem")
+        self._problem = controls.problem_label("target.problem")
         self._session.follow(self._refresh)
         self._kind.on_value_change(lambda event: self._choose(event.value))
         stage.view.on_pick(self._picked)
@@ -107,7 +99,7 @@ class _Targets:
             rows = rows_of(table, key)
             if row < len(rows):
                 field.set_value(rows[row][column])
-        self._problem.set_text(problem_of(self._session, "target", "bounds"))
+        self._problem.set_text(controls.problem_of(self._session, "target", "bounds"))
         self._mark_targets()
 
     def _build(self, kind: str, count: int) -> None:
@@ -120,7 +112,7 @@ class _Targets:
                 with ui.row().classes("w-full items-center gap-2 no-wrap"):
                     ui.label(str(row + 1) if place == 0 else "").classes("w-4 text-sm opacity-70 shrink-0")
                     for column, axis in enumerate("xyz"):
-                        field = number_box(
+                        field = controls.number(
                             f"{axis} [mm]" if key == POSITION else f"{axis} of axis",
                             f"target.{key}.{row}.{column}",
                             look="debounce=250",
@@ -129,7 +121,7 @@ class _Targets:
                         )
                         self._fields[key, row, column] = field.classes("grow min-w-0")
                     remove = partial(self._remove, row)
-                    bin_ = button("", "close", f"target.remove.{row}", remove, "flat dense round size=sm")
+                    bin_ = controls.button("", "close", f"target.remove.{row}", remove, "flat dense round size=sm")
                     bin_.props('aria-label="remove"').classes("" if place == 0 else "invisible")
                     bin_.set_enabled(count > 1)
 
@@ -171,7 +163,9 @@ def _bounds(session: Session) -> None:
 
     with ui.row().classes("w-full gap-2 no-wrap") as row:
         ends = ("Lowest", "Highest")
-        fields = [number_box(f"{e} pressure", f"bounds.{e.lower()}", "bar", "debounce=250", step=0.1) for e in ends]
+        fields = [
+            controls.number(f"{e} pressure", f"bounds.{e.lower()}", "bar", "debounce=250", step=0.1) for e in ends
+        ]
     several = ui.label("Each set has bounds of its own, from the file.").classes("text-sm")
 
     def refresh() -> None:
@@ -193,8 +187,8 @@ class _Search:
         self._session = session
         self._steps: Sequence[Step] = ()
         self._chosen = 0
-        self._row = RunRow("inverse", "Find the pressures", self._begin)
-        self._use = use_button("Use these pressures", "inverse.use", self._take)
+        self._row = study_row("inverse", "Find the pressures", self._asked, self._finish)
+        self._use = controls.use_button("Use these pressures", "inverse.use", self._take)
         self._use.set_visibility(False)
         self._table = NumberTable("inverse.table", self._choose)
 
@@ -203,9 +197,8 @@ class _Search:
         asked = scenario_with(self._session, STUDY)
         return lambda progress: run_steps(asked, progress)
 
-    async def _begin(self) -> None:
-        run = await self._row.ask(self._asked)
-        if run is None or not run.steps:
+    def _finish(self, run: Run) -> None:
+        if not run.steps:
             return
         self._steps = run.steps
         self._table.show_steps(run, target_columns(run), "targets.csv", "target")

@@ -6,13 +6,11 @@ import asyncio
 import base64
 import sys
 from asyncio.subprocess import PIPE, STDOUT, Process
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from nicegui import ui
 
-from softnlp.app.fields import named
+from softnlp.app.controls import button, named
 from softnlp.app.files import zipped
 from softnlp.app.session import Stage
 from softnlp.app.theme import darkness, on_dark
@@ -35,17 +33,17 @@ def scenario_tab(stage: Stage) -> None:
         editor = ui.codemirror(session.text(), language="TOML", theme="basicLight").classes("w-full h-80 text-xs")
         named(editor, "scenario.text", "scenario-text")
         with ui.row().classes("w-full gap-2"):
-            _button("Apply", None, "apply", "unelevated dense", lambda: apply())
-            back = _button("Back", None, "back", "flat dense", lambda: editor.set_value(session.text()))
+            button("Apply", None, "scenario-apply", lambda: apply(), "no-caps unelevated dense")
+            back = button("Back", None, "scenario-back", lambda: editor.set_value(session.text()), "no-caps flat dense")
             back.tooltip("Forget what was typed here")
             ui.space()
-            run_button = _button("Run", "play_arrow", "run", "unelevated dense", lambda: start())
-            stop_button = _button("Stop", "stop", "stop", "outline dense", lambda: stop())
+            run_button = button("Run", "play_arrow", "scenario-run", lambda: start(), "no-caps unelevated dense")
+            stop_button = button("Stop", "stop", "scenario-stop", lambda: stop(), "no-caps outline dense")
         stop_button.set_visibility(False)
         output = ui.log(max_lines=400).classes("w-full h-40 text-xs").props("data-testid=scenario-output")
         figure = ui.image().classes("w-full").props("data-testid=scenario-figure")
         figure.set_visibility(False)
-        result = _button("Results", "download", "results", "flat dense", lambda: offer())
+        result = button("Results", "download", "scenario-results", lambda: offer(), "no-caps flat dense")
         result.set_visibility(False)
 
     out = session.folder / "results"
@@ -109,10 +107,6 @@ def scenario_tab(stage: Stage) -> None:
     session.on_scenario(follow)
     session.on_pressure(follow)
     ui.context.client.on_delete(stop)
-
-
-def _button(words: str, icon: str | None, test: str, look: str, act: Callable[[], Any]) -> ui.button:
-    return ui.button(words, icon=icon, on_click=act).props(f"no-caps {look} data-testid=scenario-{test}")
 
 
 def _data_url(image: Path) -> str:

@@ -9,20 +9,9 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
+from softnlp.app import controls
 from softnlp.app.asking import Progress, rows_bar, run_steps, said, scenario_with
-from softnlp.app.fields import (
-    button,
-    heading,
-    named,
-    number_box,
-    plain_words,
-    problem_label,
-    problem_of,
-    select_box,
-    tell_problem,
-    toggle,
-)
-from softnlp.app.parts import Chart, NumberTable, RunRow, csv_drop, line
+from softnlp.app.parts import Chart, NumberTable, csv_drop, line, study_row
 from softnlp.app.session import Session, Stage
 from softnlp.base.columns import MM, OUTPUTS, Output
 from softnlp.base.errors import InputError
@@ -57,24 +46,24 @@ class _Source:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        heading("Pressure sequence")
-        self._kind = toggle({"list": "List", "ramp": "Ramp", "file": "CSV file"}, "pressure.source")
+        controls.heading("Pressure sequence")
+        self._kind = controls.toggle({"list": "List", "ramp": "Ramp", "file": "CSV file"}, "pressure.source")
         with ui.column().classes("w-full gap-1") as self._list:
             self._text = ui.textarea("A line a step: the pressure of each set [bar]").classes("w-full font-mono")
-            named(self._text, "pressure.sequence_bar").props("dense outlined debounce=600 rows=5")
-            button("Add the pressures shown", "add", "pressure.add", self._add)
+            controls.named(self._text, "pressure.sequence_bar").props("dense outlined debounce=600 rows=5")
+            controls.button("Add the pressures shown", "add", "pressure.add", self._add)
         with ui.column().classes("w-full gap-2") as self._ramp:
-            self._sets = select_box([1], "pressure.ramp.sets", "Sets", multiple=True, look="use-chips")
+            self._sets = controls.select([1], "pressure.ramp.sets", "Sets", multiple=True, look="use-chips")
             self._numbers: dict[str, ui.number] = {}
             with ui.row().classes("w-full gap-2 no-wrap"):
                 for key, label, unit in (("from_bar", "From", "bar"), ("to_bar", "To", "bar"), ("steps", "Steps", "")):
-                    number = number_box(label, f"pressure.ramp.{key}", unit, "debounce=250").classes("grow")
+                    number = controls.number(label, f"pressure.ramp.{key}", unit, "debounce=250").classes("grow")
                     number.on_value_change(lambda event, key=key: self._ramped(key, event.value))
                     self._numbers[key] = number
         with ui.column().classes("w-full gap-1") as self._file:
             self._named = ui.label("").classes("text-sm").mark("pressure.file")
             csv_drop("pressure.drop", "Drop a CSV: t_s (optional), p1_bar, p2_bar, …", self._dropped)
-        self._problem = problem_label("pressure.problem")
+        self._problem = controls.problem_label("pressure.problem")
         self._asked_file = False
         session.follow(self._refresh)
         self._kind.on_value_change(lambda event: self._choose(event.value))
@@ -108,8 +97,8 @@ class _Source:
             for key, number in self._numbers.items():
                 number.set_value(ramp.get(key, 0.0 if key == "from_bar" else None))
         self._named.set_text(f"From {table['file']}" if kind == "file" else "")
-        self._problem.set_text(problem_of(session, "pressure"))
-        tell_problem(session, self._text, "pressure", "sequence_bar")
+        self._problem.set_text(controls.problem_of(session, "pressure"))
+        controls.tell_problem(session, self._text, "pressure", "sequence_bar")
 
     def _show_rows(self, rows: list[list[float]]) -> None:
         many = len(rows) > MOST_TYPED
@@ -146,7 +135,7 @@ class _Source:
         try:
             rows = rows_of_text(text or "")
         except InputError as error:
-            self._problem.set_text(plain_words(error))
+            self._problem.set_text(controls.plain_words(error))
             return
         self._problem.set_text("")
         self._put({"sequence_bar": rows})
@@ -181,7 +170,7 @@ class _StepSlider:
         with ui.row().classes("w-full items-center gap-3 pr-3 no-wrap") as self._row:
             self._label = ui.label("").classes("text-sm shrink-0")
             self._slider = ui.slider(min=1, max=2, value=1, on_change=self._moved).props("snap dense")
-            named(self._slider, "sequence.step")
+            controls.named(self._slider, "sequence.step")
         session.follow(self._refresh)
         session.on_pressure(self._follow)
 
@@ -216,12 +205,12 @@ class _Results:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._steps: Sequence[Step] = []
-        self._row = RunRow("sequence", "Run all steps", self._begin)
+        self._row = study_row("sequence", "Run all steps", self._asked, self._finish, lambda: self._draw())
         labels = {key: output.label.capitalize() for key, output in QUANTITIES.items()}
         axes = {"pressure": "Against pressure", "step": "Against step or time"}
         with ui.row().classes("w-full gap-2 no-wrap") as self._choice:
             self._what, self._along = (
-                select_box(options, name, value=first, on_change=self._draw).classes("grow", remove="w-full")
+                controls.select(options, name, value=first, on_change=self._draw).classes("grow", remove="w-full")
                 for options, name, first in (
                     (labels, "sequence.quantity", "bending"),
                     (axes, "sequence.axis", "pressure"),
@@ -231,13 +220,11 @@ class _Results:
         self._chart = Chart("sequence.chart", "", "")
         self._table = NumberTable("sequence.table", self._show_step)
 
-    async def _begin(self) -> None:
-        run = await self._row.ask(self._asked, self._draw)
-        if run is not None:
-            self._steps = run.steps
-            self._draw()
-            self._row.say(said(run))
-            self._table.show_steps(run, series(run.steps), "steps.csv")
+    def _finish(self, run: Run) -> None:
+        self._steps = run.steps
+        self._draw()
+        self._row.say(said(run))
+        self._table.show_steps(run, series(run.steps), "steps.csv")
 
     def _asked(self) -> Callable[[Progress], Run]:
         asked = scenario_with(self._session, STUDY)

@@ -8,19 +8,9 @@ from typing import Any, TypeVar
 import numpy as np
 from nicegui import ui
 
+from softnlp.app import controls
 from softnlp.app.asking import Progress, scenario_with
-from softnlp.app.fields import (
-    HINT,
-    choice_field,
-    heading,
-    named,
-    number_field,
-    problem_label,
-    problem_of,
-    select_box,
-    use_button,
-)
-from softnlp.app.parts import Chart, NumberTable, RunRow, csv_drop, downloads, line, marks
+from softnlp.app.parts import Chart, NumberTable, csv_drop, downloads, line, marks, study_row
 from softnlp.app.session import Session
 from softnlp.base.errors import InputError
 from softnlp.figures.style import colour
@@ -75,7 +65,7 @@ def tensile_part(session: Session) -> None:
 
 def _test(session: Session) -> None:
     """Show the keys of [tensile]."""
-    heading("Tensile test")
+    controls.heading("Tensile test")
     files = ui.label("").classes("text-sm").mark("tensile.file")
 
     def dropped(name: str, content: bytes) -> None:
@@ -84,17 +74,17 @@ def _test(session: Session) -> None:
         session.take_file("tensile", name, content, others, lambda p: (p.table, p.key) == ("tensile", "file"))
 
     csv_drop("tensile.drop", "Drop a CSV: stretch, stress_MPa or displacement_mm, force_N", dropped)
-    choice_field(session, "tensile", "stress", "Stress of the file", _STRESSES)
-    ui.label("The specimen, where the file has force and displacement").classes(HINT)
+    controls.choice_field(session, "tensile", "stress", "Stress of the file", _STRESSES)
+    ui.label("The specimen, where the file has force and displacement").classes(controls.HINT)
     with ui.grid(columns=2).classes("w-full gap-2"):
         for key, label in _SPECIMEN.items():
-            number_field(session, "tensile", key, f"{label} [mm]", "")
-    problem = problem_label("tensile.problem")
+            controls.number_field(session, "tensile", key, f"{label} [mm]", "")
+    problem = controls.problem_label("tensile.problem")
 
     def refresh() -> None:
         words = from_files(session.table("tensile"))
         files.set_text(words)
-        problem.set_text(problem_of(session, "tensile", "material") if words else "")
+        problem.set_text(controls.problem_of(session, "tensile", "material") if words else "")
 
     session.follow(refresh)
 
@@ -104,31 +94,30 @@ class _Fit:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._done: tuple[TensileTask, TensileFit] | None = None
-        self._row = RunRow("tensile", "Fit the laws", self._begin)
+        self._fit: TensileFit | None = None
+        self._row = study_row("tensile", "Fit the laws", self._asked, self._finish)
         with ui.column().classes("w-full gap-2") as self._box:
             self._chart = Chart("tensile.chart", "stretch [-]", "engineering stress [kPa]", height="18rem")
             self._table = NumberTable("tensile.laws")
             with ui.row().classes("w-full gap-2 items-center no-wrap"):
-                self._law = select_box([], "tensile.law", "Law").classes("grow", remove="w-full")
-                use_button("Use this silicone", "tensile.use", self._use)
+                self._law = controls.select([], "tensile.law", "Law").classes("grow", remove="w-full")
+                controls.use_button("Use this silicone", "tensile.use", self._use)
             with ui.row().classes("gap-1"):
-                downloads(
-                    ("material.toml", "tensile.toml", self._take_material),
-                    ("table.csv", "tensile.csv", self._take_rows),
+                self._texts = downloads(
+                    ("material.toml", "tensile.toml", "text/plain"), ("table.csv", "tensile.csv", "text/csv")
                 )
-            self._told = named(ui.label("").classes("text-sm whitespace-pre-line break-words"), "tensile.told")
+            self._told = controls.named(ui.label("").classes("text-sm whitespace-pre-line break-words"), "tensile.told")
         self._box.set_visibility(False)
 
     def _asked(self) -> Callable[[Progress], tuple[TensileTask, TensileFit]]:
         asked, task = asked_with(self._session, TensileTask, "a tensile test", "file" in self._session.table("tensile"))
         return lambda progress: (task, run_tensile(asked))
 
-    async def _begin(self) -> None:
-        done = await self._row.ask(self._asked)
-        if done is None:
-            return
-        self._done = task, fit = done
+    def _finish(self, done: tuple[TensileTask, TensileFit]) -> None:
+        task, fit = done
+        self._fit = fit
+        self._texts["material.toml"] = lambda: material_file_text(task, fit)
+        self._texts["table.csv"] = lambda: tensile_table_text(task, fit)
         best = fit.best
         usable = [law for law, found in fit.fits.items() if found.material is not None]
         points = f"{fit.stretch.size} points{task.left_out}"
@@ -141,19 +130,11 @@ class _Fit:
 
     def _use(self) -> None:
         """Make the fitted law the scenario's silicone."""
-        chosen = None if self._done is None else self._done[1].fits.get(str(self._law.value))
+        chosen = None if self._fit is None else self._fit.fits.get(str(self._law.value))
         if chosen is None or chosen.material is None:
             return
         self._session.change_all("material", material_table(chosen.material))
         ui.notify("The scenario has this silicone now", position="bottom-right", timeout=2000)
-
-    def _take_material(self) -> None:
-        if self._done is not None:
-            ui.download.content(material_file_text(*self._done), "material.toml", "text/plain")
-
-    def _take_rows(self) -> None:
-        if self._done is not None:
-            ui.download.content(tensile_table_text(*self._done), "table.csv", "text/csv")
 
 
 def law_rows(fit: TensileFit) -> tuple[list[str], Rows]:

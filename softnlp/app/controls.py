@@ -33,7 +33,9 @@ def dashed(element: E, name: str) -> E:
     return named(element, name, name.replace(".", "-"))
 
 
-def button(words: str, icon: str, name: str, act: Callable[..., Any], look: str = SMALL, test: str = "") -> ui.button:
+def button(
+    words: str, icon: str | None, name: str, act: Callable[..., Any], look: str = SMALL, test: str = ""
+) -> ui.button:
     """Show a button."""
     return named(ui.button(words, icon=icon, on_click=act).props(look), name, test)
 
@@ -43,7 +45,7 @@ def use_button(words: str, name: str, act: Callable[[], Any]) -> ui.button:
     return button(words, "tune", name, act, USE).classes("px-2")
 
 
-def number_box(label: str, name: str, unit: str = "", look: str = "", test: str = "", **more: Any) -> ui.number:
+def number(label: str, name: str, unit: str = "", look: str = "", test: str = "", **more: Any) -> ui.number:
     """Show a number that is no key of the scenario, or one of several in a key."""
     box = named(ui.number(label, **more), name, test).props(f"{BOX} {look}")
     if unit:
@@ -51,7 +53,7 @@ def number_box(label: str, name: str, unit: str = "", look: str = "", test: str 
     return box.without_auto_validation()  # it would take away what `say_beside` says
 
 
-def select_box(
+def select(
     options: Any, name: str, label: str | None = None, *, look: str = "", test: str = "", **more: Any
 ) -> ui.select:
     """Show a choice from a list."""
@@ -59,9 +61,9 @@ def select_box(
     return box.classes("w-full").without_auto_validation()
 
 
-def toggle(options: Any, name: str, value: str | None = None) -> ui.toggle:
+def toggle(options: Any, name: str, value: str | None = None, test: str = "") -> ui.toggle:
     """Show a choice between a few words in a row."""
-    switch = named(ui.toggle(options, value=value), name)
+    switch = named(ui.toggle(options, value=value), name, test)
     return switch.props("dense no-caps unelevated spread").classes("w-full")
 
 
@@ -147,7 +149,7 @@ def number_field(
 
     unit = unit_of(key) if unit is None else unit
     name, look = f"{table}.{key}", "debounce=250"
-    field = number_box(label, name, unit, look, test, value=shown(), step=step, on_change=entered)
+    field = number(label, name, unit, look, test, value=shown(), step=step, on_change=entered)
     _follow(session, table, key, [field], lambda: [shown()])
     return field.classes("w-full")
 
@@ -173,7 +175,7 @@ def choice_field(
         if event.value is not None and event.value != session.document.get(table, key, standard):
             session.change(table, key, None if event.value == standard else event.value)
 
-    field = select_box(options, f"{table}.{key}", label, test=test, value=shown(), on_change=entered)
+    field = select(options, f"{table}.{key}", label, test=test, value=shown(), on_change=entered)
     _follow(session, table, key, [field], lambda: [shown()])
     return field
 
@@ -209,7 +211,7 @@ def vector_field(
     with ui.row().classes("w-full no-wrap gap-2"):
         for index, label in enumerate(labels):
             name, value = f"{table}.{key}.{index}", shown()[index]
-            fields.append(number_box(label, name, unit, "debounce=250", value=value, step=step))
+            fields.append(number(label, name, unit, "debounce=250", value=value, step=step))
             fields[-1].on_value_change(lambda event, index=index: entered(index, event.value))
             fields[-1].classes("min-w-0 grow basis-0")
     _follow(session, table, key, fields, shown)
