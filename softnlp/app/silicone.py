@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tomlkit.items import InlineTable
 
 from softnlp.app.document import Document
+from softnlp.app.parts import marks
 from softnlp.app.theme import figure_config, figure_layout, figure_text
 from softnlp.base.errors import InputError
 from softnlp.figures.style import colour
@@ -279,16 +280,8 @@ def _axis(title: str, reach: list[float] | None) -> dict[str, Any]:
 
 
 def _pose() -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "name": "pose",
-        "x": [],
-        "y": [],
-        "marker": {"size": 11, "color": "#E5383B", "line": {"color": "#FFFFFF", "width": 1.5}},
-        "hovertemplate": "%{y:.4g} kPa at %{x:.3f}<extra>pose</extra>",
-        "cliponaxis": False,
-    }
+    trace = marks([], [], "#E5383B", "pose", size=11, line={"color": "#FFFFFF", "width": 1.5})
+    return trace | {"hovertemplate": "%{y:.4g} kPa at %{x:.3f}<extra>pose</extra>", "cliponaxis": False}
 
 
 def _fit(fitted: tuple[float, float]) -> list[dict[str, Any]]:

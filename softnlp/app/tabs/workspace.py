@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from nicegui import ui
@@ -145,6 +145,7 @@ class _Sweep:
         return lambda progress: sweep(asked, session.folder / "sweeps", int(workers), progress)
 
     def _finish(self, swept: Swept) -> None:
+        """Show a sweep, where it was not stopped."""
         news = swept.news
         if news.stopped:
             self._row.say(f"Stopped after {news.done} of {news.poses} poses, which are kept: run again to go on.")
@@ -153,17 +154,12 @@ class _Sweep:
         timed = f", {news.seconds:.2f} s, {news.rate:.0f} poses/s" if news.rate else ""
         self._words = f"{news.done} poses, {news.failed} failed{timed}."
         self._row.say(self._words)
-        self._show(swept)
-
-    def _show(self, swept: Swept) -> None:
-        """Show the finished sweep."""
         choices = quantities(swept)
         chosen = self._what.value if self._what.value in choices else next(iter(choices), None)
         self._what.set_options(choices, value=chosen)
         self._bar.style(f"background: {gradient()}")
         self._found.set_visibility(True)
-        rows = [list(line) for line in lines(swept)]
-        self._table.show(["number", "value", "unit"], rows, "workspace_numbers.csv")
+        self._table.show(["number", "value", "unit"], lines(swept), "workspace_numbers.csv")
         self._draw()
 
     def _draw(self) -> None:
@@ -225,14 +221,6 @@ class Swept:
     news: SweepSummary
     workspace: Workspace | None
     summary: Summary | None
-
-
-class Line(NamedTuple):
-    """A number of a sweep."""
-
-    label: str
-    value: str
-    unit: str
 
 
 def sweep(asked: Scenario, folder: Path, workers: int, progress: Progress) -> Swept:
@@ -351,15 +339,15 @@ def in_sight(workspace: Workspace, viewer_mm: Point, along: Point) -> int | None
     return int(near[np.argmin(depth[near])])
 
 
-def lines(swept: Swept) -> list[Line]:
-    """Return a finished sweep in numbers."""
+def lines(swept: Swept) -> list[list[str]]:
+    """Return a finished sweep in numbers: name, value and unit of each."""
     summary, news = swept.summary, swept.news
     if summary is None:
         return []
-    found = [Line("Poses", str(summary.poses), ""), Line("Solved", str(summary.solved), "")]
-    found += [Line(f"Ended {status.value.replace('_', ' ')}", str(n), "") for status, n in summary.failed.items()]
+    found = [["Poses", str(summary.poses), ""], ["Solved", str(summary.solved), ""]]
+    found += [[f"Ended {status.value.replace('_', ' ')}", str(n), ""] for status, n in summary.failed.items()]
     if news.done > news.already:
-        found += [Line("Time", f"{news.seconds:.2f}", "s"), Line("Rate", f"{news.rate:.0f}", "poses/s")]
+        found += [["Time", f"{news.seconds:.2f}", "s"], ["Rate", f"{news.rate:.0f}", "poses/s"]]
     if not summary.solved:
         return found
     reach, boundary, hull, dexterity = summary.reach, summary.boundary, summary.hull, summary.dexterity
@@ -375,14 +363,14 @@ def lines(swept: Swept) -> list[Line]:
     )
     return [
         *found,
-        *(Line(label, str(count), "") for label, count in counts.items() if count),
-        Line("Distance from the axis", _range(reach.nearest_to_axis, reach.farthest_from_axis), "mm"),
-        Line("Distance from the base", _range(reach.nearest_to_base, reach.farthest_from_base), "mm"),
-        Line("Height", _range(reach.lowest, reach.highest), "mm"),
-        Line("Shape of the workspace", boundary.extent.meaning, ""),
-        *(Line(label, f"{size:.4g}", unit) for label, size, unit in measures if size),
-        *([] if dexterity is None else [Line("Directions of the tip", f"{100 * dexterity.overall:.3g}", "% of all")]),
-        Line("Largest residual", f"{summary.worst_residual:.1e}", ""),
+        *([label, str(count), ""] for label, count in counts.items() if count),
+        ["Distance from the axis", _range(reach.nearest_to_axis, reach.farthest_from_axis), "mm"],
+        ["Distance from the base", _range(reach.nearest_to_base, reach.farthest_from_base), "mm"],
+        ["Height", _range(reach.lowest, reach.highest), "mm"],
+        ["Shape of the workspace", boundary.extent.meaning, ""],
+        *([label, f"{size:.4g}", unit] for label, size, unit in measures if size),
+        *([] if dexterity is None else [["Directions of the tip", f"{100 * dexterity.overall:.3g}", "% of all"]]),
+        ["Largest residual", f"{summary.worst_residual:.1e}", ""],
     ]
 
 
