@@ -12,8 +12,7 @@ from nicegui import background_tasks
 from nicegui.testing import User
 from nicegui.testing.user_simulation import user_simulation
 
-from softnlp.app.session import Session
-from softnlp.app.stage import Stage
+from softnlp.app.session import Session, Stage
 
 
 class NotedView:

@@ -17,9 +17,9 @@ from app_stage import done, enter, field, opened, ran, until
 from softnlp import blocked_force
 from softnlp.app.asking import scenario_with
 from softnlp.app.session import Session
-from softnlp.app.tabs.blocked import blocked_tab
-from softnlp.app.tabs.contact_table import (
+from softnlp.app.tabs.blocked import (
     CLOSURES,
+    blocked_tab,
     of_a_curve,
     of_a_target,
     pushing,

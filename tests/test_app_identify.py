@@ -17,10 +17,8 @@ from nicegui.testing import User
 
 from softnlp import Coefficients, forward, material, robot
 from softnlp.app.parts import Chart
-from softnlp.app.session import LARGEST_FILE
-from softnlp.app.stage import Stage
-from softnlp.app.tabs.identify import identify_tab
-from softnlp.app.tabs.identify_table import LETTERS, bounds_of, first_free, with_bound, with_free
+from softnlp.app.session import LARGEST_FILE, Stage
+from softnlp.app.tabs.identify import LETTERS, bounds_of, first_free, identify_tab, with_bound, with_free
 from softnlp.base.units import DEGREE, MILLIMETRE
 from softnlp.scenario.read import scenario_from_text
 from softnlp.studies.free_constants import COEFFICIENTS

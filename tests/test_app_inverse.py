@@ -13,11 +13,11 @@ pytest.importorskip("nicegui", reason="the extra gui is not installed")
 from app_stage import NotedView, done, enter, field, opened, ran
 
 from softnlp.app.session import Session
-from softnlp.app.tabs.inverse import inverse_tab
-from softnlp.app.tabs.target_table import (
+from softnlp.app.tabs.inverse import (
     KINDS,
     POSITION,
     count_of,
+    inverse_tab,
     kind_of,
     rows_of,
     with_added,

@@ -13,8 +13,11 @@ from nicegui.testing import User
 
 from softnlp.app.document import Document
 from softnlp.app.live import LivePoses
-from softnlp.app.material_figure import MEASURES, material_figure
-from softnlp.app.material_state import (
+from softnlp.app.live_view import PoseStretch
+from softnlp.app.panels.material import material_panel
+from softnlp.app.session import Session
+from softnlp.app.silicone import (
+    MEASURES,
     OWN_LAW,
     constants_form,
     constants_of_rows,
@@ -24,11 +27,9 @@ from softnlp.app.material_state import (
     known_silicones,
     law_or_default,
     library_form,
+    material_figure,
     material_state,
 )
-from softnlp.app.panels.material import material_panel
-from softnlp.app.session import Session
-from softnlp.app.stretch import PoseStretch
 from softnlp.app.theme import figure_config, on_dark
 from softnlp.model.laws import LAWS
 from softnlp.model.materials import load_materials, material, material_from_table

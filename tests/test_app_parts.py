@@ -14,8 +14,7 @@ from nicegui.testing.user_simulation import user_simulation
 
 from softnlp.app import live_view
 from softnlp.app.parts import RunRow
-from softnlp.app.session import Session
-from softnlp.app.stage import Stage
+from softnlp.app.session import Session, Stage
 from softnlp.base.units import BAR
 
 

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from nicegui.testing import User
 
 from softnlp.app.document import Document
-from softnlp.app.panels.robot import robot_panel
-from softnlp.app.robot_state import OWN, RULE_FIELDS, changed_keys, library_table, own_table, robot_state
+from softnlp.app.panels.robot import OWN, RULE_FIELDS, changed_keys, library_table, own_table, robot_panel, robot_state
 from softnlp.app.section_svg import section_svg
 from softnlp.app.session import Session
 from softnlp.base.errors import InputError

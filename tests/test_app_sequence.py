@@ -20,8 +20,7 @@ from nicegui import ui
 from softnlp import forward
 from softnlp.app.asking import scenario_with
 from softnlp.app.parts import MOST_MARKS, csv_text, line, number_text
-from softnlp.app.tabs.sequence import sequence_tab
-from softnlp.app.tabs.sequence_table import rows_of_text, rows_text, source_of
+from softnlp.app.tabs.sequence import rows_of_text, rows_text, sequence_tab, source_of
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, DEGREE
 

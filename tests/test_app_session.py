@@ -13,8 +13,8 @@ pytest.importorskip("tomlkit", reason="the extra gui is not installed")
 
 from app_stage import done, enter, field, opened
 
-from softnlp.app.numbers import certificate_words, step_lines
-from softnlp.app.panels.loads import loads_panel
+from softnlp.app.panels.equations import loads_panel
+from softnlp.app.panels.results import certificate_words, step_lines
 from softnlp.app.session import LARGEST_FILE, Session
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR

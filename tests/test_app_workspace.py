@@ -14,10 +14,9 @@ pytest.importorskip("nicegui", reason="the extra gui is not installed")
 
 from app_stage import NotedView, done, enter, field, opened, ran
 
-from softnlp.app.asking import scenario_with
-from softnlp.app.job import Progress
+from softnlp.app.asking import Progress, scenario_with
 from softnlp.app.session import Session
-from softnlp.app.tabs import cloud
+from softnlp.app.tabs import workspace as cloud
 from softnlp.app.tabs.workspace import workspace_tab
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.studies.ellipsoids import manipulability

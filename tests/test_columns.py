@@ -17,7 +17,7 @@ from rich.console import Console
 
 import softnlp
 from softnlp import forward, material, robot
-from softnlp.app.numbers import step_lines
+from softnlp.app.panels.results import step_lines
 from softnlp.base import columns
 from softnlp.base.columns import DEG, ONE, OUTPUTS, TABLES, Output, by_key, outputs, written
 from softnlp.results import netcdf_bytes, table_lines, table_text, to_json

@@ -21,8 +21,7 @@ from view_browser import FLAGS, STAGE, drawn, served
 
 from softnlp import robot
 from softnlp.app.view import Frame, frame_of
-from softnlp.app.view.frame import ARROW, quaternions
-from softnlp.app.view.message import cloud_message, frame_message, layout_of, packed, robot_message
+from softnlp.app.view.frame import ARROW, cloud_message, frame_message, layout_of, packed, quaternions, robot_message
 from softnlp.base.palette import colour
 from softnlp.figures.mesh import display_mesh
 from softnlp.figures.mesh.display import STATIONS

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
+from threading import Event
 from typing import Any
 
 from softnlp.app.document import Document
-from softnlp.app.job import Progress, Stopped
 from softnlp.app.session import Session
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR
@@ -18,6 +18,41 @@ MOST_STEPS = 10_000
 """Of a run on the page, which keeps every shape in memory; `softnlp run` takes more."""
 
 Tables = Mapping[str, Mapping[str, Any] | None]
+
+
+class Stopped(Exception):
+    """A person stopped the work."""
+
+
+class Progress:
+    """How far work is; the work calls it between two steps, the page reads `fraction` and `text`."""
+
+    def __init__(self) -> None:
+        self.fraction = 0.0
+        self.text = ""
+        self._stop = Event()
+
+    def __call__(self, done: float, total: float, text: str = "") -> None:
+        """Note how far the work is.
+
+        Raises
+        ------
+        Stopped
+            Where a person wants it to end.
+        """
+        if self._stop.is_set():
+            raise Stopped
+        self.fraction = min(1.0, done / total) if total else 0.0
+        self.text = text
+
+    @property
+    def stopping(self) -> bool:
+        """Whether a person wants the work to end."""
+        return self._stop.is_set()
+
+    def stop(self) -> None:
+        """Ask the work to end at its next step."""
+        self._stop.set()
 
 
 def scenario_with(session: Session, study: str, tables: Tables | None = None) -> Scenario:
@@ -35,6 +70,14 @@ def scenario_with(session: Session, study: str, tables: Tables | None = None) ->
     return scenario_from_text(document.text(study), session.folder / session.name)
 
 
+def few_enough(asked: Scenario, most: int, what: str, command: str, table: str | None = None) -> None:
+    """Raise `InputError` for a scenario of more steps or poses than a page should wait for."""
+    count = asked.step_count
+    if count > most:
+        words = f"{count} {what} are too many for this page, which runs {most}; save the scenario and use {command}"
+        raise InputError(words, table=table)
+
+
 def run_steps(asked: Scenario, progress: Progress, on_step: Callable[[Step], None] = lambda step: None) -> Run:
     """Run a scenario; where a person stops it, the run has the steps done by then and says so.
 
@@ -45,11 +88,7 @@ def run_steps(asked: Scenario, progress: Progress, on_step: Callable[[Step], Non
     InputError
         For more steps than the page takes, and as `softnlp.run_scenario`.
     """
-    if asked.step_count > MOST_STEPS:
-        raise InputError(
-            f"{asked.step_count} steps are too many for this page, which runs {MOST_STEPS}; save the scenario and use "
-            "softnlp run"
-        )
+    few_enough(asked, MOST_STEPS, "steps", "softnlp run")
     steps: list[Step] = []
 
     def done(number: int, step: Step) -> None:
@@ -70,21 +109,19 @@ def said(run: Run) -> str:
     if run.failed:
         words += f" First failed: {run.failed[0].message}."
     stopped = [note for note in run.warnings if note.startswith("stopped")]
-    return " ".join([words, *(f"{note[0].upper()}{note[1:]}." for note in stopped)])
+    return " ".join([words, *map(sentence, stopped)])
 
 
-def step_rows(run: Run, columns: Mapping[str, Sequence[float]]) -> tuple[list[str], list[list[Any]]]:
-    """Return header and rows of a table of steps: number, pressures, some columns by their label, how it ended."""
-    header = ["step", *(f"p{k + 1} [bar]" for k in range(run.robot.chamber_sets)), *columns, "status"]
-    header += ["message"] * bool(run.failed)
-    rows = []
-    for k, step in enumerate(run.steps):
-        words = ["" if step.status.has_solution else step.message] * bool(run.failed)
-        bars = [float(p) / BAR for p in step.pressure]
-        rows.append([k + 1, *bars, *(values[k] for values in columns.values()), str(step.status), *words])
-    return header, rows
+def sentence(words: str) -> str:
+    """Return words as a sentence."""
+    return f"{words[:1].upper()}{words[1:]}."
 
 
-def failures(run: Run) -> list[bool]:
-    """Return which steps carry no solution."""
-    return [not step.status.has_solution for step in run.steps]
+def rows_bar(pressures: Iterable[Any]) -> list[list[float]]:
+    """Return rows of pressures [Pa] as a file has them [bar]."""
+    return [[float(f"{p / BAR:.12g}") for p in row] for row in pressures]
+
+
+def bars(pressure: Iterable[float], digits: int = 4) -> str:
+    """Return pressures [Pa] in words, in bar."""
+    return ", ".join(f"{p / BAR:.{digits}g}" for p in pressure)

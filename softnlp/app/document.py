@@ -54,7 +54,7 @@ class Document:
         """Parse a scenario; raises `InputError` for text that is not TOML or has a table where a value belongs."""
         parse_toml(text)  # says the same of a broken file as the commands
         try:
-            self._tables = tomlkit.parse(text)
+            self._tables: Any = tomlkit.parse(text)
         except (TOMLKitError, ValueError, RecursionError) as error:
             raise InputError(f"not valid TOML: {one_line(str(error)) or 'nested too deeply'}") from None
         study = self._tables.get("study")
@@ -102,13 +102,13 @@ class Document:
                 return
             if not isinstance(self._tables.get(table), Table | InlineTable):
                 self._tables[table] = tomlkit.table()
-            self._table(table)[key] = value
+            self._tables[table][key] = value
             return
         if table == _TOP:
             self._tables.pop(key, None)
         elif isinstance(self._tables.get(table), Table | InlineTable):
-            self._table(table).pop(key, None)
-            if not self._table(table):
+            self._tables[table].pop(key, None)
+            if not self._tables[table]:
                 self._tables.remove(table)
 
     def replace(self, table: str, values: Mapping[str, Any] | None) -> None:
@@ -135,10 +135,16 @@ class Document:
             for name, values in _NEEDED.get(study, {}).items():
                 if name not in wanted and not (name == "workspace" and "pressure" in wanted):
                     wanted[name] = _new_table(values)
-            _without_second_source(study, wanted)
-            _without_a_robots_tables(study, wanted)
+            own = wanted.get("workspace")
+            unused: list[str] = []
+            if study == "workspace" and isinstance(own, Mapping) and ("levels" in own or "samples" in own):
+                unused.append("pressure")  # of another tab, where a sweep has a grid or samples of its own
             if study == "workspace" and not self.sweeps_wall:
-                wanted.pop("contact", None)
+                unused.append("contact")
+            if study == "identify" and "tensile" in wanted and "measurements" not in wanted:
+                unused += [*UNUSED_BY_TENSILE, "solver"]  # whose grid means nothing there
+            for name in unused:
+                wanted.pop(name, None)
         if wanted.get("study") != study:
             wanted["study"] = study
         return tomlkit.dumps(wanted)
@@ -157,7 +163,9 @@ class Document:
     def fit_pressures(self) -> None:
         """Give each row of pressures as many columns as the robot has sets: zeros are added, columns left out."""
         rows = self.get("pressure", "sequence_bar")
-        sets = self.get("robot", "chamber_sets") or _sets_of(self.get("robot", "name"))
+        name = self.get("robot", "name")
+        library = ROBOTS.get(name) if isinstance(name, str) else None
+        sets = self.get("robot", "chamber_sets") or (None if library is None else library.chamber_sets)
         if not isinstance(sets, int) or isinstance(sets, bool) or not 1 <= sets <= MOST_SETS:
             return
         rows = rows if isinstance(rows, list) and all(isinstance(row, list) for row in rows) else []
@@ -169,30 +177,8 @@ class Document:
             if kept != ramp["sets"]:
                 self.set("pressure", "ramp", ramp | {"sets": kept or [1]})
 
-    def _table(self, name: str) -> Any:
-        return self._tables[name]
-
-
-def _sets_of(name: Any) -> int | None:
-    return ROBOTS[name].chamber_sets if isinstance(name, str) and name in ROBOTS else None
-
 
 def _new_table(values: Mapping[str, Any]) -> Table:
     table = tomlkit.table()
     table.update(values)
     return table
-
-
-def _without_second_source(study: str, tables: tomlkit.TOMLDocument) -> None:
-    """Take the pressures of another tab out of a workspace that has a grid or samples of its own."""
-    if study == "workspace":
-        own = tables.get("workspace")
-        if isinstance(own, Mapping) and ("levels" in own or "samples" in own):
-            tables.pop("pressure", None)
-
-
-def _without_a_robots_tables(study: str, tables: tomlkit.TOMLDocument) -> None:
-    """Take what a tensile test does not use out of it."""
-    if study == "identify" and "tensile" in tables and "measurements" not in tables:
-        for name in (*UNUSED_BY_TENSILE, "solver"):  # whose grid means nothing there
-            tables.pop(name, None)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from nicegui import events, ui
@@ -24,21 +25,30 @@ def saved(session: Session) -> tuple[str, bytes]:
     files = session.document.files()
     if not files:
         return f"{stem}.toml", text
+    contents = {name: (session.folder / name).read_bytes() for name in files}
+    return f"{stem}.zip", zipped({f"{stem}.toml": text, **contents})
+
+
+def zipped(files: Mapping[str, bytes | Path]) -> bytes:
+    """Return contents and files as a zip archive under their names in it."""
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr(f"{stem}.toml", text)
-        for name in files:
-            archive.writestr(name, (session.folder / name).read_bytes())
-    return f"{stem}.zip", packed.getvalue()
+        for name, content in files.items():
+            archive.write(content, name) if isinstance(content, Path) else archive.writestr(name, content)
+    return packed.getvalue()
 
 
 def save(session: Session) -> None:
     """Offer the scenario on the screen as a download; what is wrong with it is said instead."""
     if session.problem is not None:
-        ui.notify(f"not saved: {session.problem}", type="negative", close_button="Close", timeout=0)
+        _refuse(f"not saved: {session.problem}")
         return
     name, content = saved(session)
     ui.download.content(content, name)
+
+
+def _refuse(words: str) -> None:
+    ui.notify(words, type="negative", close_button="Close", timeout=0)
 
 
 def open_dialog(session: Session) -> ui.dialog:
@@ -50,7 +60,7 @@ def open_dialog(session: Session) -> ui.dialog:
         try:
             open_files(session, [(file.name, await file.read()) for file in event.files])
         except SoftnlpError as error:
-            ui.notify(f"not opened: {error}", type="negative", close_button="Close", timeout=0)
+            _refuse(f"not opened: {error}")
             return
         dialog.close()
         ui.notify(f"opened {session.name}", type="positive")
@@ -92,22 +102,21 @@ def open_files(session: Session, files: Sequence[tuple[str, bytes]]) -> None:
 def mesh_menu(session: Session, pose: Callable[[], Pose | None]) -> None:
     """Build menu entries that offer the body as a mesh. pose : a function that gives the pose shown, or None."""
 
-    def offer(kind: str, deformed: bool) -> None:
-        shown = pose()
-        scenario = session.scenario
+    def offer(state: str, kind: str) -> None:
+        shown, scenario, name = pose(), session.scenario, f"{state}.{kind}"
+        deformed = state == "deformed"
         if scenario is None or (deformed and shown is None):
             ui.notify("no solved pose to export", type="warning")
             return
         try:
-            name = f"{'deformed' if deformed else 'undeformed'}.{kind}"
             ui.download.content(mesh_bytes(scenario.robot, shown if deformed else None, session.folder / name), name)
         except SoftnlpError as error:
             ui.notify(str(error), type="negative")
 
-    for deformed, words in ((True, "Deformed body"), (False, "Undeformed body for the mould")):
+    for state, words in (("deformed", "Deformed body"), ("undeformed", "Undeformed body for the mould")):
         for kind in ("stl", "glb"):
-            item = ui.menu_item(f"{words}, {kind.upper()}", on_click=lambda k=kind, d=deformed: offer(k, d))
-            item.props(f"data-testid=mesh-{'deformed' if deformed else 'undeformed'}-{kind}")
+            item = ui.menu_item(f"{words}, {kind.upper()}", on_click=partial(offer, state, kind))
+            item.props(f"data-testid=mesh-{state}-{kind}")
 
 
 def mesh_bytes(robot: Robot, pose: Pose | None, file: Path) -> bytes:

@@ -10,8 +10,8 @@ from nicegui import Client, ui
 from starlette.requests import Request
 from starlette.responses import Response
 
-from softnlp.app.redraw import Redraw
 from softnlp.app.session import Session
+from softnlp.app.theme import Redraw
 from softnlp.base.errors import SoftnlpError
 
 _KEPT, _FILES = "softnlp.scenario", "softnlp.files"

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 
+import casadi as ca
 import numpy as np
 from nicegui import background_tasks, ui
 from numpy.typing import NDArray
 
-from softnlp.app.stage import Stage
+from softnlp.app.asking import bars
+from softnlp.app.session import Session, Stage
+from softnlp.app.theme import Redraw
 from softnlp.app.view import frame_of
 from softnlp.base.errors import InputError
-from softnlp.base.units import BAR
+from softnlp.base.status import Status
+from softnlp.model.quantities import quantities
 from softnlp.results import Body
 from softnlp.scenario.read import Scenario
-from softnlp.statics.step import Contact, Pose, Run, Step
+from softnlp.statics.branch import branch_function, stretch_on_branch
+from softnlp.statics.step import Pose, Run, Step
 from softnlp.statics.wall import Wall
 
 Array = NDArray[np.float64]
@@ -34,14 +39,14 @@ class LiveView:
 
     def __init__(self, stage: Stage, shown: Callable[[Run], None], say: Callable[[str], None]) -> None:
         self._stage = stage
-        self._shown = shown
         self._say = say
         self._words = ""
         self._wanted = False
         self._working = False
         self._last: tuple[Scenario, Array] | None = None
-        self._told: Run | None = None
         self._client = ui.context.client
+        # The panels get the numbers a moment after the picture, which they would hold up in the browser.
+        self._tell = Redraw(self._client.content, lambda: shown(self._run), _NUMBERS_AFTER_S)
         stage.session.on_scenario(self.request)
         stage.session.on_pressure(self.request)
 
@@ -83,49 +88,38 @@ class LiveView:
             step = run.steps[0]
             if not step.status.has_solution and self._stays(scenario, pressure):
                 assert self._last is not None
-                self._said(f"{step.message}. The sliders stay at {_listed(self._last[1])} bar.")
+                self._said(f"{step.message}. The sliders stay at {bars(self._last[1], 3)} bar.")
                 session.set_pressure(self._last[1])
                 return
             if step.pose is not None and step.status.has_solution:
                 self._show(scenario, pressure, step, step.pose, ghost)
             else:
                 self._said(f"{step.message}. The picture is of the last pose that was solved.")
-        self._tell(run)
+        self._run = run
+        self._tell()
 
     def _said(self, words: str) -> None:
         """Say words that stay when a later pose takes long."""
         self._words = words
         self._say(words)
 
-    def _tell(self, run: Run) -> None:
-        """Give the panels the numbers a moment after the picture, which they would hold up in the browser."""
-        telling = self._told is not None
-        self._told = run
-        if not telling:
-            asyncio.get_running_loop().call_later(_NUMBERS_AFTER_S, self._tell_now)
-
-    def _tell_now(self) -> None:
-        run, self._told = self._told, None
-        if run is not None and not self._client.is_deleted:
-            with self._client:
-                self._shown(run)
-
     def _show(self, scenario: Scenario, pressure: Array, step: Step, pose: Pose, ghost: Pose | None) -> None:
         if self._last is None or not np.array_equal(self._last[1], pressure) or self._last[0] is not scenario:
             self._said("")
-        self._last = (scenario, pressure)
+        self._last, loads, contact = (scenario, pressure), scenario.loads, step.contact
+        stands = contact is not None and contact.normal.any()  # else the chambers alone are held
         self._stage.view.show(
             frame_of(
                 scenario.robot,
                 _body(pose),
                 pressure,
                 ghost=None if ghost is None else _body(ghost),
-                tip_force=scenario.loads.tip_force,
-                tip_moment=scenario.loads.tip_moment,
-                gravity=scenario.loads.gravity,
-                wall=_wall(step.contact),
-                wall_force=0.0 if step.contact is None else step.contact.force,
-                tip_cap=0.0 if step.contact is None else step.contact.tip_cap,
+                tip_force=loads.tip_force,
+                tip_moment=loads.tip_moment,
+                gravity=loads.gravity,
+                wall=Wall(contact.wall_point, contact.normal) if contact is not None and stands else None,
+                wall_force=0.0 if contact is None else contact.force,
+                tip_cap=0.0 if contact is None else contact.tip_cap,
             )
         )
 
@@ -134,14 +128,26 @@ class LiveView:
         return self._last is not None and self._last[0] is scenario and not np.array_equal(self._last[1], pressure)
 
 
+class PoseStretch:
+    """Gives the stretch of a session's pose; what is compiled is kept while robot and law are of the same kind."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._kind: Hashable = None
+        self._branch: ca.Function | None = None
+
+    def __call__(self) -> float | None:
+        """Return lambda at the pressures shown, as Eq. (23) gives it; None where there is no such equilibrium."""
+        scenario, pressure = self._session.scenario, self._session.pressure
+        if scenario is None or len(pressure) != scenario.robot.chamber_sets:
+            return None
+        model = scenario.model
+        if self._branch is None or self._kind != model.kind:
+            self._branch, self._kind = branch_function(model), model.kind
+        nominal = {name: q.nominal for name, q in quantities(model).items()} | {"pressure": pressure}
+        point = stretch_on_branch(self._branch, np.concatenate([np.ravel(v) for v in nominal.values()]), pressure)
+        return point.stretch if point.status is Status.SOLVED else None
+
+
 def _body(pose: Pose) -> Body:
     return Body(pose.shape.position, pose.shape.rotation, pose.radii)
-
-
-def _wall(contact: Contact | None) -> Wall | None:
-    """Return the wall of a step; None where the chambers alone are held."""
-    return Wall(contact.wall_point, contact.normal) if contact is not None and contact.normal.any() else None
-
-
-def _listed(pressure: Array) -> str:
-    return ", ".join(f"{p / BAR:.3g}" for p in pressure)

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
 
 from nicegui import ui
 
+from softnlp.app.controls import button
 from softnlp.app.files import mesh_menu, open_dialog, save
 from softnlp.app.live_view import LiveView
-from softnlp.app.panels.coefficients import coefficients_panel
-from softnlp.app.panels.loads import loads_panel
+from softnlp.app.panels.equations import coefficients_panel, loads_panel, solver_panel
 from softnlp.app.panels.material import material_panel
 from softnlp.app.panels.pressure import pressure_panel
 from softnlp.app.panels.results import ResultsPanel
 from softnlp.app.panels.robot import robot_panel
-from softnlp.app.panels.solver import solver_panel
-from softnlp.app.session import Session
-from softnlp.app.stage import Stage
+from softnlp.app.session import Session, Stage
 from softnlp.app.tabs.blocked import blocked_tab
 from softnlp.app.tabs.identify import identify_tab
 from softnlp.app.tabs.inverse import inverse_tab
@@ -28,24 +25,15 @@ from softnlp.app.tabs.workspace import workspace_tab
 from softnlp.app.theme import style_page
 from softnlp.app.view import RobotView
 
-
-@dataclass(frozen=True)
-class Study:
-    """A tab of the page. study : of the scenario while it is open."""
-
-    label: str
-    study: str
-    build: Callable[[Stage], None]
-
-
-STUDIES: Mapping[str, Study] = {
-    "kinematics": Study("Kinematics", "forward", sequence_tab),
-    "blocked": Study("Blocked force", "blocked-force", blocked_tab),
-    "workspace": Study("Workspace", "workspace", workspace_tab),
-    "inverse": Study("Inverse", "inverse", inverse_tab),
-    "identify": Study("Identification", "identify", identify_tab),
+STUDIES = {
+    "kinematics": ("Kinematics", "forward", sequence_tab),
+    "blocked": ("Blocked force", "blocked-force", blocked_tab),
+    "workspace": ("Workspace", "workspace", workspace_tab),
+    "inverse": ("Inverse", "inverse", inverse_tab),
+    "identify": ("Identification", "identify", identify_tab),
 }
-_TAB_OF = {study.study: name for name, study in STUDIES.items()}
+"""The tabs: label, study of the scenario while it is open, and what builds it."""
+_TAB_OF = {study: name for name, (_, study, _) in STUDIES.items()}
 SCENARIO = "scenario"
 _LINE = "border-neutral-300 dark:border-neutral-700"
 _HEADER = f"h-12 px-3 py-0 items-center no-wrap gap-2 border-b softnlp-surface {_LINE}"
@@ -62,9 +50,8 @@ def build_page(session: Session) -> None:
     with ui.header(elevated=False).classes(_HEADER):
         ui.label("softnlp").classes("text-lg font-semibold mr-2")
         with ui.tabs().props("dense no-caps inline-label shrink").classes("min-w-0") as tabs:
-            for name, study in STUDIES.items():
-                ui.tab(name, label=study.label).props(f"data-testid=tab-{name}")
-            ui.tab(SCENARIO, label="Scenario").props("data-testid=tab-scenario")
+            for name, label in (*((name, label) for name, (label, *_) in STUDIES.items()), (SCENARIO, "Scenario")):
+                ui.tab(name, label=label).props(f"data-testid=tab-{name}")
         tabs.set_value(chosen)
         ui.space()
         exports = _files(session, dark)
@@ -110,20 +97,19 @@ def build_page(session: Session) -> None:
 def awaits_data(session: Session) -> bool:
     """Whether all that is missing is the file that an identification starts from."""
     tables = ("measurements", "tensile")
-    return session.document.study == "identify" and not any(session.document.table(name) for name in tables)
+    return session.document.study == "identify" and not any(map(session.table, tables))
 
 
 def _files(session: Session, dark: ui.dark_mode) -> ui.menu:
     """Build the buttons for files and return the menu of exports."""
     dialog = open_dialog(session)
-    ui.button("Open", icon="folder_open", on_click=dialog.open).props("flat dense no-caps data-testid=open")
-    ui.button("Save", icon="save", on_click=lambda: save(session)).props("flat dense no-caps data-testid=save")
-    with ui.button("Export", icon="view_in_ar").props("flat dense no-caps data-testid=export"), ui.menu() as exports:
+    look = "flat dense no-caps"
+    button("Open", "folder_open", "open", dialog.open, look)
+    button("Save", "save", "save", partial(save, session), look)
+    with ui.button("Export", icon="view_in_ar").props(f"{look} data-testid=export"), ui.menu() as exports:
         pass
-    turn = ui.button(icon="contrast", on_click=dark.toggle).props(
-        'flat dense round data-testid=dark aria-label="light or dark"'
-    )
-    turn.tooltip("Light or dark")
+    turn = button("", "contrast", "dark", dark.toggle, "flat dense round").tooltip("Light or dark")
+    turn.props('aria-label="light or dark"')
     return exports
 
 
@@ -171,10 +157,8 @@ def _view_buttons(view: RobotView) -> None:
             ("trail", "timeline", "Forget the trail of the tip", view.clear_trail),
             ("picture", "photo_camera", "Save a picture", picture),
         ):
-            button = ui.button(icon=icon, on_click=act).props(
-                f'flat dense round data-testid=view-{name} aria-label="{words}"'
-            )
-            button.tooltip(words)
+            control = button("", icon, f"view-{name}", act, "flat dense round").tooltip(words)
+            control.props(f'aria-label="{words}"')
 
 
 def _studies(stage: Stage, tabs: ui.tabs, chosen: str) -> None:
@@ -185,12 +169,13 @@ def _studies(stage: Stage, tabs: ui.tabs, chosen: str) -> None:
 
     def opened() -> None:
         name = str(panels.value)
-        if name in STUDIES:
-            stage.session.choose(STUDIES[name].study)
+        _, study, build = STUDIES.get(name, ("", None, scenario_tab))
+        if study is not None:
+            stage.session.choose(study)
         if name not in built:
             built.add(name)
             with slots[name]:
-                STUDIES[name].build(stage) if name in STUDIES else scenario_tab(stage)
+                build(stage)
 
     panels.on_value_change(opened)
     opened()

@@ -2,30 +2,31 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable, Mapping, Sequence
+from functools import partial
 from math import isfinite
 from typing import Any, TypeVar
 
+import numpy as np
 from nicegui import events, ui
+from numpy.typing import NDArray
 
-from softnlp.app.job import Progress, Stopped, in_background
+from softnlp.app.asking import Progress, Stopped
+from softnlp.app.controls import HINT, button, named, plain_words
 from softnlp.app.session import LARGEST_FILE
 from softnlp.app.theme import darkness, figure_config, figure_layout, figure_text, on_dark
 from softnlp.base.errors import InputError, SoftnlpError
+from softnlp.base.units import BAR
 from softnlp.results import document
+from softnlp.results.table import table_text
+from softnlp.statics.step import Run
 
 T = TypeVar("T")
+Numbers = Sequence[float] | NDArray[np.float64]
 
 MOST_ROWS = 400
 """Rows of a table on the page; the CSV has all."""
-
-
-def plain_words(error: SoftnlpError) -> str:
-    """Return an error in one line without the file that it is about: on the page there is but one."""
-    if isinstance(error, InputError):
-        return str(type(error)(error.message, table=error.table, key=error.key))
-    return str(error)
-
 
 MOST_MARKS = 2000
 """Of a line of a chart."""
@@ -40,13 +41,12 @@ class RunRow:
         self.running = False
         self._watch: Callable[[], None] | None = None
         with ui.row().classes("w-full items-center gap-2 no-wrap"):
-            self._start = ui.button(label, icon="play_arrow", on_click=begin).props("dense unelevated no-caps")
-            self._start.classes("px-3 shrink-0").mark(f"{marker}.run").props(f"data-testid={marker}.run")
-            self._end = ui.button("Stop", icon="stop", on_click=self.stop).props("dense outline no-caps")
-            self._end.classes("px-3 shrink-0").mark(f"{marker}.stop").props(f"data-testid={marker}.stop")
+            self._start = button(label, "play_arrow", f"{marker}.run", begin, "dense unelevated no-caps")
+            self._end = button("Stop", "stop", f"{marker}.stop", self.stop, "dense outline no-caps")
+            for control in (self._start, self._end):
+                control.classes("px-3 shrink-0")
             self._bar = ui.linear_progress(0.0, show_value=False, size="8px").props("rounded instant-feedback")
-        self._words = ui.label("").classes("text-sm break-words w-full").mark(f"{marker}.message")
-        self._words.props(f"data-testid={marker}.message")
+        self._words = named(ui.label("").classes("text-sm break-words w-full"), f"{marker}.message")
         self._timer = ui.timer(0.25, self._look, active=False)
         self._end.set_visibility(False)
         self._bar.set_visibility(False)
@@ -63,7 +63,7 @@ class RunRow:
         self._show(True)
         self.say("Starting…")
         try:
-            return await in_background(work, self.progress)
+            return await asyncio.to_thread(work, self.progress)
         except Stopped:
             self.say("Stopped.")
         except SoftnlpError as error:
@@ -107,6 +107,32 @@ class RunRow:
             self._watch()
 
 
+def study_row(
+    marker: str,
+    label: str,
+    asked: Callable[[], Callable[[Progress], T]],
+    done: Callable[[T], None],
+    watch: Callable[[], None] | None = None,
+) -> RunRow:
+    """Show the row of a study: the button does the work that `asked` returns, `done` gets its result.
+
+    What is not possible is said. watch : as of `RunRow.do`.
+    """
+
+    async def begin() -> None:
+        try:
+            work = asked()
+        except InputError as error:
+            row.warn(plain_words(error))
+            return
+        found = await row.do(work, watch)
+        if found is not None:
+            done(found)
+
+    row = RunRow(marker, label, begin)
+    return row
+
+
 def number_text(value: Any, digits: int = 5) -> str:
     """Return a number as a table on the page has it; other things as text, nothing for None and nan."""
     if isinstance(value, bool):
@@ -128,9 +154,9 @@ class NumberTable:
         """Build the table, hidden until there is something to show; `on_row` is called with the row clicked."""
         self._csv, self._name = "", "table.csv"
         with ui.column().classes("w-full gap-1") as self._box:
-            self._table = ui.table(columns=[], rows=[], row_key="row").props("dense flat bordered wrap-cells")
-            self._table.classes("w-full softnlp-numbers").style(f"max-height: {height}").mark(marker)
-            self._table.props(f"data-testid={marker} hide-bottom :rows-per-page-options=[0]")
+            self._table = named(ui.table(columns=[], rows=[], row_key="row"), marker).style(f"max-height: {height}")
+            self._table.props("dense flat bordered wrap-cells hide-bottom :rows-per-page-options=[0]")
+            self._table.classes("w-full softnlp-numbers")
             self._table.add_slot(
                 "body-cell",
                 "<q-td :props=\"props\" :class=\"props.row.failed ? 'text-negative' : ''\">{{ props.value }}</q-td>",
@@ -139,11 +165,9 @@ class NumberTable:
                 self._table.classes("cursor-pointer")
                 self._table.on("rowClick", lambda event: on_row(int(event.args[1]["row"])), args=[None, ["row"], None])
             with ui.row().classes("gap-1 items-center"):
-                self._more = ui.label("").classes("text-xs opacity-70")
-                copy = ui.button("Copy", icon="content_copy", on_click=self._copy)
-                take = ui.button("CSV", icon="download", on_click=self._take)
-                for button, word in ((copy, "copy"), (take, "download")):
-                    button.props(f"dense flat no-caps size=sm data-testid={marker}.{word}").mark(f"{marker}.{word}")
+                self._more = ui.label("").classes(HINT)
+                button("Copy", "content_copy", f"{marker}.copy", self._copy)
+                button("CSV", "download", f"{marker}.download", self._take)
         self._box.set_visibility(False)
 
     def show(
@@ -169,6 +193,18 @@ class NumberTable:
         self._table.update()
         self._more.set_text(f"first {MOST_ROWS} of {len(rows)} rows" if len(rows) > MOST_ROWS else "")
         self._box.set_visibility(True)
+
+    def show_steps(self, run: Run, columns: Mapping[str, Sequence[Any]], name: str, first: str = "step") -> None:
+        """Show the steps of a run: number, pressures, some columns by their label, how each ended."""
+        header = [first, *(f"p{k + 1} [bar]" for k in range(run.robot.chamber_sets)), *columns, "status"]
+        header += ["message"] * bool(run.failed)
+        failed = [not step.status.has_solution for step in run.steps]
+        rows = []
+        for k, step in enumerate(run.steps):
+            words = [step.message if failed[k] else ""] * bool(run.failed)
+            bars = [float(p) / BAR for p in step.pressure]
+            rows.append([k + 1, *bars, *(values[k] for values in columns.values()), str(step.status), *words])
+        self.show(header, rows, name, csv=table_text(run), failed=failed)
 
     def _copy(self) -> None:
         ui.clipboard.write(self._csv)
@@ -207,8 +243,7 @@ class Chart:
         self._place.set_visibility(bool(traces))
         if traces and self._plot is None:  # plotly cannot draw where nothing is shown
             with self._place:
-                self._plot = ui.plotly({"data": [], "layout": {}}).classes("w-full h-full").mark(self._marker)
-                self._plot.props(f"data-testid={self._marker}")
+                self._plot = named(ui.plotly({"data": [], "layout": {}}).classes("w-full h-full"), self._marker)
         self._draw()
 
     def _draw(self) -> None:
@@ -222,20 +257,18 @@ class Chart:
         self._plot.update_figure({"data": self._traces, "layout": layout, "config": figure_config()})
 
 
-def line(x: Sequence[float], y: Sequence[float], colour: str, name: str = "", **more: Any) -> dict[str, Any]:
+def marks(x: Numbers, y: Numbers, colour: str, name: str = "", **more: Any) -> dict[str, Any]:
+    """Return a trace of marks; one without a number is left out."""
+    shown = {"x": list(map(_number, x)), "y": list(map(_number, y)), "marker": {"color": colour, **more}}
+    return {"type": "scatter", "mode": "markers", "name": name, **shown}
+
+
+def line(x: Numbers, y: Numbers, colour: str, name: str = "", **more: Any) -> dict[str, Any]:
     """Return a trace of a line with marks; there is a gap where there is no number. A long one is thinned evenly."""
-    every = -(-len(x) // MOST_MARKS) if x else 1
-    kept = sorted({*range(0, len(x), every), len(x) - 1} if x else set())
-    return {
-        "type": "scatter",
-        "mode": "lines+markers",
-        "x": [_number(x[k]) for k in kept],
-        "y": [_number(y[k]) for k in kept],
-        "name": name,
-        "line": {"color": colour, "width": 2},
-        "marker": {"color": colour, "size": 6},
-        **more,
-    }
+    every = -(-len(x) // MOST_MARKS) or 1
+    kept = sorted({*range(0, len(x), every), *range(len(x))[-1:]})
+    trace = marks([x[k] for k in kept], [y[k] for k in kept], colour, name, size=6)
+    return trace | {"mode": "lines+markers", "line": {"color": colour, "width": 2}} | more
 
 
 def _number(value: float) -> float | None:
@@ -275,8 +308,24 @@ def csv_drop(marker: str, label: str, take: Callable[[str, bytes], None]) -> ui.
         max_file_size=LARGEST_FILE,
         auto_upload=True,
     )
-    box.props(f"accept=.csv,text/csv flat bordered color=transparent text-color=primary data-testid={marker}")
-    return box.classes("w-full softnlp-drop").mark(marker)
+    box.props("accept=.csv,text/csv flat bordered color=transparent text-color=primary")
+    return named(box.classes("w-full softnlp-drop"), marker)
+
+
+def downloads(*files: tuple[str, str, str]) -> dict[str, Callable[[], str]]:
+    """Show a button for each file to take away, and return where its text is put by name once there is one.
+
+    files : name, that of the button, and kind (text/csv).
+    """
+    texts: dict[str, Callable[[], str]] = {}
+
+    def offer(name: str, kind: str) -> None:
+        if name in texts:
+            ui.download.content(texts[name](), name, kind)
+
+    for name, mark, kind in files:
+        button(name, "download", mark, partial(offer, name, kind))
+    return texts
 
 
 # The list of files is empty at once: a dropped one is named by the tab.

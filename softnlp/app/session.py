@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,9 @@ from softnlp.base.errors import InputError
 from softnlp.base.reading import LARGEST_TOML, one_line, read_bytes, read_text, shown
 from softnlp.base.units import BAR
 from softnlp.scenario.read import Scenario, load_scenario, placed, scenario_from_text
+
+if TYPE_CHECKING:
+    from softnlp.app.view import RobotView
 
 Array = NDArray[np.float64]
 Listener = Callable[[], None]
@@ -139,6 +143,30 @@ class Session:
         self.document.replace(table, values)
         self.reread()
 
+    def table(self, name: str) -> dict[str, Any]:
+        """Return a table of the scenario as plain Python; empty where there is none."""
+        return self.document.table(name)
+
+    def put(self, table: str, values: Mapping[str, object]) -> None:
+        """Put these keys in place of a whole table's where they say something else."""
+        if values != self.table(table):
+            self.change_all(table, values)
+
+    def take_file(
+        self, table: str, name: str, content: bytes, others: Mapping[str, object], refused: Callable[[InputError], bool]
+    ) -> None:
+        """Keep a file and name it in a table beside other keys; raises `InputError` and restores what is `refused`."""
+        before = self.table(table)
+        self.change_all(table, {**others, "file": self.keep(name, content)})
+        if (problem := self.problem) is not None and refused(problem):
+            self.change_all(table, before or None)
+            raise InputError(problem.message)
+
+    def follow(self, refresh: Listener) -> None:
+        """Call a function now and after each change of the scenario."""
+        refresh()
+        self.on_scenario(refresh)
+
     def choose(self, study: str) -> None:
         """Turn to another study of the same robot."""
         if study != self.document.study:
@@ -150,6 +178,11 @@ class Session:
         self.pressure = np.asarray(pressure, dtype=float)
         self.follows_file = False
         self._tell(self._pressure_listeners)
+
+    def use_pressure(self, pressure: Array) -> None:
+        """Show the pose at a pressure found for a robot, where this one has as many sets."""
+        if len(pressure) == len(self.pressure):
+            self.set_pressure(pressure)
 
     def show_step(self, index: int) -> None:
         """Show a step of the scenario's own pressures."""
@@ -245,3 +278,11 @@ class Session:
     def _tell(listeners: list[Listener]) -> None:
         for listener in tuple(listeners):
             listener()
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """What panels and tabs of one page share: its scenario and its 3-D view."""
+
+    session: Session
+    view: RobotView

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json as json_module
 import math
-import os
 import shlex
 import sys
 import tempfile
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softnlp.base.errors import InputError
+from softnlp.base.processes import processors
 from softnlp.base.units import MILLIMETRE
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, interrupt_asked, say
 from softnlp.cli.study import beside
@@ -67,7 +67,7 @@ def sweep(
     if asked.study != "workspace":
         raise InputError(f"expected a scenario of study 'workspace'; {asked.path} is of study {asked.study!r}")
     folder = out or Path("results") / scenario.stem
-    summary = _run(asked, folder, workers=workers, cluster=cluster, resume=resume, csv=csv)
+    summary = _run(asked, folder, workers=workers or processors(), cluster=cluster, resume=resume, csv=csv)
     return _told(asked, folder, summary)
 
 
@@ -105,7 +105,7 @@ def _run(
             asked,
             folder,
             executor=executor,
-            workers=workers or _processors(),
+            workers=workers or processors(),
             resume=resume,
             progress=bar.show,
             stop=stop,
@@ -177,14 +177,6 @@ def _document(asked: Scenario, folder: Path, summary: SweepSummary, *, kept: boo
         "file": str(folder / WORKSPACE_FILE) if kept and not summary.stopped else None,
         "warnings": list(asked.warnings),
     }
-
-
-def _processors() -> int:
-    """Return how many processors this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on Linux
-        return os.cpu_count() or 1
 
 
 class _Bar(ExitStack):

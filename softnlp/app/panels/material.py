@@ -2,38 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Collection, Mapping
+from functools import partial
+from typing import Any, TypeVar
 
 from nicegui import ui
 
-from softnlp.app.fields import number_field, say_beside, typed
-from softnlp.app.material_figure import LAW_NAMES, MEASURES, law_name, mark_pose, material_figure
-from softnlp.app.material_state import (
-    Form,
-    MaterialState,
-    constants_form,
-    fitted_range,
-    form_of,
-    formula_form,
-    inline,
-    known_silicones,
-    law_or_default,
-    library_form,
-    material_state,
-)
-from softnlp.app.panels.constant_rows import ConstantRows
-from softnlp.app.redraw import Redraw
+from softnlp.app import controls, silicone
+from softnlp.app.live_view import PoseStretch
 from softnlp.app.session import Session
-from softnlp.app.stretch import PoseStretch
-from softnlp.app.theme import darkness, on_dark
+from softnlp.app.theme import Redraw, darkness, on_dark
 from softnlp.model.formula import MAX_LENGTH
 from softnlp.model.laws import LAWS
 from softnlp.model.materials import DENSITY, FITTED_STRETCH, MaterialEntry
 
-_FORMS: Mapping[Form, str] = {"library": "Library", "constants": "Own constants", "formula": "Own formula"}
-_LOOK = "dense outlined hide-bottom-space"
+_FORMS: Mapping[silicone.Form, str] = {"library": "Library", "constants": "Own constants", "formula": "Own formula"}
+T = TypeVar("T", ui.input, ui.textarea)
 _SMALL = "text-xs opacity-80 w-full"
+_LONGEST_NAME = 40
+_MOST_ROWS = 30
 
 
 def material_panel(session: Session) -> None:
@@ -49,24 +36,15 @@ class _MaterialPanel:
         self.dark = darkness()
         self.stretch = PoseStretch(session)
         self.seen = session.document
-        self.left: dict[Form, dict[str, Any]] = {}
+        self.left: dict[silicone.Form, dict[str, Any]] = {}
         self.measure = "engineering_stress"
         self.constants: dict[str, ui.number] = {}
-        self.entries: Mapping[str, MaterialEntry] = known_silicones(session.document, session.folder)
+        self.entries: Mapping[str, MaterialEntry] = silicone.known_silicones(session.document, session.folder)
         self.file = session.document.get("material", "file")
         self.read_from: Any = None
         self.state = self._read()
         with ui.column().classes("w-full gap-2").props("data-testid=material-panel") as self.root:
-            self.form = ui.toggle(dict(_FORMS), on_change=self._form_chosen)
-            self.form.props("dense no-caps spread unelevated size=sm data-testid=material-form").classes("w-full")
-            self.form.mark("material.form")
-            self._identity()
-            self._own_constants()
-            self._own_formula()
-            self.error = ui.label().classes("text-xs text-red-700 dark:text-red-300 leading-tight")
-            self.error.props("data-testid=material-said role=alert").mark("material.said")
-            self._numbers()
-            self._curves()
+            self._build()
         self.redraw = Redraw(self.root, self._draw)
         self.move = Redraw(self.root, self._mark, 0.25, at_rest=True)
         session.on_scenario(self._changed)
@@ -77,61 +55,60 @@ class _MaterialPanel:
 
     # --- controls -----------------------------------------------------------------------------------------------------
 
-    def _identity(self) -> None:
-        self.silicone = ui.select(list(self.entries), label="Silicone", on_change=self._silicone_chosen)
-        self.silicone.props(f"{_LOOK} options-dense data-testid=material-name").classes("w-full")
-        self.silicone.without_auto_validation().mark("material.name")
-        self.own_name = ui.input("Silicone", on_change=lambda event: self._text("name", event.value))
-        self.own_name.props(f"{_LOOK} debounce=300 maxlength=200 data-testid=material-own_name").classes("w-full")
-        self.own_name.without_auto_validation().mark("material.own_name")
-        self.law = ui.select(dict(LAW_NAMES), label="Law", on_change=self._law_chosen)
-        self.law.props(f"{_LOOK} options-dense data-testid=material-model").classes("w-full")
-        self.law.without_auto_validation().mark("material.model")
-        self.own_law = ui.input("Name of the law", on_change=lambda event: self._text("model", event.value))
-        self.own_law.props(f"{_LOOK} debounce=300 maxlength=200 data-testid=material-own_model").classes("w-full")
-        self.own_law.without_auto_validation().mark("material.own_model")
-
-    def _own_constants(self) -> None:
+    def _build(self) -> None:
+        """Build the fields of every form; `_show` hides those of the others."""
+        self.form = self._toggle(dict(_FORMS), "form", self._form_chosen)
+        names = list(self.entries)
+        self.silicone = controls.select(names, "material.name", "Silicone", test="material-name")
+        self.silicone.on_value_change(self._silicone_chosen)
+        self.own_name = self._text_box(ui.input, "Silicone", "name", "own_name", "maxlength=200")
+        self.law = controls.select(dict(silicone.LAW_NAMES), "material.model", "Law", test="material-model")
+        self.law.on_value_change(self._law_chosen)
+        self.own_law = self._text_box(ui.input, "Name of the law", "model", "own_model", "maxlength=200")
         self.constants_box = ui.element("div").classes("grid grid-cols-2 gap-2 w-full items-start")
         self.constants_law = ""
-
-    def _own_formula(self) -> None:
         with ui.column().classes("w-full gap-2") as self.formula_box:
-            self.formula = ui.textarea(
-                "Engineering stress [MPa] =", on_change=lambda event: self._text("formula", event.value)
-            )
-            look = f"{_LOOK} autogrow debounce=300 maxlength={MAX_LENGTH} spellcheck=false input-class=font-mono"
-            self.formula.props(f"{look} data-testid=material-formula")
-            self.formula.classes("w-full").without_auto_validation().mark("material.formula")
+            look = f"autogrow maxlength={MAX_LENGTH} spellcheck=false input-class=font-mono"
+            self.formula = self._text_box(ui.textarea, "Engineering stress [MPa] =", "formula", "formula", look)
             ui.label("Of stretch and the constants below; 0 at stretch 1, rising.").classes(_SMALL)
-            self.rows = ConstantRows(self._rows_changed)
-
-    def _numbers(self) -> None:
-        self.density = number_field(
-            self.session, "material", "density_kg_m3", "Density", "kg/m³", default=lambda: self._density(), step=10
+            self.rows = _ConstantRows(self._rows_changed)
+        self.error = ui.label().classes("text-xs text-red-700 dark:text-red-300 leading-tight")
+        controls.dashed(self.error.props("role=alert"), "material.said")
+        key, test = "density_kg_m3", "material-density_kg_m3"
+        self.density = controls.number_field(
+            self.session, "material", key, "Density", default=self._density, step=10, test=test
         )
-        self.density.props("data-testid=material-density_kg_m3")
         with ui.row().classes("w-full no-wrap gap-2") as self.fitted_box:
-            self.fitted: list[ui.number] = []
-            for k, label in enumerate(("Fitted from stretch", "to stretch")):
-                end = ui.number(label, step=0.1, on_change=self._fitted_changed).without_auto_validation()
-                end.props(f"{_LOOK} debounce=300 no-error-icon data-testid=material-fitted_stretch-{k}")
-                self.fitted.append(end.classes("w-1/2").mark(f"material.fitted_stretch.{k}"))
+            self.fitted = [
+                self._number(label, f"fitted_stretch.{k}", f"material-fitted_stretch-{k}", step=0.1).classes("w-1/2")
+                for k, label in enumerate(("Fitted from stretch", "to stretch"))
+            ]
+        for end in self.fitted:
+            end.on_value_change(self._fitted_changed)
+        measures = {measure: label for measure, (label, _) in silicone.MEASURES.items()}
+        self._toggle(measures, "measure", self._measure_chosen, self.measure)
+        self.plot = controls.dashed(ui.plotly(self._figure()).classes("self-center"), "material.plot")
+        self.caption = controls.dashed(ui.label().classes(_SMALL), "material.caption")
 
-    def _curves(self) -> None:
-        names = {measure: label for measure, (label, _) in MEASURES.items()}
-        choice = ui.toggle(names, value=self.measure, on_change=self._measure_chosen)
-        choice.props("dense no-caps spread unelevated size=sm data-testid=material-measure").classes("w-full")
-        choice.mark("material.measure")
-        self.plot = ui.plotly(self._figure()).classes("self-center").props("data-testid=material-plot")
-        self.plot.mark("material.plot")
-        self.caption = ui.label().classes(_SMALL).props("data-testid=material-caption").mark("material.caption")
+    def _text_box(self, kind: type[T], label: str, key: str, name: str, look: str) -> T:
+        """Show a text of [material] that is a person's own."""
+        box = controls.dashed(kind(label, on_change=lambda event: self._text(key, event.value)), f"material.{name}")
+        return box.props(f"{controls.BOX} debounce=300 {look}").classes("w-full").without_auto_validation()
+
+    @staticmethod
+    def _number(label: str, name: str, test: str, **more: Any) -> ui.number:
+        return controls.number(label, f"material.{name}", look="debounce=300 no-error-icon", test=test, **more)
+
+    @staticmethod
+    def _toggle(options: Any, name: str, act: Callable[[Any], None], value: str | None = None) -> ui.toggle:
+        choice = controls.toggle(options, f"material.{name}", value, f"material-{name}").props("size=sm")
+        return choice.on_value_change(act)
 
     # --- what a person does -------------------------------------------------------------------------------------------
 
     @property
     def _table(self) -> dict[str, Any]:
-        return self.session.document.table("material")
+        return self.session.table("material")
 
     def _entry(self) -> MaterialEntry | None:
         name = self._table.get("name")
@@ -139,62 +116,65 @@ class _MaterialPanel:
 
     def _form_chosen(self, event: Any) -> None:
         table = self._table
-        before = form_of(table)
-        wanted: Form = event.value or before
+        before = silicone.form_of(table)
+        wanted: silicone.Form = event.value or before
         if wanted == before:
             return
         self.left[before] = table
-        kept = self.left.get(wanted)
+        kept, entry, model = self.left.get(wanted), self._entry(), table.get("model")
         if kept is None and wanted == "library":
-            entry = self._entry()
             name = entry.name if entry is not None else next(iter(self.entries))
-            kept = library_form(table, name, law_or_default(table.get("model"), self.entries[name].models))
+            kept = silicone.library_form(table, name, silicone.law_or_default(model, self.entries[name].models))
         elif kept is None and wanted == "constants":
-            kept = constants_form(table, law_or_default(table.get("model"), LAWS), self._entry())
+            kept = silicone.constants_form(table, silicone.law_or_default(model, LAWS), entry)
         elif kept is None:
-            kept = formula_form(table, self._entry())
+            kept = silicone.formula_form(table, entry)
         if "constants" in kept:
-            kept = kept | {"constants": inline(kept["constants"])}
+            kept = kept | {"constants": silicone.inline(kept["constants"])}
         self.session.change_all("material", kept)
 
     def _silicone_chosen(self, event: Any) -> None:
         if event.value is None or event.value == self._table.get("name"):
             return
-        model = law_or_default(self._table.get("model"), self.entries[event.value].models)
-        self.session.change_all("material", library_form(self._table, event.value, model))
+        model = silicone.law_or_default(self._table.get("model"), self.entries[event.value].models)
+        self.session.change_all("material", silicone.library_form(self._table, event.value, model))
 
     def _law_chosen(self, event: Any) -> None:
         if event.value is None or event.value == self._table.get("model"):
             return
-        if form_of(self._table) == "constants":
-            self.session.change_all("material", constants_form(self._table, event.value, self._entry()))
+        if silicone.form_of(self._table) == "constants":
+            self.session.change_all("material", silicone.constants_form(self._table, event.value, self._entry()))
         else:
             self.session.change("material", "model", event.value)
 
     def _text(self, key: str, value: Any) -> None:
-        text = typed(value)
-        form = form_of(self._table)
+        text = controls.typed(value)
+        form = silicone.form_of(self._table)
         if (form == "library") or (form == "constants" and key != "name") or text == self._table.get(key, ""):
             return
         self.session.change("material", key, text)
 
-    def _constant_changed(self, key: str, value: float | None) -> None:
-        constants = self._table.get("constants")
-        if form_of(self._table) != "constants" or not isinstance(constants, dict) or constants.get(key) == value:
+    def _constant_changed(self, key: str, event: Any) -> None:
+        constants, value = self._table.get("constants"), event.value
+        if (
+            silicone.form_of(self._table) != "constants"
+            or not isinstance(constants, dict)
+            or constants.get(key) == value
+        ):
             return
         constants = {k: v for k, v in constants.items() if k != key} | ({} if value is None else {key: value})
-        self.session.change("material", "constants", inline(constants))
+        self.session.change("material", "constants", silicone.inline(constants))
 
     def _rows_changed(self, constants: dict[str, float]) -> None:
-        if form_of(self._table) == "formula" and constants != self._table.get("constants"):
-            self.session.change("material", "constants", inline(constants))
+        if silicone.form_of(self._table) == "formula" and constants != self._table.get("constants"):
+            self.session.change("material", "constants", silicone.inline(constants))
         else:
             self._say()
 
     def _fitted_changed(self) -> None:
         low, high = (field.value for field in self.fitted)
-        wanted = fitted_range(low, high)
-        if form_of(self._table) != "library" and (wanted or list(FITTED_STRETCH)) != self._fitted_shown():
+        wanted = silicone.fitted_range(low, high)
+        if silicone.form_of(self._table) != "library" and (wanted or list(FITTED_STRETCH)) != self._fitted_shown():
             self.session.change("material", "fitted_stretch", wanted)
 
     def _measure_chosen(self, event: Any) -> None:
@@ -203,17 +183,17 @@ class _MaterialPanel:
 
     # --- what is shown ------------------------------------------------------------------------------------------------
 
-    def _read(self) -> MaterialState:
+    def _read(self) -> silicone.MaterialState:
         """Read the silicone again where something about it changed; most changes are of other tables."""
         problem = self.session.problem
         read_from = (self._table, str(problem) if problem is not None and problem.table == "material" else "")
         if read_from == self.read_from:
             return self.state
         self.read_from = read_from
-        return material_state(self.session.document, self.entries, self.session.folder, problem)
+        return silicone.material_state(self.session.document, self.entries, self.session.folder, problem)
 
     def _density(self) -> float:
-        models = getattr(self._entry(), "models", {}) if form_of(self._table) == "library" else {}
+        models = getattr(self._entry(), "models", {}) if silicone.form_of(self._table) == "library" else {}
         return float(next(iter(models.values())).density) if models else DENSITY
 
     def _fitted_shown(self) -> list[Any]:
@@ -233,7 +213,7 @@ class _MaterialPanel:
             self.read_from = None
         if table.get("file") != self.file or self.read_from is None:
             self.file = table.get("file")
-            self.entries = known_silicones(self.session.document, self.session.folder)
+            self.entries = silicone.known_silicones(self.session.document, self.session.folder)
         self.state = self._read()
         form = self.state.form
         self.form.set_value(form)
@@ -250,27 +230,27 @@ class _MaterialPanel:
         self._show_names(table, form)
         self._show_constants(table, form)
         if form == "formula":
-            _put(self.formula, table.get("formula", ""))
+            self.formula.set_value(table.get("formula", ""))
             constants = table.get("constants", {})
             self.rows.show(constants if isinstance(constants, dict) else {})
         for field, value in zip(self.fitted, self._fitted_shown(), strict=True):
-            _put(field, value)
+            field.set_value(value)
         self._say()
 
-    def _show_names(self, table: Mapping[str, Any], form: Form) -> None:
+    def _show_names(self, table: Mapping[str, Any], form: silicone.Form) -> None:
         name, model = table.get("name"), table.get("model")
         if form == "library":
             self.silicone.set_options(list(self.entries), value=name if name in self.entries else None)
         else:
-            _put(self.own_name, name or "")
+            self.own_name.set_value(name or "")
         if form == "formula":
-            _put(self.own_law, model or "")
+            self.own_law.set_value(model or "")
             return
         entry = self._entry()
         laws = list(entry.models) if form == "library" and entry is not None else list(LAWS)
-        self.law.set_options({law: law_name(law) for law in laws}, value=model if model in laws else None)
+        self.law.set_options({law: silicone.law_name(law) for law in laws}, value=model if model in laws else None)
 
-    def _show_constants(self, table: Mapping[str, Any], form: Form) -> None:
+    def _show_constants(self, table: Mapping[str, Any], form: silicone.Form) -> None:
         """Show a field for each constant of the law; another law has others."""
         law = str(table.get("model")) if form == "constants" else ""
         if law != self.constants_law:
@@ -279,17 +259,14 @@ class _MaterialPanel:
             self.constants = {}
             with self.constants_box:
                 for constant in LAWS[law].constants if law in LAWS else ():
-                    self.constants[constant.file_key] = self._constant(constant.file_key, constant.name, constant.unit)
+                    key, unit = constant.file_key, "" if constant.unit == "1" else constant.unit
+                    field = self._number(constant.name, f"constants.{key}", f"material-{key}", unit=unit)
+                    field.props("step=any")
+                    field.on_value_change(partial(self._constant_changed, key))
+                    self.constants[key] = field.classes("w-full")
         given = table.get("constants")
         for key, field in self.constants.items():
-            _put(field, given.get(key) if isinstance(given, dict) else None)
-
-    def _constant(self, key: str, name: str, unit: str) -> ui.number:
-        field = ui.number(name, on_change=lambda event: self._constant_changed(key, event.value))
-        field.props(f"{_LOOK} debounce=300 no-error-icon step=any data-testid=material-{key}").classes("w-full")
-        if unit != "1":
-            field.props(f"suffix={unit}")
-        return field.without_auto_validation().mark(f"material.constants.{key}")
+            field.set_value(given.get(key) if isinstance(given, dict) else None)
 
     def _say(self) -> None:
         """Put what is wrong beside its field; what has none stands below them all."""
@@ -304,25 +281,21 @@ class _MaterialPanel:
             (self.density, "density_kg_m3"),
         )
         for element, key in beside:
-            say_beside(element, said.pop(key, "") if element.visible else "")
-        left = []
-        for key, message in said.items():
-            name = key.removeprefix("constants.")
-            left.append(f"{name}: {message}" if name not in ("", "constants") else message)
-        if self.state.form == "constants":
-            for key, field in self.constants.items():
-                field.props.set_bool("error", f"constants.{key}" in said)
-        self.rows.say("", "")
-        for key, message in said.items():
-            if self.state.form == "formula" and key.startswith("constants."):
-                self.rows.say(key.removeprefix("constants."), message)
+            controls.say_beside(element, said.pop(key, "") if element.visible else "")
+        names = [(key.removeprefix("constants."), message) for key, message in said.items()]
+        left = [message if name in ("", "constants") else f"{name}: {message}" for name, message in names]
+        for key, field in self.constants.items():
+            field.props.set_bool("error", f"constants.{key}" in said)
+        self.rows.say({key.removeprefix("constants.") for key in said if key.startswith("constants.")})
         for end in self.fitted:
             end.props.set_bool("error", "fitted_stretch" in said)
         self.error.set_text(" ".join(left))
         self.error.set_visibility(bool(left))
 
     def _figure(self) -> dict[str, Any]:
-        return material_figure(self.state.material, self.state.others, self.measure, self.stretch(), self.dark())
+        return silicone.material_figure(
+            self.state.material, self.state.others, self.measure, self.stretch(), self.dark()
+        )
 
     def _draw(self) -> None:
         self.plot.update_figure(self._figure())
@@ -330,7 +303,7 @@ class _MaterialPanel:
 
     def _mark(self) -> None:
         """Move the point of the pose; the curves stay."""
-        mark_pose(self.plot.figure, self.state.material, self.measure, self.stretch())
+        silicone.mark_pose(self.plot.figure, self.state.material, self.measure, self.stretch())
         self.plot.update()
         self._describe()
 
@@ -346,7 +319,65 @@ class _MaterialPanel:
         self.caption.set_text(words)
 
 
-def _put(field: Any, value: Any) -> None:
-    """Show a value; a field that shows it already keeps what a person is typing."""
-    if field.value != value:
-        field.set_value(value)
+class _ConstantRows:
+    """Rows of a name and a value; `changed` is called with the constants whenever a person changes one."""
+
+    def __init__(self, changed: Callable[[dict[str, float]], None]) -> None:
+        """Build the table in the current slot, without rows."""
+        self._changed = changed
+        self._rows: list[tuple[ui.element, ui.input, ui.number]] = []
+        self._table = ui.column().classes("w-full gap-1").props("data-testid=material-rows")
+        controls.button("Add constant", "add", "material.add", self._added, test="material-add")
+
+    def show(self, constants: Mapping[str, Any]) -> None:
+        """Show other constants; rows that say this already stay as they are, also while a person types in one."""
+        if self.values()[0] == dict(constants):
+            return
+        self._table.clear()
+        self._rows.clear()
+        for name, value in constants.items():
+            self._row(str(name), value if controls.is_number(value) else None)
+
+    def values(self) -> tuple[dict[str, float], str]:
+        """Return the constants, and what is wrong with the rows."""
+        return silicone.constants_of_rows(
+            [(controls.typed(name.value).strip(), value.value) for _, name, value in self._rows]
+        )
+
+    def say(self, names: Collection[str]) -> None:
+        """Mark the rows of constants with which something is wrong."""
+        for _, field, _ in self._rows:
+            field.props.set_bool("error", controls.typed(field.value).strip() in names)
+
+    def _row(self, name: str, value: float | None) -> None:
+        with self._table, ui.row().classes("w-full no-wrap gap-2 items-center") as row:
+            look = f"{controls.BOX} debounce=300 no-error-icon"
+            name_field = ui.input("Name", value=name, on_change=self._tell).without_auto_validation().classes("w-24")
+            controls.dashed(name_field, "material.constant-name")
+            name_field.props(f"{look} maxlength={_LONGEST_NAME}")
+            value_field = controls.number("Value", "material.constant-value", look=look, test="material-constant-value")
+            entry = (row, name_field, value_field.classes("grow"))
+            value_field.set_value(value).on_value_change(self._tell)
+            remove = controls.button(
+                "",
+                "close",
+                "material.remove",
+                partial(self._removed, entry),
+                "flat dense round size=sm",
+                "material-remove",
+            )
+            remove.props('aria-label="remove this constant"')
+        self._rows.append(entry)
+
+    def _added(self) -> None:
+        if len(self._rows) < _MOST_ROWS:
+            self._row("", None)
+
+    def _removed(self, entry: tuple[ui.element, ui.input, ui.number]) -> None:
+        if entry in self._rows:
+            self._rows.remove(entry)
+            self._table.remove(entry[0])
+            self._tell()
+
+    def _tell(self) -> None:
+        self._changed(self.values()[0])

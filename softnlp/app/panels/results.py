@@ -1,40 +1,45 @@
-"""What was found: certificate in words, numbers, chamber lengths, strains and forces along the rod."""
+"""What was found: certificate in words, numbers, chamber lengths, strains and forces along the rod.
+
+The numbers are taken from the document that `softnlp run --json` prints.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from nicegui import ui
-from numpy.typing import NDArray
 
-from softnlp.app.numbers import NOTHING, Line, certificate_words, step_lines
+from softnlp.app.controls import button, named
 from softnlp.app.parts import Chart, csv_text, line
-from softnlp.base.columns import MM, OUTPUTS, PER_M, Output
+from softnlp.base.columns import MM, OUTPUTS, PER_M, TABLES, Output, written
 from softnlp.base.units import MILLIMETRE
 from softnlp.figures.style import COLOURS
 from softnlp.results import table_text, to_json
 from softnlp.statics.step import Run, Shape
 from softnlp.studies.fields import value
 
-Array = NDArray[np.float64]
-
-_ALONG: Mapping[str, Output] = {
-    key: OUTPUTS[name]
-    for key, name in (
-        ("curvature", "curvature"),
-        ("strain", "shear_extension"),
-        *((name, name) for name in ("force", "moment", "position")),
-    )
+NOTHING = "–"
+_STABILITY = {
+    True: "",
+    False: " The equilibrium is not stable.",
+    None: " Its stability is undefined: a dead tip moment has no potential.",
 }
-
-
+_ALONG: Mapping[str, Output] = {
+    "curvature": OUTPUTS["curvature"],
+    "strain": OUTPUTS["shear_extension"],
+    **{name: OUTPUTS[name] for name in ("force", "moment", "position")},
+}
 _ENDS = {
     "well": ("check_circle", "text-green-700 dark:text-green-400"),
     "warned": ("warning", "text-orange-700 dark:text-orange-300"),
     "failed": ("error", "text-red-700 dark:text-red-300"),
 }
+_GRID = "1fr auto 52px"
 
 
 class ResultsPanel:
@@ -47,42 +52,31 @@ class ResultsPanel:
         self._drawn: Shape | None = None
         with ui.row().classes("w-full items-start no-wrap gap-2"):
             self._icon = ui.icon("hourglass_empty").classes("text-xl shrink-0")
-            self._certificate = ui.label("solving …").classes("text-sm").props("data-testid=certificate")
-            self._certificate.mark("certificate")
+            self._certificate = named(ui.label("solving …").classes("text-sm"), "certificate")
         self._warnings = ui.label().classes("text-xs text-orange-800 dark:text-orange-300 whitespace-pre-line")
         self._warnings.props("data-testid=warnings")
-        self._numbers = ui.grid(columns="1fr auto 52px").classes("w-full gap-x-2 gap-y-0 text-sm mt-2")
+        self._numbers = ui.grid(columns=_GRID).classes("w-full gap-x-2 gap-y-0 text-sm mt-2")
         with ui.row().classes("w-full gap-1"):
-            ui.button("Copy", icon="content_copy", on_click=self._copy).props(
-                "flat dense no-caps size=sm data-testid=results-copy"
-            )
-            ui.button("CSV", icon="download", on_click=self._download).props(
-                "flat dense no-caps size=sm data-testid=results-csv"
-            )
-            ui.button("JSON", icon="download", on_click=self._download_json).props(
-                "flat dense no-caps size=sm data-testid=results-json"
-            )
+            for words, icon, act in (
+                ("Copy", "content_copy", self._copy),
+                ("CSV", "download", partial(self._offer, table_text, "softnlp_pose.csv")),
+                ("JSON", "download", partial(self._offer, _json, "softnlp_pose.json", "application/json")),
+            ):
+                button(words, icon, f"results-{words.lower()}", act)
 
     def details(self) -> None:
         """Build what few people look at, in the current slot: chambers, strains and forces along the rod, equations."""
-        with ui.expansion("Chambers").classes("w-full softnlp-panel").props("dense data-testid=chambers"):
-            self._chambers = ui.grid(columns="1fr auto 52px").classes("w-full gap-x-2 gap-y-0 text-sm")
-        self._along = ui.expansion("Strains and internal force along the rod").classes("w-full softnlp-panel")
-        self._along.props("dense data-testid=along")
-        with self._along:
-            self._quantity = ui.select(
-                {key: f"{output.title} [{output.unit.sign or NOTHING}]" for key, output in _ALONG.items()},
-                value="curvature",
-                on_change=lambda: self._draw(force=True),
-            ).props("dense outlined options-dense data-testid=along-quantity")
-            self._quantity.classes("w-full")
+        with _part("Chambers", "chambers"):
+            self._chambers = ui.grid(columns=_GRID).classes("w-full gap-x-2 gap-y-0 text-sm")
+        with _part("Strains and internal force along the rod", "along") as self._along:
+            labels = {key: f"{output.title} [{output.unit.sign or NOTHING}]" for key, output in _ALONG.items()}
+            self._quantity = ui.select(labels, value="curvature", on_change=lambda: self._draw(force=True))
+            self._quantity.props("dense outlined options-dense data-testid=along-quantity").classes("w-full")
             self._plot = Chart("along-plot", f"s [{MM}]", f"u [{PER_M}]", height="14rem")
-            ui.button("CSV along the rod", icon="download", on_click=self._download_along).props(
-                "flat dense no-caps size=sm data-testid=along-csv"
-            )
+            button("CSV along the rod", "download", "along-csv", self._offer_along)
         self._along.on_value_change(lambda: self._draw(force=True))
-        with ui.expansion("Equations").classes("w-full softnlp-panel").props("dense data-testid=equations"):
-            self._equations = ui.grid(columns="1fr auto 52px").classes("w-full gap-x-2 gap-y-0 text-xs")
+        with _part("Equations", "equations"):
+            self._equations = ui.grid(columns=_GRID).classes("w-full gap-x-2 gap-y-0 text-xs")
         ui.timer(0.3, self._draw)
 
     @property
@@ -95,11 +89,11 @@ class ResultsPanel:
         self._run = run
         step = run.steps[0]
         solved = step.status.has_solution
-        _set(self._certificate, certificate_words(run))
+        self._certificate.set_text(certificate_words(run))
         icon, tint = _ENDS["failed" if not solved else "warned" if step.warnings else "well"]
         self._icon.name = icon
         self._icon.classes(replace=f"text-xl shrink-0 {tint}")
-        _set(self._warnings, "\n".join((*run.warnings, *step.warnings)))
+        self._warnings.set_text("\n".join((*run.warnings, *step.warnings)))
         self._warnings.set_visibility(bool(self._warnings.text))
         lines = step_lines(run)
         self._fill(self._numbers, "numbers", lines.numbers)
@@ -121,10 +115,10 @@ class ResultsPanel:
                 for key, line in zip(keys, lines, strict=True):
                     ui.label(line.label).classes("opacity-80")
                     label = ui.label(line.text).classes("tabular-nums text-right")
-                    self._labels[key] = label.props(f'data-testid="value-{line.key}"').mark(f"value.{line.key}")
+                    self._labels[key] = named(label, f"value.{line.key}", f"value-{line.key}")
                     ui.label(line.unit).classes("opacity-70")
         for key, line in zip(keys, lines, strict=True):
-            _set(self._labels[key], line.text)
+            self._labels[key].set_text(line.text)
 
     def _draw(self, *, force: bool = False) -> None:
         """Draw what is chosen along the rod, some time after the last change and only where it is open."""
@@ -155,17 +149,13 @@ class ResultsPanel:
         ui.clipboard.write("\n".join(rows))
         ui.notify("copied", type="positive")
 
-    def _download(self) -> None:
+    def _offer(self, text: Callable[[Run], str], name: str, kind: str = "text/csv") -> None:
         if self._run is not None:
-            ui.download.content(table_text(self._run), "softnlp_pose.csv", "text/csv")
+            ui.download.content(text(self._run), name, kind)
 
-    def _download_json(self) -> None:
-        if self._run is not None:
-            ui.download.content(json.dumps(to_json(self._run), indent=2), "softnlp_pose.json", "application/json")
-
-    def _download_along(self) -> None:
+    def _offer_along(self) -> None:
         if self._run is not None and self._run.steps[0].pose is not None:
-            ui.download.content(along_csv(self._run), "softnlp_along_the_rod.csv", "text/csv")
+            self._offer(along_csv, "softnlp_along_the_rod.csv")
 
 
 def along_csv(run: Run) -> str:
@@ -179,6 +169,73 @@ def along_csv(run: Run) -> str:
     return csv_text(header, columns.tolist())
 
 
-def _set(label: ui.label, text: str) -> None:
-    if label.text != text:
-        label.set_text(text)
+def _json(run: Run) -> str:
+    return json.dumps(to_json(run), indent=2)
+
+
+def _part(label: str, test: str) -> ui.expansion:
+    return ui.expansion(label).classes("w-full softnlp-panel").props(f"dense data-testid={test}")
+
+
+@dataclass(frozen=True)
+class Line:
+    """A number with its name and unit. key : of the JSON document, with the index of an entry, `tip_position_mm.0`."""
+
+    key: str
+    label: str
+    text: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Lines:
+    """The numbers of a step. numbers : without a solution each is a dash. chambers : of each chamber."""
+
+    numbers: list[Line]
+    chambers: list[Line]
+
+
+def step_lines(run: Run) -> Lines:
+    """Return what the document of a run says of its only step."""
+    step = to_json(run)["steps"][0]
+    return Lines(_numbers(run, step), _lines(step, TABLES["page, chambers"], run))
+
+
+def _numbers(run: Run, step: dict[str, Any]) -> list[Line]:
+    names = [*TABLES["page"]]
+    if any(run.loads.tip_force) or any(run.loads.tip_moment) or any(run.loads.gravity):
+        names += TABLES["page, loads"]
+    longer = OUTPUTS["elongation"]
+    backbone, length = step[OUTPUTS["backbone_length"].key], longer.shown(run.robot.length)
+    elongation = None if backbone is None else backbone - length
+    lines = _lines({**step, longer.key: elongation}, [*names, *TABLES["page, wall"]], run)
+    relative = written(None if elongation is None else 100 * elongation / length, ".2f", NOTHING)
+    at = 1 + next(k for k, line in enumerate(lines) if line.key == longer.key)
+    return [*lines[:at], Line(f"{longer.name}_percent", lines[at - 1].label, relative, "% of L₀"), *lines[at:]]
+
+
+def _lines(step: dict[str, Any], names: Sequence[str], run: Run) -> list[Line]:
+    """Return the lines of the outputs that the document of a step has."""
+    lines = []
+    for output in (OUTPUTS[name] for name in names if OUTPUTS[name].key in step):
+        found, title = step[output.key], output.title or output.label.capitalize()
+        if not output.dims:
+            lines.append(Line(output.key, title, written(found, output.page, NOTHING), output.unit.sign))
+            continue
+        indices = list("xyz") if output.dims == ("axis",) else [str(n + 1) for n in range(run.robot.chambers)]
+        for k, index in enumerate(indices):
+            entry = None if found is None or k >= len(found) else found[k]
+            text = written(entry, output.page, NOTHING)
+            lines.append(Line(f"{output.key}.{k}", title.format(index), text, output.unit.sign))
+    return lines
+
+
+def certificate_words(run: Run) -> str:
+    """Return in plain words how a step ended and how well its equations hold, or what to do next."""
+    step = run.steps[0]
+    if not step.status.has_solution or step.residual is None:
+        return f"{step.status.value.replace('_', ' ').capitalize()}: {step.message}."
+    stable = "" if step.pose is None else _STABILITY[step.pose.stable]
+    error = "" if step.discretisation_error is None else f", tip within {step.discretisation_error:.0e} L₀"
+    lead = "Solved" if step.status.value == "solved" else "No contact: the robot does not reach the wall"
+    return f"{lead}, residual {step.residual:.0e}{error}, {step.intervals} intervals.{stable}"

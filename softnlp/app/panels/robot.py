@@ -2,31 +2,55 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
 from math import inf
 from typing import Any
 
 from nicegui import ui
 
-from softnlp.app.fields import number_field, say_beside, tell_problem, typed
-from softnlp.app.redraw import Redraw
-from softnlp.app.robot_state import (
-    OWN,
-    RobotState,
-    changed_keys,
-    effective,
-    library_table,
-    library_value,
-    own_table,
-    robot_state,
-)
+from softnlp.app.asking import sentence
+from softnlp.app.controls import BOX, button, dashed, number_field, say_beside, select, tell_problem, typed
+from softnlp.app.document import Document
+from softnlp.app.live_view import PoseStretch
 from softnlp.app.section_svg import section_svg
 from softnlp.app.session import Session
-from softnlp.app.stretch import PoseStretch
-from softnlp.base.errors import InputError
+from softnlp.app.theme import Redraw
+from softnlp.base.errors import InputError, RobotError
+from softnlp.base.ranges import SIZE
+from softnlp.base.reading import shown
 from softnlp.base.units import MILLIMETRE
-from softnlp.model.robot import ALLOWABLE, DIMENSIONS, MINIMUM_WALL, ROBOTS, Dimension
+from softnlp.model.robot import (
+    ALLOWABLE,
+    DIMENSIONS,
+    LENGTH_LIMITS,
+    MINIMUM_WALL,
+    ROBOTS,
+    Dimension,
+    Robot,
+    Violation,
+    is_number,
+    touching_stretch,
+    violations,
+)
 
-_LABELS = {
+OWN = "own robot"
+"""The name that a robot of one's own starts with."""
+
+_WALLS = ("outer_diameter_mm", "lumen_diameter_mm")
+_CHAMBERS = ("chamber_circle_diameter_mm", "chamber_diameter_mm", "chamber_wall_mm")
+RULE_FIELDS: Mapping[str, tuple[str, ...]] = {
+    "wall_thickness": (*_WALLS, "chamber_diameter_mm", "minimum_wall_mm"),
+    "chamber_overlap": (*_CHAMBERS, "chamber_angle_deg", "chamber_sets", "chambers_per_set"),
+    "chambers_inside_wall": (*_CHAMBERS, *_WALLS),
+}
+"""The keys of [robot] that each rule of manufacture depends on, the most likely one first."""
+
+_ROOMY = replace(ROBOTS["D25L60"], outer_diameter=LENGTH_LIMITS[1], chamber_sets=1, chambers_per_set=1)
+"""A robot in which any possible dimension is possible."""
+_WALL = "minimum_wall_mm"
+_FIELDS = {
     "outer_diameter_mm": ("Outer diameter", 0.5),
     "lumen_diameter_mm": ("Lumen diameter", 0.5),
     "chamber_circle_diameter_mm": ("Chamber circle", 0.5),
@@ -36,9 +60,10 @@ _LABELS = {
     "chamber_sets": ("Chamber sets", 1.0),
     "chambers_per_set": ("Chambers a set", 1.0),
     "chamber_angle_deg": ("Chamber angle", 1.0),
+    _WALL: ("Thinnest wall", 0.1),
 }
-"""Label and step of each dimension."""
-_WALL = "minimum_wall_mm"
+"""Label and step of each field, two in a row."""
+_DIMENSIONS = {d.file_key: d for d in DIMENSIONS}
 _RULES = {
     "wall_thickness": "Allow thin walls",
     "chamber_overlap": "Allow chambers that overlap",
@@ -46,6 +71,7 @@ _RULES = {
 }
 _STRETCHED = "At the stretch of the pose"
 _RESTING = 1.0 + 1e-9  # below it a section looks as made
+_RED, _ORANGE = "text-xs text-red-700 dark:text-red-300", "text-xs text-orange-800 dark:text-orange-300"
 
 
 def robot_panel(session: Session) -> None:
@@ -65,13 +91,23 @@ class _RobotPanel:
         self.lines: dict[str, ui.label] = {}
         with ui.column().classes("w-full gap-2").props("data-testid=robot-panel") as self.root:
             self._choice()
-            self._drawing()
+            self.picture = dashed(ui.html(sanitize=False).classes("w-full"), "robot.section")
+            self.caption = dashed(ui.label().classes("text-xs opacity-80 w-full"), "robot.caption")
+            self.stretched = self._switch(_STRETCHED, "robot.stretched", lambda _: self._draw())
             with ui.element("div").classes("grid grid-cols-2 gap-x-2 gap-y-2 w-full items-start"):
-                self._dimensions()
-            self._allowed()
+                keys = list(_FIELDS)
+                for pair in zip(keys[::2], keys[1::2], strict=True):
+                    for build in (self._field, self._line):
+                        for key in pair:
+                            build(key)
+            self.rules = {
+                rule: self._switch(_RULES[rule], f"robot.allow.{rule}", partial(self._allow, rule))
+                for rule in ALLOWABLE
+            }
+            self.warning = dashed(ui.label().classes(f"{_ORANGE} leading-tight"), "robot.warning")
         self.redraw = Redraw(self.root, self._draw)
         session.on_scenario(self._changed)
-        session.on_pressure(self._pose_changed)
+        session.on_pressure(lambda: self.redraw() if self.stretched.value else None)
         self._show()
         self._draw()
 
@@ -79,100 +115,34 @@ class _RobotPanel:
 
     def _choice(self) -> None:
         options = {name: name for name in ROBOTS} | {OWN: "Own dimensions"}
-        self.choice = ui.select(options, label="Robot", on_change=self._chosen)
-        self.choice.props("dense outlined options-dense hide-bottom-space data-testid=robot-name")
-        self.choice.without_auto_validation().classes("w-full").mark("robot.name")
-        self.own_name = ui.input("Name", on_change=self._named)
-        self.own_name.props("dense outlined debounce=250 hide-bottom-space maxlength=200 data-testid=robot-own_name")
-        self.own_name.without_auto_validation().classes("w-full").mark("robot.own_name")
+        self.choice = select(options, "robot.name", "Robot", test="robot-name", on_change=self._chosen)
+        self.own_name = dashed(ui.input("Name", on_change=self._named).without_auto_validation(), "robot.own_name")
+        self.own_name.props(f"{BOX} debounce=250 maxlength=200").classes("w-full")
         with ui.row().classes("w-full items-center justify-between no-wrap gap-2") as self.changed_row:
             self.changed_text = ui.label().classes("text-xs opacity-80").props("data-testid=robot-changed")
-            reset = ui.button("Library values", icon="restart_alt", on_click=self._reset)
-            reset.props("flat dense no-caps size=sm data-testid=robot-reset").mark("robot.reset")
+            button("Library values", "restart_alt", "robot.reset", self._reset, test="robot-reset")
 
-    def _drawing(self) -> None:
-        self.picture = ui.html(sanitize=False).classes("w-full").props("data-testid=robot-section")
-        self.picture.mark("robot.section")
-        self.caption = (
-            ui.label().classes("text-xs opacity-80 w-full").props("data-testid=robot-caption").mark("robot.caption")
-        )
-        self.stretched = ui.switch(_STRETCHED, on_change=lambda: self._draw())
-        self.stretched.props("dense size=sm data-testid=robot-stretched").classes("text-xs").mark("robot.stretched")
+    @staticmethod
+    def _switch(words: str, name: str, act: Callable[[bool], None]) -> ui.switch:
+        switch = dashed(ui.switch(words, on_change=lambda event: act(event.value)), name)
+        return switch.props("dense size=sm").classes("text-xs")
 
-    def _dimensions(self) -> None:
-        rows: list[list[Dimension]] = [list(DIMENSIONS[i : i + 2]) for i in range(0, len(DIMENSIONS), 2)]
-        for row in rows:
-            for dimension in row:
-                self._field(dimension)
-            if len(row) == 1:
-                self._wall()
-            for dimension in row:
-                self._line(dimension.file_key)
-        self._line(_WALL)
-
-    def _field(self, dimension: Dimension) -> None:
-        key = dimension.file_key
-        label, step = _LABELS[key]
-        unit = "" if dimension.scale is None else "mm" if key.endswith("_mm") else "°"
-
-        def default() -> float | None:
-            return library_value(self.session.document.table("robot"), dimension)
-
-        field = number_field(
-            self.session,
-            "robot",
-            key,
-            label,
-            unit,
-            default=default,
-            step=step,
-            whole=dimension.scale is None,
-        )
-        self._keep(key, field)
-
-    def _wall(self) -> None:
-        field = number_field(
-            self.session,
-            "robot",
-            _WALL,
-            "Thinnest wall",
-            "mm",
-            default=lambda: MINIMUM_WALL / MILLIMETRE,
-            step=0.1,
-        )
-        self._keep(_WALL, field)
-
-    def _keep(self, key: str, field: ui.number) -> None:
-        field.props(f"data-testid=robot-{key} no-error-icon")
-        self.fields[key] = field
+    def _field(self, key: str) -> None:
+        label, step = _FIELDS[key]
+        dimension = _DIMENSIONS.get(key)
+        default = None if dimension is None else lambda: library_value(self._table, dimension)
+        field = number_field(self.session, "robot", key, label, default=default, step=step, test=f"robot-{key}")
+        self.fields[key] = field.props("no-error-icon")
 
     def _line(self, key: str) -> None:
-        line = (
-            ui.label()
-            .classes("col-span-2 text-xs text-red-700 dark:text-red-300 leading-tight whitespace-pre-line -mt-1")
-            .mark(f"robot.{key}.said")
-        )
-        line.props(f"data-testid=robot-{key}-said role=alert")
-        self.lines[key] = line
-
-    def _allowed(self) -> None:
-        self.rules = {}
-        for rule in ALLOWABLE:
-            switch = ui.switch(_RULES[rule], on_change=lambda event, rule=rule: self._allow(rule, event.value))
-            switch.props(f"dense size=sm data-testid=robot-allow-{rule}").classes("text-xs")
-            self.rules[rule] = switch.mark(f"robot.allow.{rule}")
-        self.warning = (
-            ui.label()
-            .classes("text-xs text-orange-800 dark:text-orange-300 leading-tight")
-            .props("data-testid=robot-warning")
-        )
-        self.warning.mark("robot.warning")
+        look = f"col-span-2 {_RED} leading-tight whitespace-pre-line -mt-1"
+        self.lines[key] = dashed(ui.label().classes(look).props("role=alert"), f"robot.{key}.said")
 
     # --- what a person does -------------------------------------------------------------------------------------------
 
     @property
     def _table(self) -> dict[str, Any]:
-        return self.session.document.table("robot")
+        return self.session.table("robot")
 
     def _chosen(self, event: Any) -> None:
         if event.value is None or event.value == self._shown_choice():
@@ -210,7 +180,7 @@ class _RobotPanel:
         self.choice.set_value(chosen)
         self.own_name.set_visibility(chosen == OWN)
         name = self._table.get("name", "")
-        if chosen == OWN and self.own_name.value != name and isinstance(name, str):
+        if chosen == OWN and isinstance(name, str):
             self.own_name.set_value(name)
         self.changed_row.set_visibility(bool(changed))
         self.changed_text.set_text(f"{len(changed)} dimension{'s' if len(changed) > 1 else ''} of {chosen} changed")
@@ -232,42 +202,158 @@ class _RobotPanel:
         messages = state.said_beside(self.latest)
         for key, line in self.lines.items():
             message = messages.get(key, "")
-            line.set_text(f"{_LABELS.get(key, ('Thinnest wall',))[0]}: {message}" if message else "")
+            line.set_text(f"{_FIELDS[key][0]}: {message}" if message else "")
             line.set_visibility(bool(message))
             say_beside(self.fields[key], "")  # the line has room for it, the field has not
             self.fields[key].props.set_bool("error", bool(message))
         tell_problem(self.session, self.own_name, "robot", "name")
         if messages or state.broken:  # then that is what stands below
             say_beside(self.own_name, "")
-        allowed = [v.message for v in state.broken if v.rule in state.allowed]
-        self.warning.set_text(" ".join(f"{m[0].upper()}{m[1:]}." for m in allowed))
+        allowed = [sentence(v.message) for v in state.broken if v.rule in state.allowed]
+        self.warning.set_text(" ".join(allowed))
         self.warning.set_visibility(bool(allowed))
-
-    def _pose_changed(self) -> None:
-        if self.stretched.value:
-            self.redraw()
 
     def _draw(self) -> None:
         state = robot_state(self.session.document)
-        stretch = self._drawn_stretch()
+        stretch = self.stretch() if self.stretched.value else None
+        if stretch is None or not stretch > _RESTING:
+            stretch = 1.0
         self.stretched.set_text(_STRETCHED if stretch == 1.0 else f"{_STRETCHED}, {stretch:.3g}")
-        if state.robot is None:
-            self._no_drawing("")
-            return
-        try:
-            drawing = section_svg(state.robot, state.red_chambers(stretch), stretch)
-        except InputError as error:
-            self._no_drawing(error.message)
-            return
+        drawing, caption = '<div class="text-center text-xs opacity-70 py-8">No section to draw</div>', ""
+        if (robot := state.robot) is not None:
+            try:
+                drawing = section_svg(robot, state.red_chambers(stretch), stretch)
+            except InputError as error:
+                caption = error.message
+            else:
+                wall = (robot.chamber_wall + robot.outer_wall) / MILLIMETRE
+                touch = f" · chambers touch from stretch {state.touching:.3g}" if 1.0 <= state.touching < inf else ""
+                caption = f"Wall {wall:.3g} mm{touch}"
         self.picture.set_content(drawing)
-        wall = (state.robot.chamber_wall + state.robot.outer_wall) / MILLIMETRE
-        touch = f" · chambers touch from stretch {state.touching:.3g}" if 1.0 <= state.touching < inf else ""
-        self.caption.set_text(f"Wall {wall:.3g} mm{touch}")
+        self.caption.set_text(caption)
 
-    def _no_drawing(self, why: str) -> None:
-        self.picture.set_content('<div class="text-center text-xs opacity-70 py-8">No section to draw</div>')
-        self.caption.set_text(why)
 
-    def _drawn_stretch(self) -> float:
-        value = self.stretch() if self.stretched.value else None
-        return value if value is not None and value > _RESTING else 1.0
+@dataclass(frozen=True, eq=False)
+class RobotState:
+    """A robot as far as the document gives one.
+
+    robot : where every dimension is a possible number, else None. said : by key of [robot], what is wrong with it.
+    broken : rules of manufacture that it breaks. allowed : rules that may be broken.
+    """
+
+    robot: Robot | None
+    said: Mapping[str, str]
+    broken: tuple[Violation, ...]
+    allowed: frozenset[str]
+
+    @property
+    def touching(self) -> float:
+        """Stretch above which neighbouring chambers touch; infinite where there are none."""
+        try:
+            return inf if self.robot is None else touching_stretch(self.robot)
+        except RobotError:  # a lumen wider than the body, which is drawn all the same
+            return inf
+
+    def red_chambers(self, stretch: float = 1.0) -> frozenset[int]:
+        """Return the chambers, from 0, that break a rule, whether it is allowed or not, or touch at this stretch."""
+        red = frozenset(n for violation in self.broken for n in violation.chambers)
+        if self.robot is None or not stretch > self.touching:
+            return red
+        return red | frozenset(range(self.robot.chambers))
+
+    def said_beside(self, latest: str | None = None) -> dict[str, str]:
+        """Return messages by key: of values, and of each rule that may not be broken at one of its keys.
+
+        latest : the key changed last, which has the message where the rule depends on it.
+        """
+        messages = dict(self.said)
+        for violation in self.broken:
+            if violation.rule in self.allowed:
+                continue
+            fields = RULE_FIELDS[violation.rule]
+            key = latest if latest in fields else fields[0]
+            known = [messages[key]] if key in messages else []
+            messages[key] = "\n".join([*known, sentence(violation.message)])
+        return messages
+
+
+def robot_state(document: Document) -> RobotState:
+    """Read the robot of a document; nothing is raised."""
+    table = document.table("robot")
+    allow = table.get("allow")
+    allowed = frozenset(rule for rule in ALLOWABLE if isinstance(allow, list) and rule in allow)
+    values = {d.field: effective(table, d) for d in DIMENSIONS}
+    said = {d.file_key: problem for d in DIMENSIONS if (problem := _problem(d, values[d.field]))}
+    wall = table.get("minimum_wall_mm", MINIMUM_WALL / MILLIMETRE)
+    if not is_number(wall) or not SIZE.low <= wall <= SIZE.high:
+        said["minimum_wall_mm"] = f"expected a length of {SIZE.low:g} to {SIZE.high:g} mm, got {shown(wall)}"
+        wall = MINIMUM_WALL / MILLIMETRE
+    if any(d.file_key in said for d in DIMENSIONS):
+        return RobotState(None, said, (), allowed)
+    name = table.get("name")
+    sizes = {d.field: values[d.field] * (d.scale or 1) for d in DIMENSIONS}
+    robot = Robot(name=name if isinstance(name, str) else OWN, **sizes)
+    try:
+        return RobotState(robot, said, violations(robot, wall * MILLIMETRE), allowed)
+    except RobotError as error:  # two dimensions that do not go together
+        key = next((d.file_key for d in DIMENSIONS if d.field == error.key), "chamber_sets")
+        return RobotState(robot if error.key == "lumen_diameter" else None, {**said, key: error.message}, (), allowed)
+
+
+def effective(table: Mapping[str, Any], dimension: Dimension) -> Any:
+    """Return what holds for a dimension, in the unit of the file: as written, or of the library, or None."""
+    value = table.get(dimension.file_key)
+    return library_value(table, dimension) if value is None else value
+
+
+def library_value(table: Mapping[str, Any], dimension: Dimension) -> float | None:
+    """Return a dimension of the library's robot that the table names, in the unit of the file, or None."""
+    name = table.get("name")
+    if not isinstance(name, str) or name not in ROBOTS:
+        return None
+    value = getattr(ROBOTS[name], dimension.field)
+    return int(value) if dimension.scale is None else float(f"{value / dimension.scale:.12g}")
+
+
+def changed_keys(table: Mapping[str, Any]) -> list[str]:
+    """Return the dimensions that differ from those of the library's robot."""
+    return [d.file_key for d in DIMENSIONS if library_value(table, d) not in (None, effective(table, d))]
+
+
+def library_table(table: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """Return the table with a robot of the library in place of its dimensions; rules stay."""
+    return {"name": name, **_rules(table)}
+
+
+def own_table(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the table with every dimension in full, under a name that is not the library's."""
+    full = {d.file_key: effective(table, d) for d in DIMENSIONS}
+    return {"name": OWN, **{key: value for key, value in full.items() if value is not None}, **_rules(table)}
+
+
+def _rules(table: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: table[key] for key in ("minimum_wall_mm", "allow") if key in table}
+
+
+def _problem(dimension: Dimension, value: Any) -> str | None:
+    """Return why a value is no possible dimension of any robot, or None."""
+    if value is None:
+        return "missing; a robot of your own needs every dimension"
+    if not is_number(value):
+        return f"expected a number, got {shown(value)}"
+    scaled: Any = value if dimension.scale is None else _times(value, dimension.scale)
+    if dimension.scale is None and isinstance(value, float):
+        return f"expected a whole number, got {shown(value)}"
+    try:
+        changed: dict[str, Any] = {dimension.field: scaled}
+        violations(replace(_ROOMY, **changed))
+    except RobotError as error:
+        return error.message if error.key in (dimension.field, "chamber_sets") else None
+    return None
+
+
+def _times(value: Any, scale: float) -> float:
+    try:
+        return float(value * scale)
+    except OverflowError:  # an integer beyond the largest float
+        return float("inf")

@@ -2,41 +2,44 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from nicegui import ui
 from numpy.typing import NDArray
 
-from softnlp.app.asking import failures, run_steps, said, scenario_with, step_rows
-from softnlp.app.fields import number_field, tell_problem, vector_field
-from softnlp.app.parts import Chart, NumberTable, RunRow, line, plain_words
-from softnlp.app.session import Session
-from softnlp.app.stage import Stage
-from softnlp.app.tabs.contact_table import (
-    CLOSURES,
-    WEIGHTS,
-    force_points,
-    of_a_curve,
-    of_a_target,
-    pushing,
-    rising,
-    with_closure,
-    with_mode,
-    with_wall,
-)
+from softnlp.app import controls
+from softnlp.app.asking import Progress, bars, run_steps, said, scenario_with
+from softnlp.app.parts import Chart, NumberTable, line, study_row
+from softnlp.app.session import Session, Stage
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR
 from softnlp.figures.style import colour
-from softnlp.results.table import table_text
 from softnlp.statics.step import Run, Step
 
+Table = dict[str, Any]
 Array = NDArray[np.float64]
+Curve = tuple[str, list[Step]]
+"""Of force against pressure: what it is of, and its steps so far."""
 
 STUDY = "blocked-force"
 MOST_CURVES = 7  # colours that can be told apart
+CLOSURES: Mapping[str, str] = {
+    "compliant": "chambers give way by k_c, one constant for all robots; within 6.5 % on the mean at 1.5 bar",
+    "free": "no chamber constraint, a lower bound: forces come out 20 to 60 % low",
+    "rigid": "chambers keep their free length, an upper bound: forces come out 3 to 5 times high",
+    "weighted": "the paper's least squares, to compare with it: the force depends on the weights",
+}
+_WEIGHTS = {
+    "weight_force_per_N": "Weight of force, W_n [1/N]",
+    "weight_moment_per_Nmm": "Weight of moment, W_m [1/(N mm)]",
+    "weight_length_per_mm": "Weight of length, W_L [1/mm]",
+    "weight_position_per_mm": "Weight of position, W_h [1/mm]",
+}
+_OF_A_WALL = ("offset_mm", "offsets_mm", "offset_ramp", "wall_point_mm", "wall_normal", "target_force_N", "tip_cap_mm")
+_OF_A_FORCE = ("offsets_mm", "offset_ramp", "target_force_N", "weight_sensitivity")
 
 
 def blocked_tab(stage: Stage) -> None:
@@ -52,21 +55,18 @@ def blocked_tab(stage: Stage) -> None:
 def _contact_fields(session: Session) -> None:
     """Show the keys of [contact]."""
 
-    def table() -> dict[str, Any]:
-        return session.document.table("contact")
+    def table() -> Table:
+        return session.table("contact")
 
     def closure() -> str:
         return str(table().get("closure", "compliant"))
 
-    ui.label("Contact").classes("text-base font-medium")
-    mode = ui.toggle({"blocked": "Blocked by a wall", "constrained": "Chambers held"}).mark("contact.mode")
-    mode.props("dense no-caps unelevated spread data-testid=contact.mode").classes("w-full")
+    controls.heading("Contact")
+    mode = controls.toggle({"blocked": "Blocked by a wall", "constrained": "Chambers held"}, "contact.mode")
     options = {key: f"{key.capitalize()}: {use}" for key, use in CLOSURES.items()}
-    select = ui.select(options, label="Closure").classes("w-full").mark("contact.closure")
-    select.props("dense outlined options-dense hide-bottom-space data-testid=contact.closure")
-    select.without_auto_validation()
-    good_for = ui.label("").classes("text-xs opacity-70 -mt-2")
-    reaction = number_field(
+    select = controls.select(options, "contact.closure", "Closure")
+    good_for = ui.label("").classes(f"{controls.HINT} -mt-2")
+    reaction = controls.number_field(
         session,
         "contact",
         "chamber_reaction",
@@ -75,22 +75,20 @@ def _contact_fields(session: Session) -> None:
         step=0.05,
     )
     with ui.column().classes("w-full gap-2") as weights:
-        for key, (label, unit) in WEIGHTS.items():
-            number_field(session, "contact", key, f"{label} [{unit}]")
+        for key, label in _WEIGHTS.items():
+            controls.number_field(session, "contact", key, label, "")
     with ui.column().classes("w-full gap-2") as wall:
-        number_field(session, "contact", "tip_cap_mm", "Tip cap, L_t", "mm", default=lambda: 0.0, step=1)
-        anywhere = ui.switch("Wall by point and normal").mark("contact.wall").props("dense data-testid=contact.wall")
-        offset = number_field(
-            session, "contact", "offset_mm", "Offset of the wall, h", "mm", default=lambda: 0.0, step=1
+        controls.number_field(session, "contact", "tip_cap_mm", "Tip cap, L_t", step=1)
+        anywhere = controls.named(ui.switch("Wall by point and normal").props("dense"), "contact.wall")
+        offset = controls.number_field(
+            session, "contact", "offset_mm", "Offset of the wall, h", default=lambda: 0.0, step=1
         )
         with ui.column().classes("w-full gap-2") as place:
-            vector_field(session, "contact", "wall_point_mm", ("Point x", "y", "z"), "mm")
-            vector_field(session, "contact", "wall_normal", ("Normal x", "y", "z"), "", default=(1.0, 0.0, 0.0))
-            ui.label("The normal is the way in which the wall pushes the robot.").classes("text-xs opacity-70")
-
-    def put(new: dict[str, Any]) -> None:
-        if new != table():
-            session.change_all("contact", new)
+            controls.vector_field(session, "contact", "wall_point_mm", ("Point x", "y", "z"), "mm")
+            controls.vector_field(
+                session, "contact", "wall_normal", ("Normal x", "y", "z"), "", default=(1.0, 0.0, 0.0)
+            )
+            ui.label("The normal is the way in which the wall pushes the robot.").classes(controls.HINT)
 
     def refresh() -> None:
         held = table().get("mode", "blocked") == "constrained"
@@ -99,26 +97,19 @@ def _contact_fields(session: Session) -> None:
         select.set_options(offered, value=closure() if closure() in offered else None)
         select.props(f'display-value="{closure().capitalize()}"' if closure() in CLOSURES else 'display-value=""')
         good_for.set_text(CLOSURES.get(closure(), ""))
-        reaction.set_visibility(closure() == "compliant")
-        weights.set_visibility(closure() == "weighted")
-        wall.set_visibility(not held)
         placed = "wall_point_mm" in table() or "wall_normal" in table()
         anywhere.set_value(placed)
-        place.set_visibility(placed)
-        offset.set_visibility(not placed)
-        tell_problem(session, select, "contact", "closure", "mode")
+        for element, shown in (
+            (reaction, closure() == "compliant"),
+            (weights, closure() == "weighted"),
+            (wall, not held),
+            (place, placed),
+            (offset, not placed),
+        ):
+            element.set_visibility(shown)
+        controls.tell_problem(session, select, "contact", "closure", "mode")
 
-    refresh()
-
-    def choose_closure(closure: str | None) -> None:
-        if closure is not None:
-            put(with_closure(table(), closure))
-
-    def choose_wall(placed: bool) -> None:
-        if placed != ("wall_point_mm" in table()):
-            put(with_wall(table(), placed))
-
-    aside: dict[str, Any] = {}
+    aside: Table = {}
 
     def choose_mode(chosen: str) -> None:
         """Put the keys of the wall aside where there is none, and take them out again."""
@@ -130,20 +121,20 @@ def _contact_fields(session: Session) -> None:
         else:
             new = with_closure(aside | new, str((aside | new).get("closure", "compliant")))
             aside.clear()
-        put(new)
+        session.put("contact", new)
 
+    def choose_closure(closure: str | None) -> None:
+        if closure is not None:
+            session.put("contact", with_closure(table(), closure))
+
+    def choose_wall(placed: bool) -> None:
+        if placed != ("wall_point_mm" in table()):
+            session.put("contact", with_wall(table(), placed))
+
+    session.follow(refresh)
     mode.on_value_change(lambda event: choose_mode(str(event.value)))
     select.on_value_change(lambda event: choose_closure(event.value))
     anywhere.on_value_change(lambda event: choose_wall(event.value))
-    session.on_scenario(refresh)
-
-
-@dataclass(eq=False)
-class _Curve:
-    """A force-pressure curve: what it is of, and its steps so far."""
-
-    name: str
-    steps: list[Step] = field(default_factory=list)
 
 
 class _Curves:
@@ -151,58 +142,49 @@ class _Curves:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._kept: list[_Curve] = []
-        self._last: _Curve | None = None
+        self._kept: list[Curve] = []
+        self._last: Curve | None = None
         self._pressures: list[Array] = []
-        ui.label("Force against pressure").classes("text-base font-medium")
-        self._source = ui.toggle({"ramp": "Ramp to the pose shown", "steps": "Scenario's steps"}, value="ramp")
-        self._source.props("dense no-caps unelevated spread data-testid=blocked.source").classes("w-full")
-        self._source.mark("blocked.source")
-        self._count = ui.number("Steps", value=11, min=2, max=1000, precision=0).mark("blocked.steps")
-        self._count.props("dense outlined hide-bottom-space data-testid=blocked.steps").classes("w-full")
+        controls.heading("Force against pressure")
+        self._source = controls.toggle(
+            {"ramp": "Ramp to the pose shown", "steps": "Scenario's steps"}, "blocked.source", "ramp"
+        )
+        self._count = controls.number("Steps", "blocked.steps", value=11, min=2, max=1000, precision=0).classes(
+            "w-full"
+        )
         self._count.bind_visibility_from(self._source, "value", value="ramp")
-        self._row = RunRow("blocked", "Run the curve", self._begin)
+        self._row = study_row("blocked", "Run the curve", self._asked, self._finish, self._draw)
         self._chart = Chart("blocked.chart", "pressure [bar]", OUTPUTS["blocked_force"].axis)
         with ui.row().classes("gap-1") as self._buttons:
-            keep = ui.button("Keep curve", icon="push_pin", on_click=self._keep).mark("blocked.keep")
-            keep.props("dense flat no-caps size=sm data-testid=blocked.keep")
-            clear = ui.button("Clear kept", icon="clear_all", on_click=self._clear).mark("blocked.clear")
-            clear.props("dense flat no-caps size=sm data-testid=blocked.clear")
+            controls.button("Keep curve", "push_pin", "blocked.keep", self._keep)
+            controls.button("Clear kept", "clear_all", "blocked.clear", self._clear)
         self._buttons.set_visibility(False)
         self._table = NumberTable("blocked.table", self._show_pressure)
-
-    async def _begin(self) -> None:
-        count = self._count.value
-        if self._source.value == "ramp" and not (count and 2 <= count <= 1000):
-            self._row.warn("Steps: expected a whole number from 2 to 1000")
-            return
-        try:
-            contact = of_a_curve(self._session.document.table("contact"))
-            tables: dict[str, Any] = {"contact": contact}
-            if self._source.value == "ramp":
-                tables["pressure"] = {"sequence_bar": rising(self._session.pressure, int(count))}
-            asked = scenario_with(self._session, STUDY, tables)
-        except InputError as error:
-            self._row.warn(plain_words(error))
-            return
-        held = contact.get("mode") == "constrained"
-        curve = _Curve(f"{contact.get('closure', 'compliant')}{', held' if held else ''}, {asked.robot.name}")
-        self._last = curve
-        run = await self._row.do(lambda progress: run_steps(asked, progress, curve.steps.append), self._draw)
-        if run is not None:
-            self._finish(run)
 
     def _finish(self, run: Run) -> None:
         self._draw()
         self._row.say(said(run))
-        header, rows = step_rows(run, {OUTPUTS["blocked_force"].heading: force_points(run.steps)[1]})
-        self._table.show(header, rows, "force_pressure.csv", csv=table_text(run), failed=failures(run))
+        forces = {OUTPUTS["blocked_force"].heading: force_points(run.steps)[1]}
+        self._table.show_steps(run, forces, "force_pressure.csv")
         self._pressures = [step.pressure for step in run.steps]
 
+    def _asked(self) -> Callable[[Progress], Run]:
+        contact, count = of_a_curve(self._session.table("contact")), self._count.value
+        tables: dict[str, Table] = {"contact": contact}
+        if self._source.value == "ramp":
+            if not (count and 2 <= count <= 1000):
+                raise InputError("Steps: expected a whole number from 2 to 1000")
+            tables["pressure"] = {"sequence_bar": rising(self._session.pressure, int(count))}
+        asked = scenario_with(self._session, STUDY, tables)
+        held = contact.get("mode") == "constrained"
+        steps: list[Step] = []
+        self._last = f"{contact.get('closure', 'compliant')}{', held' if held else ''}, {asked.robot.name}", steps
+        return lambda progress: run_steps(asked, progress, steps.append)
+
     def _draw(self) -> None:
-        curves = [*self._kept, *([self._last] if self._last and self._last.steps else [])]
-        points = [(curve.name, *force_points(list(curve.steps))) for curve in curves]
-        self._chart.show([line(x, y, colour(k), name) for k, (name, x, y) in enumerate(points)])
+        curves = [*self._kept, *([self._last] if self._last and self._last[1] else [])]
+        lines = [line(*force_points(list(steps)), colour(k), name) for k, (name, steps) in enumerate(curves)]
+        self._chart.show(lines)
         self._buttons.set_visibility(bool(curves))
 
     def _keep(self) -> None:
@@ -220,49 +202,102 @@ class _Curves:
         self._draw()
 
     def _show_pressure(self, row: int) -> None:
-        if row < len(self._pressures) and len(self._pressures[row]) == len(self._session.pressure):
-            self._session.set_pressure(self._pressures[row])
+        if row < len(self._pressures):
+            self._session.use_pressure(self._pressures[row])
 
 
 def _target(session: Session) -> None:
     """Find the pressure of a force."""
-    ui.label("Pressure for a force").classes("text-base font-medium")
+    controls.heading("Pressure for a force")
     with ui.row().classes("w-full gap-2 no-wrap"):
-        force = ui.number("Force wanted", value=0.5, step=0.1).classes("grow").mark("blocked.target")
-        force.props('dense outlined hide-bottom-space suffix="N" data-testid=blocked.target')
-        highest = ui.number("Highest pressure", value=1.5, step=0.1).classes("grow").mark("blocked.highest")
-        highest.props('dense outlined hide-bottom-space suffix="bar" data-testid=blocked.highest')
+        force = controls.number("Force wanted", "blocked.target", "N", value=0.5, step=0.1).classes("grow")
+        highest = controls.number("Highest pressure", "blocked.highest", "bar", value=1.5, step=0.1).classes("grow")
     found: list[Step] = []
 
-    async def begin() -> None:
+    def asked() -> Callable[[Progress], Run]:
         found.clear()
         use.set_visibility(False)
-        try:
-            if force.value is None or highest.value is None:
-                raise InputError("expected a force and a highest pressure")
-            tables = {
-                "contact": of_a_target(session.document.table("contact"), float(force.value)),
-                "pressure": {"sequence_bar": pushing(session.pressure, float(highest.value))},
-            }
-            asked = scenario_with(session, STUDY, tables)
-        except InputError as error:
-            row.warn(plain_words(error))
-            return
-        run = await row.do(lambda progress: run_steps(asked, progress))
-        if run is None or not run.steps:
+        if force.value is None or highest.value is None:
+            raise InputError("expected a force and a highest pressure")
+        tables = {
+            "contact": of_a_target(session.table("contact"), float(force.value)),
+            "pressure": {"sequence_bar": pushing(session.pressure, float(highest.value))},
+        }
+        scenario = scenario_with(session, STUDY, tables)
+        return lambda progress: run_steps(scenario, progress)
+
+    def finish(run: Run) -> None:
+        if not run.steps:
             return
         step = run.steps[-1]
         if step.status.has_solution and step.contact is not None:
             found.append(step)
-            bars = ", ".join(f"{p / BAR:.4g}" for p in step.pressure)
-            row.say(f"{step.contact.force:.4g} N at {bars} bar")
+            row.say(f"{step.contact.force:.4g} N at {bars(step.pressure)} bar")
             use.set_visibility(True)
         else:
             row.warn(step.message)
 
-    def take() -> None:
-        session.set_pressure(found[0].pressure)
+    row = study_row("blocked.find", "Find the pressure", asked, finish)
+    use = controls.button("Use this pressure", "tune", "blocked.use", lambda: session.set_pressure(found[0].pressure))
+    use.set_visibility(False)
 
-    row = RunRow("blocked.find", "Find the pressure", begin)
-    use = ui.button("Use this pressure", icon="tune", on_click=take)
-    use.props("dense flat no-caps size=sm data-testid=blocked.use").mark("blocked.use").set_visibility(False)
+
+def with_closure(table: Table, closure: str) -> Table:
+    """Return the table under another closure, without the weights where they mean nothing."""
+    kept = {key: v for key, v in table.items() if closure == "weighted" or not key.startswith("weight_")}
+    return _with(kept, "closure", closure, "compliant")
+
+
+def with_mode(table: Table, mode: str) -> Table:
+    """Return the table in another mode: where only the chambers are held there is no wall, and they are held."""
+    if mode == "constrained":
+        table = {key: value for key, value in table.items() if key not in (*_OF_A_WALL, "weight_sensitivity")}
+        if table.get("closure") == "free":
+            table = with_closure(table, "compliant")
+    return _with(table, "mode", mode, "blocked")
+
+
+def with_wall(table: Table, anywhere: bool) -> Table:
+    """Return the table with a wall by point and normal, at first where the offset had it, or with an offset.
+
+    The normal is that of a wall which the unbent tip, at x = 0, is not behind.
+    """
+    plain = {key: v for key, v in table.items() if key not in ("offset_mm", "wall_point_mm", "wall_normal")}
+    if not anywhere:
+        return plain
+    offset = table.get("offset_mm", 0.0)
+    return {**plain, "wall_point_mm": [offset, 0.0, 0.0], "wall_normal": [-1.0 if offset > 0 else 1.0, 0.0, 0.0]}
+
+
+def of_a_curve(table: Table) -> Table:
+    """Return the table that asks for the force at each pressure."""
+    return {key: value for key, value in table.items() if key not in _OF_A_FORCE}
+
+
+def of_a_target(table: Table, force: float) -> Table:
+    """Return the table that asks for the pressure of a force [N]."""
+    return {**of_a_curve(table), "target_force_N": force}
+
+
+def rising(pressure: Array, steps: int) -> list[list[float]]:
+    """Return rows [bar] that rise together from zero to a pressure (sets,) [Pa]."""
+    return [[float(f"{p / BAR * k / (steps - 1):.12g}") for p in pressure] for k in range(steps)]
+
+
+def pushing(pressure: Array, highest_bar: float) -> list[list[float]]:
+    """Return the row [bar] that bounds the search for a force: the highest in the sets with pressure, or the first."""
+    sets = pressure > 0 if np.any(pressure > 0) else np.arange(len(pressure)) == 0
+    return [[highest_bar if pushes else 0.0 for pushes in sets]]
+
+
+def force_points(steps: Sequence[Step]) -> tuple[list[float], list[float]]:
+    """Return the largest pressure [bar] and the wall's force [N] of each step, nan where it has no solution."""
+    bars = [float(step.pressure.max()) / BAR for step in steps]
+    forces = [step.contact.force if step.status.has_solution and step.contact else float("nan") for step in steps]
+    return bars, forces
+
+
+def _with(table: Table, key: str, value: Any, default: Any) -> Table:
+    """Return the table with a key, which the default does not need."""
+    rest = {k: v for k, v in table.items() if k != key}
+    return rest if value == default else {**rest, key: value}

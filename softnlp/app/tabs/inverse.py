@@ -2,36 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from math import isfinite
+from typing import Any
 
 import numpy as np
 from nicegui import ui
 
-from softnlp.app.asking import failures, run_steps, said, scenario_with, step_rows
-from softnlp.app.fields import number_field
-from softnlp.app.parts import NumberTable, RunRow, plain_words
-from softnlp.app.session import Session
-from softnlp.app.stage import Stage
-from softnlp.app.tabs.target_table import (
-    KINDS,
-    POSITION,
-    Table,
-    count_of,
-    kind_of,
-    rows_of,
-    target_columns,
-    with_added,
-    with_kind,
-    with_number,
-    with_picked,
-    without,
-    words_of,
-)
-from softnlp.base.errors import InputError
-from softnlp.results.table import table_text
-from softnlp.statics.step import Step
+from softnlp.app import controls
+from softnlp.app.asking import Progress, bars, run_steps, said, scenario_with, sentence
+from softnlp.app.parts import NumberTable, study_row
+from softnlp.app.session import Session, Stage
+from softnlp.base.columns import OUTPUTS
+from softnlp.statics.step import Run, Step
+from softnlp.studies.fields import value
+
+Table = dict[str, Any]
 
 STUDY = "inverse"
+POSITION, DIRECTION = OUTPUTS["tip_position"].key, "tip_direction"
+KINDS: Mapping[str, tuple[str, ...]] = {
+    "position": (POSITION,),
+    "direction": (DIRECTION,),
+    "both": (POSITION, DIRECTION),
+}
+_LEFT = {"distance": OUTPUTS["distance"], "angle": OUTPUTS["direction_error"]}
+_FIRST: Mapping[str, list[float]] = {POSITION: [-20.0, 0.0, 62.0], DIRECTION: [0.0, 0.0, 1.0]}
 _FAR = 1e6  # [mm], farther targets are not marked
 MOST_EDITED = 25
 """Targets that have fields of their own; more come from a file."""
@@ -50,37 +47,32 @@ class _Targets:
     """The targets of the scenario: typed, added, picked, marked in the view."""
 
     def __init__(self, stage: Stage) -> None:
-        self._stage = stage
+        self._view = stage.view
         self._session = stage.session
         self._fields: dict[tuple[str, int, int], ui.number] = {}
         self._built: tuple[str, int] | None = None
         self._marked: list[list[float]] | None = None
-        ui.label("Targets of the tip").classes("text-base font-medium")
-        self._kind = ui.toggle({"position": "Position", "direction": "Direction", "both": "Both"})
-        self._kind.props("dense no-caps unelevated spread data-testid=target.kind").classes("w-full").mark(
-            "target.kind"
-        )
+        controls.heading("Targets of the tip")
+        self._kind = controls.toggle({"position": "Position", "direction": "Direction", "both": "Both"}, "target.kind")
         self._rows = ui.column().classes("w-full gap-2")
         with ui.row().classes("w-full items-center gap-2 no-wrap"):
-            self._add = ui.button("Add a target", icon="add", on_click=lambda: self._put(with_added(self._table())))
-            self._add.props("dense flat no-caps size=sm data-testid=target.add").mark("target.add")
-            self._pick = ui.switch("Pick in the view").props("dense data-testid=target.pick").mark("target.pick")
-        self._weight = number_field(
-            self._session, "target", "length_per_radian_mm", "A radian counts as", "mm", default=self._length
+            self._add = controls.button(
+                "Add a target", "add", "target.add", lambda: self._put(with_added(self._table()))
+            )
+            self._pick = controls.named(ui.switch("Pick in the view").props("dense"), "target.pick")
+        self._weight = controls.number_field(
+            self._session, "target", "length_per_radian_mm", "A radian counts as", default=self._length
         )
-        self._problem = ui.label("").classes("text-sm text-negative break-words").mark("target.problem")
-        self._problem.props("data-testid=target.problem")
-        self._refresh()
+        self._problem = controls.problem_label("target.problem")
+        self._session.follow(self._refresh)
         self._kind.on_value_change(lambda event: self._choose(event.value))
-        self._session.on_scenario(self._refresh)
         stage.view.on_pick(self._picked)
 
     def _table(self) -> Table:
-        return self._session.document.table("target")
+        return self._session.table("target")
 
     def _put(self, table: Table) -> None:
-        if table != self._table():
-            self._session.change_all("target", table)
+        self._session.put("target", table)
 
     def _length(self) -> float | None:
         scenario = self._session.scenario
@@ -105,11 +97,9 @@ class _Targets:
                 self._build(kind, count)
         for (key, row, column), field in self._fields.items():
             rows = rows_of(table, key)
-            if row < len(rows) and field.value != rows[row][column]:
+            if row < len(rows):
                 field.set_value(rows[row][column])
-        problem = self._session.problem
-        ours = problem is not None and problem.table in ("target", "bounds")
-        self._problem.set_text(plain_words(problem) if problem is not None and ours else "")
+        self._problem.set_text(controls.problem_of(self._session, "target", "bounds"))
         self._mark_targets()
 
     def _build(self, kind: str, count: int) -> None:
@@ -122,25 +112,28 @@ class _Targets:
                 with ui.row().classes("w-full items-center gap-2 no-wrap"):
                     ui.label(str(row + 1) if place == 0 else "").classes("w-4 text-sm opacity-70 shrink-0")
                     for column, axis in enumerate("xyz"):
-                        name = f"target.{key}.{row}.{column}"
-                        field = ui.number(
+                        field = controls.number(
                             f"{axis} [mm]" if key == POSITION else f"{axis} of axis",
+                            f"target.{key}.{row}.{column}",
+                            look="debounce=250",
                             value=rows_of(self._table(), key)[row][column],
                             on_change=lambda event, at=(key, row, column): self._typed(at, event.value),
                         )
-                        field.props(f"dense outlined debounce=250 hide-bottom-space data-testid={name}")
-                        field.classes("grow min-w-0").mark(name)
-                        self._fields[key, row, column] = field
-                    bin_ = ui.button(icon="close", on_click=lambda _, row=row: self._put(without(self._table(), row)))
-                    bin_.props(f'flat dense round size=sm data-testid=target.remove.{row} aria-label="remove"')
-                    bin_.mark(f"target.remove.{row}").classes("" if place == 0 else "invisible")
+                        self._fields[key, row, column] = field.classes("grow min-w-0")
+                    remove = partial(self._remove, row)
+                    bin_ = controls.button("", "close", f"target.remove.{row}", remove, "flat dense round size=sm")
+                    bin_.props('aria-label="remove"').classes("" if place == 0 else "invisible")
                     bin_.set_enabled(count > 1)
+
+    def _remove(self, row: int) -> None:
+        self._put(without(self._table(), row))
 
     def _typed(self, at: tuple[str, int, int], value: float | None) -> None:
         key, row, column = at
         rows = rows_of(self._table(), key)
         if value is not None and isfinite(value) and row < len(rows) and value != rows[row][column]:
-            self._put(with_number(self._table(), key, row, column, value))
+            rows[row][column] = value
+            self._put({**self._table(), key: rows})
 
     def _picked(self, place: tuple[float, float, float]) -> None:
         if self._session.document.study == STUDY and self._pick.value and 0 < count_of(self._table()) <= MOST_EDITED:
@@ -152,7 +145,7 @@ class _Targets:
         marked = [row for row in rows if all(isinstance(x, int | float) and abs(x) < _FAR for x in row)] or None
         if marked != self._marked:
             self._marked = marked
-            self._stage.view.targets(None if marked is None else np.array(marked, dtype=float))
+            self._view.targets(None if marked is None else np.array(marked, dtype=float))
 
 
 def _bounds(session: Session) -> None:
@@ -163,30 +156,28 @@ def _bounds(session: Session) -> None:
         one = isinstance(rows, list) and len(rows) == 2 and not any(isinstance(row, list) for row in rows)
         return rows if one else None
 
-    fields: list[ui.number] = []
-
     def entered(at: int, value: float | None) -> None:
         now = pair()
         if now is not None and value is not None and isfinite(value) and value != now[at]:
             session.change("bounds", "pressure_bar", [value if k == at else p for k, p in enumerate(now)])
 
     with ui.row().classes("w-full gap-2 no-wrap") as row:
-        for at, (label, name) in enumerate((("Lowest pressure", "lowest"), ("Highest pressure", "highest"))):
-            field = ui.number(label, step=0.1, on_change=lambda event, at=at: entered(at, event.value)).classes("grow")
-            field.props(f'dense outlined debounce=250 hide-bottom-space suffix="bar" data-testid=bounds.{name}')
-            fields.append(field.mark(f"bounds.{name}"))
+        ends = ("Lowest", "Highest")
+        fields = [
+            controls.number(f"{e} pressure", f"bounds.{e.lower()}", "bar", "debounce=250", step=0.1) for e in ends
+        ]
     several = ui.label("Each set has bounds of its own, from the file.").classes("text-sm")
 
     def refresh() -> None:
         now = pair()
         row.set_visibility(now is not None)
         several.set_visibility(now is None)
-        for field, value in zip(fields, now or (), strict=False):
-            if field.value != value:
-                field.set_value(value)
+        for field, bar in zip(fields, now or (), strict=False):
+            field.set_value(bar)
 
-    refresh()
-    session.on_scenario(refresh)
+    session.follow(refresh)
+    for at, field in enumerate(fields):
+        field.classes("grow").on_value_change(lambda event, at=at: entered(at, event.value))
 
 
 class _Search:
@@ -194,28 +185,23 @@ class _Search:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._steps: list[Step] = []
+        self._steps: Sequence[Step] = ()
         self._chosen = 0
-        self._row = RunRow("inverse", "Find the pressures", self._begin)
-        self._use = ui.button("Use these pressures", icon="tune", on_click=self._take).mark("inverse.use")
-        self._use.props("dense outline no-caps size=sm data-testid=inverse.use").classes("px-2")
+        self._row = study_row("inverse", "Find the pressures", self._asked, self._finish)
+        self._use = controls.use_button("Use these pressures", "inverse.use", self._take)
         self._use.set_visibility(False)
         self._table = NumberTable("inverse.table", self._choose)
 
-    async def _begin(self) -> None:
+    def _asked(self) -> Callable[[Progress], Run]:
         self._use.set_visibility(False)
-        try:
-            asked = scenario_with(self._session, STUDY)
-        except InputError as error:
-            self._row.warn(plain_words(error))
+        asked = scenario_with(self._session, STUDY)
+        return lambda progress: run_steps(asked, progress)
+
+    def _finish(self, run: Run) -> None:
+        if not run.steps:
             return
-        run = await self._row.do(lambda progress: run_steps(asked, progress))
-        if run is None or not run.steps:
-            return
-        self._steps = list(run.steps)
-        self._row.say(said(run))
-        header, rows = step_rows(run, target_columns(run))
-        self._table.show(["target", *header[1:]], rows, "targets.csv", csv=table_text(run), failed=failures(run))
+        self._steps = run.steps
+        self._table.show_steps(run, target_columns(run), "targets.csv", "target")
         self._choose(0)
         if len(self._steps) > 1:
             self._row.say(f"{said(run)} A click on a row chooses a target.")
@@ -233,6 +219,77 @@ class _Search:
         self._use.set_text("Use these pressures" if len(self._steps) == 1 else f"Use the pressures of target {row + 1}")
 
     def _take(self) -> None:
-        step = self._steps[self._chosen]
-        if len(step.pressure) == len(self._session.pressure):
-            self._session.set_pressure(step.pressure)
+        self._session.use_pressure(self._steps[self._chosen].pressure)
+
+
+def kind_of(table: Mapping[str, Any]) -> str:
+    """Return what the targets are: a position, a direction, or both."""
+    keys = tuple(key for key in KINDS["both"] if isinstance(table.get(key), list))
+    return next((kind for kind, wanted in KINDS.items() if wanted == keys), "position")
+
+
+def rows_of(table: Mapping[str, Any], key: str) -> list[list[Any]]:
+    """Return the rows of a key, of three entries each."""
+    rows = table.get(key)
+    return [list(row) for row in rows if isinstance(row, list) and len(row) == 3] if isinstance(rows, list) else []
+
+
+def count_of(table: Mapping[str, Any]) -> int:
+    """Return the number of targets."""
+    return max(len(rows_of(table, key)) for key in KINDS["both"])
+
+
+def with_kind(table: Table, kind: str) -> Table:
+    """Return the table with targets of another kind, as many as before."""
+    count = max(count_of(table), 1)
+    gone = KINDS["both"] if kind == "both" else (*KINDS["both"], "length_per_radian_mm")
+    kept = {key: v for key, v in table.items() if key not in gone}
+    return {key: (rows_of(table, key) + [_FIRST[key]] * count)[:count] for key in KINDS[kind]} | kept
+
+
+def with_added(table: Table) -> Table:
+    """Return the table with one more target, like the last."""
+    added = {}
+    for key in KINDS[kind_of(table)]:
+        rows = rows_of(table, key)
+        added[key] = [*rows, list(rows[-1] if rows else _FIRST[key])]
+    return {**table, **added}
+
+
+def without(table: Table, row: int) -> Table:
+    """Return the table without a target; the only one stays."""
+    if count_of(table) < 2:
+        return table
+    return {**table, **{k: [r for j, r in enumerate(rows_of(table, k)) if j != row] for k in KINDS[kind_of(table)]}}
+
+
+def with_picked(table: Table, place_mm: Sequence[float]) -> Table:
+    """Return the table with the last target at a place of the view."""
+    if kind_of(table) == "direction":
+        return table
+    rows = rows_of(table, POSITION)
+    return {**table, POSITION: [*rows[:-1], [round(float(x), 1) for x in place_mm]]}
+
+
+def words_of(step: Step) -> str:
+    """Return in words what was found for a target."""
+    aimed = step.aimed
+    if not step.status.has_solution or aimed is None:
+        return sentence(step.message)
+    known = [(value(output, step), output.unit) for output in _LEFT.values()]
+    left = [f"{size:.2g} {unit}" for size, unit in known if size is not None]
+    return f"Reached at {bars(step.pressure)} bar, {' and '.join(left)} left."
+
+
+def target_columns(run: Run) -> dict[str, list[Any]]:
+    """Return the columns of a table of targets, by label; None where there is none."""
+    columns: dict[str, list[Any]] = {}
+    wanted = OUTPUTS["target"]
+    for step in run.steps:
+        target = value(wanted, step)
+        places = [None] * 3 if target is None else map(float, target)
+        entries = {f"{axis} wanted [{wanted.unit}]": place for axis, place in zip("xyz", places, strict=True)}
+        entries |= {f"{name} left [{output.unit}]": value(output, step) for name, output in _LEFT.items()}
+        for label, entry in entries.items():
+            columns.setdefault(label, []).append(entry)
+    return {label: values for label, values in columns.items() if any(entry is not None for entry in values)}

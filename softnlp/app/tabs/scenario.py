@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import base64
-import io
 import sys
-import zipfile
 from asyncio.subprocess import PIPE, STDOUT, Process
 from pathlib import Path
 
 from nicegui import ui
 
-from softnlp.app.stage import Stage
+from softnlp.app.controls import button, named
+from softnlp.app.files import zipped
+from softnlp.app.session import Stage
 from softnlp.app.theme import darkness, on_dark
 from softnlp.base.errors import SoftnlpError
 
@@ -31,33 +31,25 @@ def scenario_tab(stage: Stage) -> None:
     with ui.column().classes("w-full gap-2 p-2"):
         ui.label("The file behind the screen. Edit it and apply, or run it as the command does.").classes("text-sm")
         editor = ui.codemirror(session.text(), language="TOML", theme="basicLight").classes("w-full h-80 text-xs")
-        editor.props("data-testid=scenario-text").mark("scenario.text")
+        named(editor, "scenario.text", "scenario-text")
         with ui.row().classes("w-full gap-2"):
-            ui.button("Apply", on_click=lambda: apply()).props("no-caps unelevated dense data-testid=scenario-apply")
-            ui.button("Back", on_click=lambda: editor.set_value(session.text())).props(
-                "no-caps flat dense data-testid=scenario-back"
-            ).tooltip("Forget what was typed here")
+            button("Apply", None, "scenario-apply", lambda: apply(), "no-caps unelevated dense")
+            back = button("Back", None, "scenario-back", lambda: editor.set_value(session.text()), "no-caps flat dense")
+            back.tooltip("Forget what was typed here")
             ui.space()
-            run_button = ui.button("Run", icon="play_arrow", on_click=lambda: start()).props(
-                "no-caps unelevated dense data-testid=scenario-run"
-            )
-            stop_button = ui.button("Stop", icon="stop", on_click=lambda: stop()).props(
-                "no-caps outline dense data-testid=scenario-stop"
-            )
+            run_button = button("Run", "play_arrow", "scenario-run", lambda: start(), "no-caps unelevated dense")
+            stop_button = button("Stop", "stop", "scenario-stop", lambda: stop(), "no-caps outline dense")
         stop_button.set_visibility(False)
         output = ui.log(max_lines=400).classes("w-full h-40 text-xs").props("data-testid=scenario-output")
         figure = ui.image().classes("w-full").props("data-testid=scenario-figure")
         figure.set_visibility(False)
-        result = ui.button("Results", icon="download", on_click=lambda: offer()).props(
-            "no-caps flat dense data-testid=scenario-results"
-        )
+        result = button("Results", "download", "scenario-results", lambda: offer(), "no-caps flat dense")
         result.set_visibility(False)
 
     out = session.folder / "results"
 
     def follow() -> None:
-        if editor.value != session.text():
-            editor.set_value(session.text())
+        editor.set_value(session.text())
 
     def apply() -> bool:
         if editor.value == session.text():
@@ -98,7 +90,8 @@ def scenario_tab(stage: Stage) -> None:
             process.terminate()
 
     def offer() -> None:
-        ui.download.content(zipped(out), f"{Path(session.name).stem}_results.zip")
+        found = {str(file.relative_to(out)): file for file in sorted(out.rglob("*")) if file.is_file()}
+        ui.download.content(zipped(found), f"{Path(session.name).stem}_results.zip")
 
     def _switch(on: bool) -> None:
         run_button.set_visibility(not on)
@@ -114,16 +107,6 @@ def scenario_tab(stage: Stage) -> None:
     session.on_scenario(follow)
     session.on_pressure(follow)
     ui.context.client.on_delete(stop)
-
-
-def zipped(folder: Path) -> bytes:
-    """Return the files of a folder as a zip archive."""
-    packed = io.BytesIO()
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
-        for file in sorted(folder.rglob("*")):
-            if file.is_file():
-                archive.write(file, file.relative_to(folder))
-    return packed.getvalue()
 
 
 def _data_url(image: Path) -> str:

@@ -2,35 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import isfinite
 from typing import Any
 
+import numpy as np
 from nicegui import ui
 
-from softnlp.app.asking import failures, run_steps, said, scenario_with, step_rows
-from softnlp.app.fields import tell_problem
-from softnlp.app.parts import Chart, NumberTable, RunRow, csv_drop, line, plain_words
-from softnlp.app.session import Session
-from softnlp.app.stage import Stage
-from softnlp.app.tabs.sequence_table import (
-    MOST_TYPED,
-    QUANTITIES,
-    RAMP,
-    against,
-    rows_of_text,
-    rows_text,
-    series,
-    source_of,
-)
-from softnlp.base.columns import MM
+from softnlp.app import controls
+from softnlp.app.asking import Progress, rows_bar, run_steps, said, scenario_with
+from softnlp.app.parts import Chart, NumberTable, csv_drop, line, study_row
+from softnlp.app.session import Session, Stage
+from softnlp.base.columns import MM, OUTPUTS, Output
 from softnlp.base.errors import InputError
+from softnlp.base.reading import shown
 from softnlp.base.units import BAR
 from softnlp.figures.style import colour
-from softnlp.results.table import table_text
 from softnlp.statics.step import Run, Step
+from softnlp.studies import fields
 
 STUDY = "forward"
+RAMP: Mapping[str, Any] = {"sets": [1], "to_bar": 1.5, "steps": 11}
+MOST_TYPED = 200
+"""Steps that are shown as text to be edited; more come from a file."""
+QUANTITIES: Mapping[str, Output] = {
+    "bending": OUTPUTS["bending_angle"],
+    "length": OUTPUTS["backbone_length"],
+    "tip": OUTPUTS["tip_position"],
+}
 
 
 def sequence_tab(stage: Stage) -> None:
@@ -47,41 +46,32 @@ class _Source:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        ui.label("Pressure sequence").classes("text-base font-medium")
-        self._kind = ui.toggle({"list": "List", "ramp": "Ramp", "file": "CSV file"}).mark("pressure.source")
-        self._kind.props("dense no-caps unelevated spread data-testid=pressure.source").classes("w-full")
+        controls.heading("Pressure sequence")
+        self._kind = controls.toggle({"list": "List", "ramp": "Ramp", "file": "CSV file"}, "pressure.source")
         with ui.column().classes("w-full gap-1") as self._list:
             self._text = ui.textarea("A line a step: the pressure of each set [bar]").classes("w-full font-mono")
-            self._text.props("dense outlined debounce=600 rows=5 data-testid=pressure.sequence_bar")
-            self._text.mark("pressure.sequence_bar")
-            add = ui.button("Add the pressures shown", icon="add", on_click=self._add).mark("pressure.add")
-            add.props("dense flat no-caps size=sm data-testid=pressure.add")
+            controls.named(self._text, "pressure.sequence_bar").props("dense outlined debounce=600 rows=5")
+            controls.button("Add the pressures shown", "add", "pressure.add", self._add)
         with ui.column().classes("w-full gap-2") as self._ramp:
-            self._sets = ui.select([1], multiple=True, label="Sets").classes("w-full").mark("pressure.ramp.sets")
-            self._sets.props("dense outlined use-chips options-dense hide-bottom-space data-testid=pressure.ramp.sets")
+            self._sets = controls.select([1], "pressure.ramp.sets", "Sets", multiple=True, look="use-chips")
             self._numbers: dict[str, ui.number] = {}
             with ui.row().classes("w-full gap-2 no-wrap"):
                 for key, label, unit in (("from_bar", "From", "bar"), ("to_bar", "To", "bar"), ("steps", "Steps", "")):
-                    number = ui.number(label).classes("grow").mark(f"pressure.ramp.{key}")
-                    number.props(f'dense outlined debounce=250 hide-bottom-space suffix="{unit}"')
-                    number.props(f"data-testid=pressure.ramp.{key}")
+                    number = controls.number(label, f"pressure.ramp.{key}", unit, "debounce=250").classes("grow")
+                    number.on_value_change(lambda event, key=key: self._ramped(key, event.value))
                     self._numbers[key] = number
         with ui.column().classes("w-full gap-1") as self._file:
             self._named = ui.label("").classes("text-sm").mark("pressure.file")
             csv_drop("pressure.drop", "Drop a CSV: t_s (optional), p1_bar, p2_bar, …", self._dropped)
-        self._problem = ui.label("").classes("text-sm text-negative break-words").mark("pressure.problem")
-        self._problem.props("data-testid=pressure.problem")
+        self._problem = controls.problem_label("pressure.problem")
         self._asked_file = False
-        self._refresh()
+        session.follow(self._refresh)
         self._kind.on_value_change(lambda event: self._choose(event.value))
         self._text.on_value_change(lambda event: self._typed(event.value))
         self._sets.on_value_change(lambda event: self._ramped("sets", sorted(event.value or [])))
-        for key, number in self._numbers.items():
-            number.on_value_change(lambda event, key=key: self._ramped(key, event.value))
-        session.on_scenario(self._refresh)
 
     def _table(self) -> dict[str, Any]:
-        return self._session.document.table("pressure")
+        return self._session.table("pressure")
 
     def _put(self, table: Mapping[str, Any]) -> None:
         """Make this the scenario's pressures, and show the last of its steps."""
@@ -105,27 +95,23 @@ class _Source:
             sets = session.scenario.robot.chamber_sets if session.scenario is not None else 1
             self._sets.set_options(list(range(1, sets + 1)), value=[k for k in ramp.get("sets", []) if 1 <= k <= sets])
             for key, number in self._numbers.items():
-                value = ramp.get(key, 0.0 if key == "from_bar" else None)
-                if number.value != value:
-                    number.set_value(value)
+                number.set_value(ramp.get(key, 0.0 if key == "from_bar" else None))
         self._named.set_text(f"From {table['file']}" if kind == "file" else "")
-        problem = session.problem
-        ours = problem is not None and problem.table == "pressure"
-        self._problem.set_text(plain_words(problem) if ours and problem is not None else "")
-        tell_problem(session, self._text, "pressure", "sequence_bar")
+        self._problem.set_text(controls.problem_of(session, "pressure"))
+        controls.tell_problem(session, self._text, "pressure", "sequence_bar")
 
     def _show_rows(self, rows: list[list[float]]) -> None:
         many = len(rows) > MOST_TYPED
         self._text.set_enabled(not many)
         if many:
             self._text.set_value(f"{len(rows)} steps; open them as a file to change them")
-        else:
-            try:
-                same = rows_of_text(self._text.value or "") == rows
-            except InputError:
-                same = False
-            if not same:
-                self._text.set_value(rows_text(rows))
+            return
+        try:
+            same = rows_of_text(self._text.value or "") == rows
+        except InputError:
+            same = False
+        if not same:
+            self._text.set_value(rows_text(rows))
 
     def _choose(self, kind: str | None) -> None:
         now = source_of(self._table())
@@ -141,8 +127,7 @@ class _Source:
         """Return the rows of the last sequence that could be read [bar], or those shown where they are too many."""
         scenario = self._session.scenario
         rows: Any = [] if scenario is None else scenario.pressures
-        rows = rows if 0 < len(rows) <= MOST_TYPED else [self._session.pressure]
-        return [[float(f"{p / BAR:.12g}") for p in row] for row in rows]
+        return rows_bar(rows if 0 < len(rows) <= MOST_TYPED else [self._session.pressure])
 
     def _typed(self, text: str | None) -> None:
         if source_of(self._table()) != "list" or not self._text.enabled:
@@ -150,7 +135,7 @@ class _Source:
         try:
             rows = rows_of_text(text or "")
         except InputError as error:
-            self._problem.set_text(plain_words(error))
+            self._problem.set_text(controls.plain_words(error))
             return
         self._problem.set_text("")
         self._put({"sequence_bar": rows})
@@ -158,8 +143,7 @@ class _Source:
     def _add(self) -> None:
         rows = self._table().get("sequence_bar")
         rows = rows if isinstance(rows, list) else []
-        shown = [float(f"{p / BAR:.12g}") for p in self._session.pressure]
-        self._put({"sequence_bar": [*rows, shown]})
+        self._put({"sequence_bar": [*rows, *rows_bar([self._session.pressure])]})
 
     def _ramped(self, key: str, value: Any) -> None:
         ramp = self._table().get("ramp")
@@ -173,15 +157,9 @@ class _Source:
 
     def _dropped(self, name: str, content: bytes) -> None:
         """Take a file of pressures; one that cannot be read leaves the sequence as it was."""
-        session, before = self._session, self._table()
-        kept = session.keep(name, content)
-        session.change_all("pressure", {"file": kept})
-        problem = session.problem
-        if problem is not None and problem.table == "pressure":
-            session.change_all("pressure", before)
-            raise InputError(problem.message)
+        self._session.take_file("pressure", name, content, {}, lambda problem: problem.table == "pressure")
         self._asked_file = False
-        session.show_step(-1)
+        self._session.show_step(-1)
 
 
 class _StepSlider:
@@ -192,9 +170,8 @@ class _StepSlider:
         with ui.row().classes("w-full items-center gap-3 pr-3 no-wrap") as self._row:
             self._label = ui.label("").classes("text-sm shrink-0")
             self._slider = ui.slider(min=1, max=2, value=1, on_change=self._moved).props("snap dense")
-            self._slider.mark("sequence.step").props("data-testid=sequence.step")
-        self._refresh()
-        session.on_scenario(self._refresh)
+            controls.named(self._slider, "sequence.step")
+        session.follow(self._refresh)
         session.on_pressure(self._follow)
 
     def _count(self) -> int:
@@ -227,39 +204,34 @@ class _Results:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._steps: list[Step] = []
-        self._row = RunRow("sequence", "Run all steps", self._begin)
+        self._steps: Sequence[Step] = []
+        self._row = study_row("sequence", "Run all steps", self._asked, self._finish, lambda: self._draw())
+        labels = {key: output.label.capitalize() for key, output in QUANTITIES.items()}
+        axes = {"pressure": "Against pressure", "step": "Against step or time"}
         with ui.row().classes("w-full gap-2 no-wrap") as self._choice:
-            labels = {key: output.label.capitalize() for key, output in QUANTITIES.items()}
-            self._what = ui.select(labels, value="bending", on_change=self._draw).classes("grow")
-            self._along = ui.select(
-                {"pressure": "Against pressure", "step": "Against step or time"}, value="pressure", on_change=self._draw
-            ).classes("grow")
-            for select, name in ((self._what, "sequence.quantity"), (self._along, "sequence.axis")):
-                select.props(f"dense outlined options-dense data-testid={name}").mark(name)
+            self._what, self._along = (
+                controls.select(options, name, value=first, on_change=self._draw).classes("grow", remove="w-full")
+                for options, name, first in (
+                    (labels, "sequence.quantity", "bending"),
+                    (axes, "sequence.axis", "pressure"),
+                )
+            )
         self._choice.set_visibility(False)
         self._chart = Chart("sequence.chart", "", "")
         self._table = NumberTable("sequence.table", self._show_step)
 
-    async def _begin(self) -> None:
-        try:
-            asked = scenario_with(self._session, STUDY)
-        except InputError as error:
-            self._row.warn(plain_words(error))
-            return
+    def _finish(self, run: Run) -> None:
+        self._steps = run.steps
+        self._draw()
+        self._row.say(said(run))
+        self._table.show_steps(run, series(run.steps), "steps.csv")
+
+    def _asked(self) -> Callable[[Progress], Run]:
+        asked = scenario_with(self._session, STUDY)
         steps: list[Step] = []
         self._steps = steps
         self._along.set_value("pressure" if _rises(asked.pressures) else "step")
-        run = await self._row.do(lambda progress: run_steps(asked, progress, steps.append), self._draw)
-        if run is not None:
-            self._steps = list(run.steps)
-            self._finish(run)
-
-    def _finish(self, run: Run) -> None:
-        self._draw()
-        self._row.say(said(run))
-        header, rows = step_rows(run, series(run.steps))
-        self._table.show(header, rows, "steps.csv", csv=table_text(run), failed=failures(run))
+        return lambda progress: run_steps(asked, progress, steps.append)
 
     def _draw(self) -> None:
         steps = list(self._steps)
@@ -277,11 +249,66 @@ class _Results:
             same = len(scenario.pressures) == len(self._steps)
             if same and (scenario.pressures[row] == self._steps[row].pressure).all():
                 self._session.show_step(row)
-            elif len(self._steps[row].pressure) == len(self._session.pressure):
-                self._session.set_pressure(self._steps[row].pressure)
+            else:
+                self._session.use_pressure(self._steps[row].pressure)
 
 
 def _rises(pressures: Any) -> bool:
     """Whether the largest pressure only rises, so that a curve against it is a line."""
     largest = pressures.max(axis=1)
     return bool((largest[1:] > largest[:-1]).all())
+
+
+def source_of(table: Mapping[str, Any]) -> str:
+    """Return where the pressures come from: ramp, file or list."""
+    return next((key for key in ("ramp", "file") if key in table), "list")
+
+
+def rows_text(rows: Sequence[Sequence[float]]) -> str:
+    """Return rows of pressures as a person edits them, a line a step."""
+    return "\n".join(", ".join(f"{p:.12g}" for p in row) for row in rows)
+
+
+def rows_of_text(text: str) -> list[list[float]]:
+    """Return the rows of pressures [bar] that a person typed; commas, semicolons or blanks between the numbers.
+
+    Raises
+    ------
+    InputError
+        For what is not a number, with its line.
+    """
+    rows = []
+    for number, words in enumerate(text.splitlines(), start=1):
+        row = []
+        for word in words.replace(",", " ").replace(";", " ").split():
+            try:
+                row.append(float(word))
+            except ValueError:
+                raise InputError(f"line {number}: expected pressures in bar, got {shown(word)}") from None
+            if not np.isfinite(row[-1]) or "_" in word:
+                raise InputError(f"line {number}: expected a finite number, got {shown(word)}")
+        if row:
+            rows.append(row)
+    if not rows:
+        raise InputError("expected a line of pressures in bar for each step")
+    return rows
+
+
+def series(steps: Sequence[Step], quantities: Iterable[str] = tuple(QUANTITIES)) -> dict[str, list[float]]:
+    """Return what is drawn of steps by column label, nan where a step has no solution."""
+    found: dict[str, list[float]] = {}
+    for output in (QUANTITIES[name] for name in quantities):
+        labels = [output.axis] if not output.dims else [f"tip {x} [{output.unit}]" for x in "xyz"]
+        values = fields.series(output, steps, {"axis": 3}).reshape(-1, len(labels))
+        found |= dict(zip(labels, values.T.tolist(), strict=True))
+    return found
+
+
+def against(steps: Sequence[Step], axis: str) -> tuple[list[float], str]:
+    """Return the numbers and the label of the axis that steps are drawn along: pressure, or time or number."""
+    if axis == "pressure":
+        return [float(step.pressure.max()) / BAR for step in steps], "largest pressure [bar]"
+    times = [step.time for step in steps]
+    if all(time is not None for time in times) and times:
+        return [float(time or 0.0) for time in times], OUTPUTS["t"].axis
+    return [float(k) for k in range(1, len(steps) + 1)], "step"

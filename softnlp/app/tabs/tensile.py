@@ -2,27 +2,58 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+import numpy as np
 from nicegui import ui
 
-from softnlp.app.asking import scenario_with
-from softnlp.app.fields import choice_field, number_field
-from softnlp.app.parts import Chart, NumberTable, RunRow, csv_drop, plain_words
+from softnlp.app import controls
+from softnlp.app.asking import Progress, scenario_with
+from softnlp.app.parts import Chart, NumberTable, csv_drop, downloads, line, marks, study_row
 from softnlp.app.session import Session
-from softnlp.app.tabs.identify_table import law_rows, law_traces
 from softnlp.base.errors import InputError
+from softnlp.figures.style import colour
 from softnlp.results.identify_document import material_file_text, material_table, tensile_table_text
 from softnlp.scenario.read import Scenario
 from softnlp.scenario.tensile import run_tensile
 from softnlp.studies.identify_task import TensileTask
-from softnlp.studies.tensile import LawFit, TensileFit
+from softnlp.studies.tensile import TensileFit
 
-STUDY = "identify"
+T = TypeVar("T")
+Rows = list[list[Any]]
+
+GREY = "#909090"
+_STRESSES = {"engineering": "Engineering: over the area before the test", "true": "True: over the area at the time"}
 _SPECIMEN = {
     "gauge_length_mm": "Gauge length",
     "diameter_mm": "Diameter",
     "width_mm": "Width",
     "thickness_mm": "Thickness",
 }
+_DASHES = ("solid", "dash", "dashdot", "dot", "longdash")
+
+
+def from_files(table: Mapping[str, Any]) -> str:
+    """Return which files a table names, in words."""
+    files = table.get("files") or ([table["file"]] if "file" in table else [])
+    return f"From {', '.join(map(str, files))}" if files else ""
+
+
+def asked_with(session: Session, kind: type[T], what: str, named: bool) -> tuple[Scenario, T]:
+    """Return the identification on the screen and its task of a kind; raises `InputError`.
+
+    what : its file is of. named : whether the scenario names one; else a person is asked for it.
+    """
+    asked = None
+    try:
+        asked = scenario_with(session, "identify")
+    except InputError:
+        if named:
+            raise
+    if asked is None or not isinstance(asked.task, kind):
+        raise InputError(f"Drop a CSV of {what} first.")
+    return asked, asked.task
 
 
 def tensile_part(session: Session) -> None:
@@ -34,44 +65,28 @@ def tensile_part(session: Session) -> None:
 
 def _test(session: Session) -> None:
     """Show the keys of [tensile]."""
-    ui.label("Tensile test").classes("text-base font-medium")
-    named = ui.label("").classes("text-sm").mark("tensile.file")
+    controls.heading("Tensile test")
+    files = ui.label("").classes("text-sm").mark("tensile.file")
 
     def dropped(name: str, content: bytes) -> None:
         """Take a file; what it needs beside it can be typed afterwards, what cannot be read is not taken."""
-        before = session.document.table("tensile")
-        kept = session.keep(name, content)
-        session.change_all("tensile", {**{k: v for k, v in before.items() if k != "files"}, "file": kept})
-        problem = session.problem
-        if problem is not None and problem.table == "tensile" and problem.key == "file":
-            session.change_all("tensile", before or None)
-            raise InputError(problem.message)
+        others = {key: value for key, value in session.table("tensile").items() if key != "files"}
+        session.take_file("tensile", name, content, others, lambda p: (p.table, p.key) == ("tensile", "file"))
 
     csv_drop("tensile.drop", "Drop a CSV: stretch, stress_MPa or displacement_mm, force_N", dropped)
-    choice_field(
-        session,
-        "tensile",
-        "stress",
-        "Stress of the file",
-        {"engineering": "Engineering: over the area before the test", "true": "True: over the area at the time"},
-        default="engineering",
-    )
-    ui.label("The specimen, where the file has force and displacement").classes("text-xs opacity-70")
+    controls.choice_field(session, "tensile", "stress", "Stress of the file", _STRESSES)
+    ui.label("The specimen, where the file has force and displacement").classes(controls.HINT)
     with ui.grid(columns=2).classes("w-full gap-2"):
         for key, label in _SPECIMEN.items():
-            number_field(session, "tensile", key, f"{label} [mm]")
-    told = ui.label("").classes("text-sm text-negative break-words").mark("tensile.problem")
-    told.props("data-testid=tensile.problem")
+            controls.number_field(session, "tensile", key, f"{label} [mm]", "")
+    problem = controls.problem_label("tensile.problem")
 
     def refresh() -> None:
-        table, problem = session.document.table("tensile"), session.problem
-        files = table.get("files") or ([table["file"]] if "file" in table else [])
-        named.set_text(f"From {', '.join(map(str, files))}" if files else "")
-        ours = bool(files) and problem is not None and problem.table in ("tensile", "material")
-        told.set_text(plain_words(problem) if problem is not None and ours else "")
+        words = from_files(session.table("tensile"))
+        files.set_text(words)
+        problem.set_text(controls.problem_of(session, "tensile", "material") if words else "")
 
-    refresh()
-    session.on_scenario(refresh)
+    session.follow(refresh)
 
 
 class _Fit:
@@ -80,43 +95,32 @@ class _Fit:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._fit: TensileFit | None = None
-        self._asked: Scenario | None = None
-        self._row = RunRow("tensile", "Fit the laws", self._begin)
+        self._row = study_row("tensile", "Fit the laws", self._asked, self._finish)
         with ui.column().classes("w-full gap-2") as self._box:
             self._chart = Chart("tensile.chart", "stretch [-]", "engineering stress [kPa]", height="18rem")
             self._table = NumberTable("tensile.laws")
             with ui.row().classes("w-full gap-2 items-center no-wrap"):
-                self._law = ui.select([], label="Law").classes("grow").mark("tensile.law")
-                self._law.props("dense outlined options-dense data-testid=tensile.law")
-                use = ui.button("Use this silicone", icon="tune", on_click=self._use).mark("tensile.use")
-                use.props("dense outline no-caps size=sm data-testid=tensile.use").classes("px-2")
+                self._law = controls.select([], "tensile.law", "Law").classes("grow", remove="w-full")
+                controls.use_button("Use this silicone", "tensile.use", self._use)
             with ui.row().classes("gap-1"):
-                for label, mark, act in (
-                    ("material.toml", "tensile.toml", self._take_material),
-                    ("table.csv", "tensile.csv", self._take_rows),
-                ):
-                    button = ui.button(label, icon="download", on_click=act).mark(mark)
-                    button.props(f"dense flat no-caps size=sm data-testid={mark}")
-            self._told = ui.label("").classes("text-sm whitespace-pre-line break-words").mark("tensile.told")
-            self._told.props("data-testid=tensile.told")
+                self._texts = downloads(
+                    ("material.toml", "tensile.toml", "text/plain"), ("table.csv", "tensile.csv", "text/csv")
+                )
+            self._told = controls.named(ui.label("").classes("text-sm whitespace-pre-line break-words"), "tensile.told")
         self._box.set_visibility(False)
 
-    async def _begin(self) -> None:
-        try:
-            asked = scenario_with(self._session, STUDY)
-            if not isinstance(asked.task, TensileTask):
-                raise InputError("expected a tensile test; drop a CSV first")
-        except InputError as error:
-            missing = "file" not in self._session.document.table("tensile")
-            self._row.warn("Drop a CSV of a tensile test first." if missing else plain_words(error))
-            return
-        fit = await self._row.do(lambda progress: run_tensile(asked))
-        if fit is None:
-            return
-        self._fit, self._asked = fit, asked
+    def _asked(self) -> Callable[[Progress], tuple[TensileTask, TensileFit]]:
+        asked, task = asked_with(self._session, TensileTask, "a tensile test", "file" in self._session.table("tensile"))
+        return lambda progress: (task, run_tensile(asked))
+
+    def _finish(self, done: tuple[TensileTask, TensileFit]) -> None:
+        task, fit = done
+        self._fit = fit
+        self._texts["material.toml"] = lambda: material_file_text(task, fit)
+        self._texts["table.csv"] = lambda: tensile_table_text(task, fit)
         best = fit.best
         usable = [law for law, found in fit.fits.items() if found.material is not None]
-        points = f"{fit.stretch.size} points{asked.task.left_out}"
+        points = f"{fit.stretch.size} points{task.left_out}"
         self._row.say(f"{points}; best: {best.law.name}." if best else f"{points}; no law is a material to use.")
         self._told.set_text("\n".join((*fit.problems, *fit.warnings)))
         self._law.set_options(usable, value=best.law.name if best else None)
@@ -126,16 +130,35 @@ class _Fit:
 
     def _use(self) -> None:
         """Make the fitted law the scenario's silicone."""
-        chosen: LawFit | None = None if self._fit is None else self._fit.fits.get(str(self._law.value))
+        chosen = None if self._fit is None else self._fit.fits.get(str(self._law.value))
         if chosen is None or chosen.material is None:
             return
         self._session.change_all("material", material_table(chosen.material))
         ui.notify("The scenario has this silicone now", position="bottom-right", timeout=2000)
 
-    def _take_material(self) -> None:
-        if self._fit is not None and self._asked is not None and isinstance(self._asked.task, TensileTask):
-            ui.download.content(material_file_text(self._asked.task, self._fit), "material.toml", "text/plain")
 
-    def _take_rows(self) -> None:
-        if self._fit is not None and self._asked is not None and isinstance(self._asked.task, TensileTask):
-            ui.download.content(tensile_table_text(self._asked.task, self._fit), "table.csv", "text/csv")
+def law_rows(fit: TensileFit) -> tuple[list[str], Rows]:
+    """Return header and rows of the laws fitted to a tensile test."""
+    rows: Rows = []
+    for f in fit.fits.values():
+        constants = ", ".join(
+            f"{c.file_key} = {f.constants[c.name] / c.scale:.5g} ± {f.standard_errors[c.name] / c.scale:.2g}"
+            + (f.notes[c.name] and f" ({f.notes[c.name]})")
+            for c in f.law.constants
+        )
+        problem = f.problem and f"{f.status}: {f.problem}"
+        rows.append([f.law.name, f.r_squared, f.misfit.rmse / 1e3, f.misfit.mape, constants, problem])
+    header = ["law", "R²", "rms [kPa]", "mean [%]", "constants ± standard error", "problem"]
+    return (header, rows) if any(row[-1] for row in rows) else (header[:-1], [row[:-1] for row in rows])
+
+
+def law_traces(fit: TensileFit) -> list[dict[str, Any]]:
+    """Return the traces of a tensile test and of the laws fitted to it, stretch against kPa."""
+    low, high = next(iter(fit.fits.values())).fitted_stretch
+    stretch = np.linspace(low, high, 121)
+    traces = [marks(fit.stretch, fit.stress / 1e3, GREY, "data", size=5, symbol=100)]
+    for k, f in enumerate(fit.fits.values()):
+        trace = line(stretch, f.stress(stretch) / 1e3, colour(k), f.law.name, mode="lines")
+        trace["line"] |= {"dash": _DASHES[k % len(_DASHES)]}
+        traces.append(trace)
+    return traces

@@ -11,8 +11,7 @@ from nicegui.element import Element
 from nicegui.events import GenericEventArguments
 from numpy.typing import NDArray
 
-from softnlp.app.view.frame import Frame
-from softnlp.app.view.message import Layout, cloud_message, frame_message, layout_of, robot_message
+from softnlp.app.view.frame import Frame, Layout, cloud_message, frame_message, layout_of, robot_message
 from softnlp.base.units import BAR
 
 Point = tuple[float, float, float]
