@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +24,7 @@ Array = NDArray[np.float64]
 _NEWTON_STEPS = 30
 _SCAN = 17
 _FURTHEST, _APART = 2.0, 1e-7  # of the change of stretch before: how far it is extrapolated; between two shapes
-_HALVINGS, _HALVINGS_LOADED = 40, 18  # of a part of the scan, to the round-off of an arc and of a loose solution
+_WITHIN, _WITHIN_LOADED = 1e-13, 2e-7  # of the path, where contact begins: the round-off of an arc, a loose solution's
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,16 +165,42 @@ class FreeShapes:
         return np.concatenate([[stretch], states.T.ravel()])
 
 
-def from_zero(end: Situation, shapes: FreeShapes, touch: float) -> tuple[Situation, float]:
-    """Return where a path from zero pressure begins, and the fraction of it at which contact is made for good.
+@dataclass(frozen=True, eq=False)
+class Route:
+    """The way to a situation from the one at which its branch begins.
+
+    start : of the free shapes there, see `FreeShapes.begin`. lengths : free chamber lengths (N,) at a fraction of it.
+    """
+
+    begin: Situation
+    shapes: FreeShapes
+    start: tuple[float, Array | None]
+    lengths: Callable[[float], Array]
+
+
+def route_from(begin: Situation, end: Situation, shapes: FreeShapes, start: tuple[float, Array | None]) -> Route:
+    """Return the way between two situations on which every free shape is found as it is asked for."""
+
+    def lengths(u: float) -> Array:
+        situation = begin.towards(end, u)
+        return shapes.tip(situation if end.wall is not None else Situation(situation.pressure, Loads(), None))[0]
+
+    return Route(begin, shapes, start, lengths)
+
+
+def from_zero(end: Situation, shapes: FreeShapes, touch: float) -> Route:
+    """Return the way to a situation from where contact is made for good on the path from zero pressure.
 
     touch : distance [m] within which the contact point touches the wall. Where loads or the offset press the robot into
     the wall already at rest, they grow with the pressure.
     """
+    from scipy.interpolate import CubicSpline
+    from scipy.optimize import brentq
+
     nothing = np.zeros_like(end.pressure)
     shapes.begin(1.0, None)
     if end.wall is None:
-        return Situation(nothing, Loads(), None), 0.0
+        return route_from(Situation(nothing, Loads(), None), end, shapes, shapes.last)
     rest = Situation(nothing, end.loads, end.wall)
     ahead = end.wall.gap(shapes.tip(rest)[1])
     if not ahead >= -touch:
@@ -183,19 +211,27 @@ def from_zero(end: Situation, shapes: FreeShapes, touch: float) -> tuple[Situati
         wall = Wall(end.wall.point + min(shift, 0.0) * end.wall.normal, end.wall.normal)
         rest = Situation(nothing, Loads(), wall)
 
-    def gap_at(t: float) -> float:
+    @cache
+    def at(t: float) -> tuple[Array, float]:
+        """Return the free lengths and the gap at a fraction of the path; inside the wall where they are not found."""
         situation = rest.towards(end, t)
         assert situation.wall is not None
-        return situation.wall.gap(shapes.tip(situation)[1])
+        lengths, point = shapes.tip(situation)
+        return lengths, float(np.nan_to_num(situation.wall.gap(point), nan=-touch))
 
-    grid = np.linspace(0, 1, _SCAN)
-    gaps = np.array([gap_at(t) for t in grid[:-1]])
-    apart = np.flatnonzero(gaps > touch)
-    if apart.size == 0:
+    scan = np.linspace(0, 1, _SCAN).tolist()
+    apart = [k for k, t in enumerate(scan[:-1]) if at(t)[1] > touch]
+    t_0 = 0.0
+    if apart:
+        low, t_0 = scan[apart[-1]], scan[apart[-1] + 1]
+        if at(t_0)[1] <= 0:
+            within = _WITHIN_LOADED if end.loads.act else _WITHIN
+            t_0 = float(brentq(lambda t: at(t)[1], low, t_0, xtol=within))
+    else:
         shapes.begin(1.0, None)
-        return rest, 0.0
-    low, high = float(grid[apart[-1]]), float(grid[apart[-1] + 1])
-    for _ in range(_HALVINGS_LOADED if end.loads.act else _HALVINGS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if gap_at(middle) > 0 else (low, middle)
-    return rest, high
+    route = route_from(rest.towards(end, t_0), end, shapes, shapes.last)
+    known = np.array([at(t)[0] for t in scan]) if end.loads.act else np.full((1, 1), np.nan)
+    if not np.all(np.isfinite(known)):
+        return route
+    along = CubicSpline(scan, known)  # they lead; only those at the end count
+    return replace(route, lengths=lambda u: np.asarray(along(t_0 + u * (1 - t_0))))
