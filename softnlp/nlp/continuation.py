@@ -99,7 +99,7 @@ def follow(
             off = strayed(guess - current.x, trial.x - current.x)
             if predict is not None:
                 off = min(off, distance(trial.x - corrected) / max(_CONTRACTION * distance(trial.x - guess), 1e-300))
-            found, change = off <= 1.0, float(np.clip(np.sqrt(0.5 / max(off, 1e-3)), 0.1, 2.0))
+            found, change = off <= 1.0, float(np.clip(np.cbrt(0.5 / max(off, 1e-3)), 0.1, 2.0))
         if found and (same_branch is None or same_branch(target, trial)):
             if predicted and strayed is not None:
                 missed = scale, trial.x - base

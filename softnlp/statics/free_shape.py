@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 _NEWTON_STEPS = 30
 _SCAN = 17
 _FURTHEST, _APART = 2.0, 1e-7  # of the change of stretch before: how far it is extrapolated; between two shapes
-_WITHIN, _WITHIN_LOADED = 1e-13, 2e-7  # of the path, where contact begins: the round-off of an arc, a loose solution's
+_HALVINGS = 40  # of a part of the scan, to round-off
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,9 +194,6 @@ def from_zero(end: Situation, shapes: FreeShapes, touch: float) -> Route:
     touch : distance [m] within which the contact point touches the wall. Where loads or the offset press the robot into
     the wall already at rest, they grow with the pressure.
     """
-    from scipy.interpolate import CubicSpline
-    from scipy.optimize import brentq
-
     nothing = np.zeros_like(end.pressure)
     shapes.begin(1.0, None)
     if end.wall is None:
@@ -211,27 +208,29 @@ def from_zero(end: Situation, shapes: FreeShapes, touch: float) -> Route:
         wall = Wall(end.wall.point + min(shift, 0.0) * end.wall.normal, end.wall.normal)
         rest = Situation(nothing, Loads(), wall)
 
-    @cache
-    def at(t: float) -> tuple[Array, float]:
-        """Return the free lengths and the gap at a fraction of the path; inside the wall where they are not found."""
+    def at(t: float) -> tuple[float, Array]:
+        """Return the gap and the free lengths at a fraction of the path."""
         situation = rest.towards(end, t)
         assert situation.wall is not None
         lengths, point = shapes.tip(situation)
-        return lengths, float(np.nan_to_num(situation.wall.gap(point), nan=-touch))
+        return situation.wall.gap(point), lengths
 
-    scan = np.linspace(0, 1, _SCAN).tolist()
-    apart = [k for k, t in enumerate(scan[:-1]) if at(t)[1] > touch]
-    t_0 = 0.0
-    if apart:
-        low, t_0 = scan[apart[-1]], scan[apart[-1] + 1]
-        if at(t_0)[1] <= 0:
-            within = _WITHIN_LOADED if end.loads.act else _WITHIN
-            t_0 = float(brentq(lambda t: at(t)[1], low, t_0, xtol=within))
-    else:
+    def gap(t: float) -> float:
+        return at(t)[0] if along is None else float(along(t)[0])
+
+    scan = np.linspace(0, 1, _SCAN)
+    known = np.array([np.append(*at(t)) for t in scan])
+    along = None  # what is found by iterations is interpolated: it leads, and only what is at the end counts
+    if end.loads.act and np.all(np.isfinite(known)):
+        along = ca.interpolant("along", "bspline", [scan.tolist()], known.ravel(), {"algorithm": "not_a_knot"})
+    apart = np.flatnonzero(known[:-1, 0] > touch)
+    low, high = (float(scan[apart[-1]]), float(scan[apart[-1] + 1])) if apart.size else (0.0, 0.0)
+    if not apart.size:
         shapes.begin(1.0, None)
-    route = route_from(rest.towards(end, t_0), end, shapes, shapes.last)
-    known = np.array([at(t)[0] for t in scan]) if end.loads.act else np.full((1, 1), np.nan)
-    if not np.all(np.isfinite(known)):
+    for _ in range(_HALVINGS if apart.size else 0):
+        middle = (low + high) / 2
+        low, high = (middle, high) if gap(middle) > 0 else (low, middle)
+    route = route_from(rest.towards(end, high), end, shapes, shapes.last)
+    if along is None:
         return route
-    along = CubicSpline(scan, known)  # they lead; only those at the end count
-    return replace(route, lengths=lambda u: np.asarray(along(t_0 + u * (1 - t_0))))
+    return replace(route, lengths=lambda u: np.asarray(along(high + u * (1 - high))).ravel()[1:])
