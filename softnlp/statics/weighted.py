@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from softnlp.model.contact_settings import ClosureWeights
 from softnlp.model.rod import STATE_SIZE
+from softnlp.nlp.evaluation import evaluated
 from softnlp.nlp.linear import LinearSolver
 from softnlp.nlp.problem import CompiledProblem
 from softnlp.nlp.solver import Engine, Solution
@@ -179,7 +180,7 @@ class Weighted:
 
         def judged(x: Array) -> tuple[Array, Array]:
             """Return p with the errors that x leaves of the tip equations, and the residual without them."""
-            g = np.asarray(problem.residual(x, none)).ravel()
+            g = evaluated(problem.residual, x, none)[0].ravel()
             given, left = none.copy(), np.where(inverse > 0, self._flat(g[-rows:]), 0.0)
             given[-_GIVEN : given.size - _GIVEN + rows] = left * scale
             g[-rows:] -= left
