@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,12 +16,12 @@ def evaluated(function: ca.Function, *given: ArrayLike) -> list[Array]:
 
     Inputs and outputs are dense, and nothing in the function may fail: an error would not be told.
     """
-    buffer, evaluate = function.buffer()
+    buffer, evaluate = cast(Any, function).buffer()  # its annotations ask for sizes
     columns = [np.asarray(value, float).ravel("F") for value in given]
     found = [np.empty(function.size_out(k), order="F") for k in range(function.n_out())]
     for k, column in enumerate(columns):
-        buffer.set_arg(k, memoryview(column))
+        buffer.set_arg(k, column.data)
     for k, entries in enumerate(found):
-        buffer.set_res(k, memoryview(entries.ravel("K")))
+        buffer.set_res(k, entries.ravel("K").data)
     evaluate()
     return found

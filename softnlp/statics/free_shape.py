@@ -23,7 +23,6 @@ Array = NDArray[np.float64]
 
 _NEWTON_STEPS = 30
 _SCAN = 17
-_FURTHEST, _APART = 2.0, 1e-7  # of the change of stretch before: how far it is extrapolated; between two shapes
 _HALVINGS = 40  # of a part of the scan, to round-off
 
 
@@ -95,7 +94,7 @@ class FreeShapes:
         self._intervals = intervals
         self._tip_cap = tip_cap
         self._last: tuple[float, Array | None] = (1.0, None)
-        self._before: tuple[float, Array] | None = None  # the one found before the last
+        self._arc: Array | None = None  # unloaded, where the last was found: the next moves as it does
         self._balance = stretch_imbalance(functions)
 
     @property
@@ -105,7 +104,7 @@ class FreeShapes:
 
     def begin(self, stretch: float, x: Array | None) -> None:
         """Start again from a known stretch, and from the pose problem's solution x there if it is known."""
-        self._last, self._before = (stretch, x), None
+        self._last, self._arc = (stretch, x), None
 
     def stretch(self, column: Array) -> float:
         """Return the root of the stretch balance next to the last one."""
@@ -123,7 +122,7 @@ class FreeShapes:
         """Return the free chamber lengths (N,) and the contact point (3,) [m]; nan where it is not found."""
         values = self._poses.values(situation.pressure, situation.loads)
         column = self._poses.column(values)
-        last_stretch, last = self._last
+        last = self._last[1]
         stretch = self.stretch(column)
         L_0 = float(self._poses.model.robot.length)
         if not situation.loads.act:
@@ -131,20 +130,15 @@ class FreeShapes:
             return state[STATE_SIZE:] * L_0, (state[:3] + self._tip_cap / L_0 * state[9:12]) * L_0
         grid = self._poses.grid(self._intervals, SEARCHED_BY)
         p = grid.problem.pack(values)
-        guess = last if last is not None else self._poses.arc_guess(grid, p, stretch)
-        if last is not None and self._before is not None:  # pressure and stretch rise together: a secant in the stretch
-            run = last_stretch - self._before[0]
-            if abs(stretch - last_stretch) <= _FURTHEST * abs(run):
-                guess = last + (last - self._before[1]) * ((stretch - last_stretch) / run) if run else last
+        arc = self._poses.arc_guess(grid, p, stretch)
+        guess = arc if last is None else last if self._arc is None else last + arc - self._arc
         solution = grid.stepper.solve(p, guess)
         if last is not None and not solution.holds(10 * grid.stepper.tolerance):
             solution = grid.stepper.solve(p, last)
         if not solution.holds(10 * grid.stepper.tolerance):
             N = self._poses.model.robot.chambers
             return np.full(N, np.nan), np.full(3, np.nan)
-        if last is not None and abs(stretch - last_stretch) > _APART:
-            self._before = last_stretch, last
-        self._last = stretch, solution.x
+        self._last, self._arc = (stretch, solution.x), arc
         found = grid.problem.outputs(x=solution.x, p=p)
         axis = np.asarray(found["tip_rotation"])[:, 2]
         point = np.asarray(found["tip_position"]).ravel() + self._tip_cap * axis
