@@ -91,7 +91,8 @@ def follow(
         if predict is not None:
             corrected = predict(guess, p)
             iterations += 1
-        trial = engine.solve(p, corrected, **left)
+        nearby = distance(corrected - guess) <= 2 * largest_jump  # else Newton leads elsewhere, if anywhere
+        trial = engine.solve(p, corrected, **(left if nearby else {"most_steps": 0}))
         iterations += max(trial.iterations, 1)
         found = trial.holds(tolerance) and distance(trial.x - guess) <= largest_jump
         change = 1.6 if trial.iterations <= 4 else 1.0
