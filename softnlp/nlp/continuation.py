@@ -91,7 +91,8 @@ def follow(
         if predict is not None:
             corrected = predict(guess, p)
             iterations += 1
-        trial = engine.solve(p, corrected, **left)
+        nearby = distance(corrected - guess) <= 2 * largest_jump  # else Newton leads elsewhere, if anywhere
+        trial = engine.solve(p, corrected, **(left if nearby else {"most_steps": 0}))
         iterations += max(trial.iterations, 1)
         found = trial.holds(tolerance) and distance(trial.x - guess) <= largest_jump
         change = 1.6 if trial.iterations <= 4 else 1.0
@@ -99,7 +100,7 @@ def follow(
             off = strayed(guess - current.x, trial.x - current.x)
             if predict is not None:
                 off = min(off, distance(trial.x - corrected) / max(_CONTRACTION * distance(trial.x - guess), 1e-300))
-            found, change = off <= 1.0, float(np.clip(np.sqrt(0.5 / max(off, 1e-3)), 0.1, 2.0))
+            found, change = off <= 1.0, float(np.clip(np.cbrt(0.5 / max(off, 1e-3)), 0.1, 2.0))
         if found and (same_branch is None or same_branch(target, trial)):
             if predicted and strayed is not None:
                 missed = scale, trial.x - base

@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.nlp.evaluation import evaluated
 from softnlp.nlp.linear import LinearSolver
 from softnlp.nlp.optimality import OPTIMAL, kkt_error
 from softnlp.nlp.problem import CompiledProblem
@@ -200,7 +201,7 @@ class Engine:
         problem = self.problem
         x, best, worst_allowed = x_start, np.inf, _DIVERGED
         with self._lock:
-            g = np.asarray(problem.residual(x, p)).ravel()
+            g = evaluated(problem.residual, x, p)[0].ravel()
             size = _size(g)
             if not size < _DIVERGED:
                 return Solution(x, p, size, 0, "the first guess is out of all proportion")
@@ -211,7 +212,7 @@ class Engine:
                     trial = x + linear.solve(x, p, g)
                 except np.linalg.LinAlgError:
                     return Solution(x, p, size, k, "Newton met a singular Jacobian")
-                g = np.asarray(problem.residual(trial, p)).ravel()
+                g = evaluated(problem.residual, trial, p)[0].ravel()
                 new_size = _size(g)
                 if not new_size < worst_allowed:
                     return Solution(x, p, size, k, "Newton diverged")

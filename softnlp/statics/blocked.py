@@ -22,7 +22,7 @@ from softnlp.statics.blocked_grid import Blocked, BlockedGrid, kept_grid, transf
 from softnlp.statics.blocked_step import failed_step, solved_step, touching_step
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.compiled import RodEquations, rod_equations
-from softnlp.statics.free_shape import Free, FreeShapes, free_shape, from_zero
+from softnlp.statics.free_shape import Free, FreeShapes, Route, free_shape, from_zero, route_from
 from softnlp.statics.loadcase import RodFunctions
 from softnlp.statics.pose_grid import iteration_cost
 from softnlp.statics.solver import MOST_INTERVALS, SEARCHED_BY, PoseSolver
@@ -52,15 +52,6 @@ class _Ended:
     iterations: int
     error: float = 0.0
     stopped: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class _Route:
-    """Where a branch is begun, and the free shapes on the way from there; start : of these, see `FreeShapes.begin`."""
-
-    begin: Situation
-    shapes: FreeShapes
-    start: tuple[float, Array | None]
 
 
 class BlockedSolver:
@@ -291,7 +282,7 @@ class BlockedSolver:
             slips = slipping_pressure(begin, end, [(u, aside) for u, (_, aside) in trace])
         return self._examined(grid, final, end, pressed, (slips, trace[-1][1]), free)
 
-    def _route(self, end: Situation, free: Free, near: Blocked | None) -> _Route:
+    def _route(self, end: Situation, free: Free, near: Blocked | None) -> Route:
         """Return the way to `end` from `near`, or from where contact begins on the way from zero pressure."""
         intervals = self.poses.first_intervals(free.column, free.stretch, transcription=SEARCHED_BY)
         solved = free.solved  # the lengths on the way lead, only those at its end count
@@ -299,16 +290,16 @@ class BlockedSolver:
             intervals = min(intervals, solved.intervals)
         shapes = FreeShapes(self.poses, self.functions, intervals, self.contact.tip_cap)
         if near is None:
-            begin, t_0 = from_zero(end, shapes, TOUCHING * float(self.model.robot.length))
-            return _Route(begin.towards(end, t_0), shapes, shapes.last)
+            return from_zero(end, shapes, TOUCHING * float(self.model.robot.length))
         solved = near.free.solved
         on_grid = solved is not None and solved.grid is self.poses.grid(intervals, SEARCHED_BY)
-        return _Route(near.situation, shapes, (near.free.stretch, solved.solution.x if solved and on_grid else None))
+        start = near.free.stretch, solved.solution.x if solved and on_grid else None
+        return route_from(near.situation, end, shapes, start)
 
     def _followed(
         self,
         grid: BlockedGrid,
-        route: _Route,
+        route: Route,
         end: Situation,
         pressed: Array,
         free: Free,
@@ -321,10 +312,8 @@ class BlockedSolver:
         shapes.begin(*route.start)
 
         def path(u: float) -> Array:
-            situation = begin.towards(end, u)
-            alone = situation if self.has_wall else Situation(situation.pressure, Loads(), None)
-            lengths = free.lengths if u >= 1.0 else shapes.tip(alone)[0]
-            return grid.problem.pack(self.values(situation, pressed, lengths))
+            lengths = free.lengths if u >= 1.0 else route.lengths(u)
+            return grid.problem.pack(self.values(begin.towards(end, u), pressed, lengths))
 
         if near is not None:
             x = transferred(near, grid, self.equations.shape)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from softnlp.model.contact_settings import ClosureWeights
 from softnlp.model.numerics import Numerics
+from softnlp.nlp.evaluation import evaluated
 from softnlp.nlp.linear import LinearSolver, SparseSolver
 from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.solver import Engine, Solution, discretisation_correction
@@ -91,7 +92,7 @@ class BlockedGrid:
     def predicted(self, x: Array, p: Array) -> Array:
         """Return x moved along the tangent from a solution towards the one at p; x where the tangent is singular."""
         try:
-            return x + self.condensed.solve(x, p, np.asarray(self.problem.residual(x, p)).ravel())
+            return x + self.condensed.solve(x, p, evaluated(self.problem.residual, x, p)[0].ravel())
         except np.linalg.LinAlgError:
             return x
 

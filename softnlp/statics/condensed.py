@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.nlp.case import Case
+from softnlp.nlp.evaluation import evaluated
 from softnlp.nlp.linear import BorderedSolver, LinearSolver, SparseSolver
 from softnlp.nlp.problem import CompiledProblem
 from softnlp.nlp.transcription import MultipleShooting, Tableau, rk_step
@@ -69,7 +70,7 @@ class CondensedSolver:
         """
         rows, known = len(self._into[0]), self._base.shape[1]
         given = np.zeros(x.size) if g is None else g
-        directions, tip, turned = (np.asarray(part) for part in self._sweep(1)(x, p, given))
+        directions, tip, turned = evaluated(self._sweep(1), x, p, given)
         if not np.max(np.abs(tip)) < _LARGEST:  # nan is not either
             raise np.linalg.LinAlgError("the linearised tip equations are not finite")
         matrix = np.delete(tip, known, axis=1)
@@ -87,7 +88,7 @@ class CondensedSolver:
     def solve_many(self, x: Array, p: Array, G: Array) -> Array:
         """Return the columns dx for as many right sides G (n, r) in one sweep. Raises as `solve`."""
         r, rows, known = G.shape[1], len(self._into[0]), self._base.shape[1]
-        directions, tip, turned = (np.asarray(part) for part in self._sweep(r)(x, p, G))
+        directions, tip, turned = evaluated(self._sweep(r), x, p, G)
         if not np.max(np.abs(tip)) < _LARGEST:  # nan is not either
             raise np.linalg.LinAlgError("the linearised tip equations are not finite")
         matrix = np.delete(tip, np.s_[known : known + r], axis=1)

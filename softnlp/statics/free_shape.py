@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,8 +23,7 @@ Array = NDArray[np.float64]
 
 _NEWTON_STEPS = 30
 _SCAN = 17
-_FURTHEST, _APART = 2.0, 1e-7  # of the change of stretch before: how far it is extrapolated; between two shapes
-_HALVINGS, _HALVINGS_LOADED = 40, 18  # of a part of the scan, to the round-off of an arc and of a loose solution
+_HALVINGS = 40  # of a part of the scan, to round-off
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +94,7 @@ class FreeShapes:
         self._intervals = intervals
         self._tip_cap = tip_cap
         self._last: tuple[float, Array | None] = (1.0, None)
-        self._before: tuple[float, Array] | None = None  # the one found before the last
+        self._arc: Array | None = None  # unloaded, where the last was found: the next moves as it does
         self._balance = stretch_imbalance(functions)
 
     @property
@@ -103,7 +104,7 @@ class FreeShapes:
 
     def begin(self, stretch: float, x: Array | None) -> None:
         """Start again from a known stretch, and from the pose problem's solution x there if it is known."""
-        self._last, self._before = (stretch, x), None
+        self._last, self._arc = (stretch, x), None
 
     def stretch(self, column: Array) -> float:
         """Return the root of the stretch balance next to the last one."""
@@ -121,7 +122,7 @@ class FreeShapes:
         """Return the free chamber lengths (N,) and the contact point (3,) [m]; nan where it is not found."""
         values = self._poses.values(situation.pressure, situation.loads)
         column = self._poses.column(values)
-        last_stretch, last = self._last
+        last = self._last[1]
         stretch = self.stretch(column)
         L_0 = float(self._poses.model.robot.length)
         if not situation.loads.act:
@@ -129,20 +130,15 @@ class FreeShapes:
             return state[STATE_SIZE:] * L_0, (state[:3] + self._tip_cap / L_0 * state[9:12]) * L_0
         grid = self._poses.grid(self._intervals, SEARCHED_BY)
         p = grid.problem.pack(values)
-        guess = last if last is not None else self._poses.arc_guess(grid, p, stretch)
-        if last is not None and self._before is not None:  # pressure and stretch rise together: a secant in the stretch
-            run = last_stretch - self._before[0]
-            if abs(stretch - last_stretch) <= _FURTHEST * abs(run):
-                guess = last + (last - self._before[1]) * ((stretch - last_stretch) / run) if run else last
+        arc = self._poses.arc_guess(grid, p, stretch)
+        guess = arc if last is None else last if self._arc is None else last + arc - self._arc
         solution = grid.stepper.solve(p, guess)
         if last is not None and not solution.holds(10 * grid.stepper.tolerance):
             solution = grid.stepper.solve(p, last)
         if not solution.holds(10 * grid.stepper.tolerance):
             N = self._poses.model.robot.chambers
             return np.full(N, np.nan), np.full(3, np.nan)
-        if last is not None and abs(stretch - last_stretch) > _APART:
-            self._before = last_stretch, last
-        self._last = stretch, solution.x
+        self._last, self._arc = (stretch, solution.x), arc
         found = grid.problem.outputs(x=solution.x, p=p)
         axis = np.asarray(found["tip_rotation"])[:, 2]
         point = np.asarray(found["tip_position"]).ravel() + self._tip_cap * axis
@@ -163,8 +159,31 @@ class FreeShapes:
         return np.concatenate([[stretch], states.T.ravel()])
 
 
-def from_zero(end: Situation, shapes: FreeShapes, touch: float) -> tuple[Situation, float]:
-    """Return where a path from zero pressure begins, and the fraction of it at which contact is made for good.
+@dataclass(frozen=True, eq=False)
+class Route:
+    """The way to a situation from the one at which its branch begins.
+
+    start : of the free shapes there, see `FreeShapes.begin`. lengths : free chamber lengths (N,) at a fraction of it.
+    """
+
+    begin: Situation
+    shapes: FreeShapes
+    start: tuple[float, Array | None]
+    lengths: Callable[[float], Array]
+
+
+def route_from(begin: Situation, end: Situation, shapes: FreeShapes, start: tuple[float, Array | None]) -> Route:
+    """Return the way between two situations on which every free shape is found as it is asked for."""
+
+    def lengths(u: float) -> Array:
+        situation = begin.towards(end, u)
+        return shapes.tip(situation if end.wall is not None else Situation(situation.pressure, Loads(), None))[0]
+
+    return Route(begin, shapes, start, lengths)
+
+
+def from_zero(end: Situation, shapes: FreeShapes, touch: float) -> Route:
+    """Return the way to a situation from where contact is made for good on the path from zero pressure.
 
     touch : distance [m] within which the contact point touches the wall. Where loads or the offset press the robot into
     the wall already at rest, they grow with the pressure.
@@ -172,7 +191,7 @@ def from_zero(end: Situation, shapes: FreeShapes, touch: float) -> tuple[Situati
     nothing = np.zeros_like(end.pressure)
     shapes.begin(1.0, None)
     if end.wall is None:
-        return Situation(nothing, Loads(), None), 0.0
+        return route_from(Situation(nothing, Loads(), None), end, shapes, shapes.last)
     rest = Situation(nothing, end.loads, end.wall)
     ahead = end.wall.gap(shapes.tip(rest)[1])
     if not ahead >= -touch:
@@ -183,19 +202,29 @@ def from_zero(end: Situation, shapes: FreeShapes, touch: float) -> tuple[Situati
         wall = Wall(end.wall.point + min(shift, 0.0) * end.wall.normal, end.wall.normal)
         rest = Situation(nothing, Loads(), wall)
 
-    def gap_at(t: float) -> float:
+    def at(t: float) -> tuple[float, Array]:
+        """Return the gap and the free lengths at a fraction of the path."""
         situation = rest.towards(end, t)
         assert situation.wall is not None
-        return situation.wall.gap(shapes.tip(situation)[1])
+        lengths, point = shapes.tip(situation)
+        return situation.wall.gap(point), lengths
 
-    grid = np.linspace(0, 1, _SCAN)
-    gaps = np.array([gap_at(t) for t in grid[:-1]])
-    apart = np.flatnonzero(gaps > touch)
-    if apart.size == 0:
+    def gap(t: float) -> float:
+        return at(t)[0] if along is None else float(along(t)[0])
+
+    scan = np.linspace(0, 1, _SCAN)
+    known = np.array([np.append(*at(t)) for t in scan])
+    along = None  # what is found by iterations is interpolated: it leads, and only what is at the end counts
+    if end.loads.act and np.all(np.isfinite(known)):
+        along = ca.interpolant("along", "bspline", [scan.tolist()], known.ravel(), {"algorithm": "not_a_knot"})
+    apart = np.flatnonzero(known[:-1, 0] > touch)
+    low, high = (float(scan[apart[-1]]), float(scan[apart[-1] + 1])) if apart.size else (0.0, 0.0)
+    if not apart.size:
         shapes.begin(1.0, None)
-        return rest, 0.0
-    low, high = float(grid[apart[-1]]), float(grid[apart[-1] + 1])
-    for _ in range(_HALVINGS_LOADED if end.loads.act else _HALVINGS):
+    for _ in range(_HALVINGS if apart.size else 0):
         middle = (low + high) / 2
-        low, high = (middle, high) if gap_at(middle) > 0 else (low, middle)
-    return rest, high
+        low, high = (middle, high) if gap(middle) > 0 else (low, middle)
+    route = route_from(rest.towards(end, high), end, shapes, shapes.last)
+    if along is None:
+        return route
+    return replace(route, lengths=lambda u: np.asarray(along(high + u * (1 - high))).ravel()[1:])

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from softnlp.model.contact_settings import ClosureWeights
 from softnlp.model.rod import STATE_SIZE
+from softnlp.nlp.evaluation import evaluated
 from softnlp.nlp.linear import LinearSolver
 from softnlp.nlp.problem import CompiledProblem
 from softnlp.nlp.solver import Engine, Solution
@@ -28,6 +29,7 @@ Array = NDArray[np.float64]
 _GIVEN = 7  # e_n, e_m, e_h are the last of a problem's fixed values
 _STEPS = 60
 _MEMORY = 4
+_SHRINKS = 0.5  # a step of Gauss-Newton's, at least, in a quarter of those that it may take
 _DIVERGED = 1e4
 
 
@@ -177,13 +179,15 @@ class Weighted:
         enough = max(self.tolerance, 1e-10)
 
         def judged(x: Array) -> tuple[Array, Array]:
-            """Return p with the errors that x leaves of the tip equations, and the residual then."""
-            left = np.asarray(problem.residual(x, none)).ravel()[-rows:]
-            given = none.copy()
-            given[-_GIVEN : given.size - _GIVEN + rows] = np.where(inverse > 0, self._flat(left), 0.0) * scale
-            return given, np.asarray(problem.residual(x, given)).ravel()
+            """Return p with the errors that x leaves of the tip equations, and the residual without them."""
+            g = evaluated(problem.residual, x, none)[0].ravel()
+            given, left = none.copy(), np.where(inverse > 0, self._flat(g[-rows:]), 0.0)
+            given[-_GIVEN : given.size - _GIVEN + rows] = left * scale
+            g[-rows:] -= left
+            return given, g
 
-        x, history = x_start, list[tuple[Array, Array]]()
+        x, history, sizes = x_start, list[tuple[Array, Array]](), list[float]()
+        patience = most_steps // 4
         for k in range(most_steps):
             given, g = judged(x)
             if not float(np.max(np.abs(g))) < _DIVERGED:
@@ -194,8 +198,12 @@ class Weighted:
                 return Solution(x, given, float("inf"), k, "the minimum is not determined")
             left = float(np.max(np.abs(dx)))
             if left <= enough * max(1.0, float(np.max(np.abs(x)))):
-                given, g = judged(x + dx)
-                return Solution(x + dx, given, float(np.max(np.abs(g))), k + 1, "minimum of the weighted squares", left)
+                given = judged(x + dx)[0]
+                residual = float(np.max(np.abs(np.asarray(problem.residual(x + dx, given)))))
+                return Solution(x + dx, given, residual, k + 1, "minimum of the weighted squares", left)
+            sizes.append(left)
+            if k >= patience and min(sizes[-patience:]) > _SHRINKS * min(sizes[:-patience]):
+                return Solution(x, given, float("inf"), k + 1, "Gauss-Newton does not converge")
             history.append((x, x + dx))
             x = _accelerated(history[-_MEMORY:])
         return Solution(x, given, float("inf"), most_steps, "Gauss-Newton reached its iteration limit")
