@@ -187,7 +187,7 @@ class Weighted:
             return given, g
 
         x, history, sizes = x_start, list[tuple[Array, Array]](), list[float]()
-        patience = most_steps // 4
+        patience = max(most_steps // 4, _MEMORY)
         for k in range(most_steps):
             given, g = judged(x)
             if not float(np.max(np.abs(g))) < _DIVERGED:
