@@ -92,11 +92,11 @@ def bars(axes: Axes, found: Comparison, name: str, made: Sequence[Look]) -> None
     robots = [k for k in range(len(found.observed)) if found.measured(name, k)]
     plain(axes, "", f"mean error [{what.unit}]")
     width = min(0.82 / len(made), _WIDEST_BAR)
-    for v, v_look in enumerate(made):
+    for v, look in enumerate(made):
         means = np.array([found.statistics(v, name, k).mean for k in robots]) / what.scale
         places = np.arange(len(robots)) + (v - (len(made) - 1) / 2) * width
-        look: dict[str, Any] = {"color": v_look.colour, "hatch": v_look.hatch, "edgecolor": "white", "linewidth": 0.3}
-        axes.bar(places, means, 0.92 * width, label=found.labels[v], **look)
+        style: dict[str, Any] = {"color": look.colour, "hatch": look.hatch, "edgecolor": "white", "linewidth": 0.3}
+        axes.bar(places, means, 0.92 * width, label=found.labels[v], **style)
         if (lost := ~np.isfinite(means)).any():
             foot = axes.get_xaxis_transform()
             axes.plot(places[lost], [0.025] * int(lost.sum()), "x", color=WRONG, markersize=4, transform=foot)

@@ -130,14 +130,14 @@ def asked_tables(model: Model, loads: Loads) -> dict[str, Any]:
 
 
 def file_attributes(
-    study: str, model: Model, loads: Loads, contact: ContactSettings | None, table: str, entries: Any, **more: str
+    study: str, model: Model, loads: Loads, contact: ContactSettings | None, own: Mapping[str, Any], **more: str
 ) -> dict[str, str]:
-    """Return the global attributes of a netCDF file, what was asked as JSON. table, entries : one of its own."""
+    """Return the global attributes of a netCDF file, with what was asked as JSON; own, more : those of its study."""
     tables = {
         **asked_tables(model, loads),
         "versions": versions(),
         "conventions_in_full": conventions_table(model.conventions),
-        table: list(entries),
+        **own,
         **({} if contact is None else {"contact": contact_table(contact)}),
     }
     return {

@@ -84,7 +84,7 @@ def to_dataset(run: Run) -> xr.Dataset:
         if any(left := [left_by_weights(step) for step in steps]):
             variables |= _errors("weighted_residual", "weighted_equation", "weighted_residual_unit", left, _WEIGHTED)
     model = Model(run.robot, run.material, run.coefficients, run.conventions)
-    about = file_attributes(run.study, model, run.loads, run.contact, "warnings", run.warnings)
+    about = file_attributes(run.study, model, run.loads, run.contact, {"warnings": list(run.warnings)})
     return xr.Dataset(variables, coords=_coordinates(run, variables["arc"][1]), attrs={"title": run.title, **about})
 
 

@@ -49,16 +49,15 @@ def write_workspace(path: str | PathLike[str], plan: Plan, journal: Journal, abo
     """
     import h5netcdf
 
-    listed, fingerprint = columns(plan), plan.fingerprint()
-    own = file_attributes(
-        "workspace", plan.model, plan.loads, plan.contact, "varied", plan.varied, fingerprint=fingerprint
-    )
+    listed = columns(plan)
+    own = {"varied": list(plan.varied)}
+    asked = file_attributes("workspace", plan.model, plan.loads, plan.contact, own, fingerprint=plan.fingerprint())
     with placed_whole(path) as part, part.open("w+b", buffering=0) as raw:
         # HDF5 that writes to a full disk by itself ends the interpreter.
         sink = Sink(raw)
         try:
             with h5netcdf.File(sink, "w") as file:
-                put_attributes(file, own | dict(about))
+                put_attributes(file, asked | dict(about))
                 _declare(file, plan, listed)
                 sink.check()
                 for numbers, rows in _slabs(plan, journal, MEMORY):
