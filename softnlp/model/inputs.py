@@ -132,11 +132,7 @@ def asked_tables(model: Model, loads: Loads) -> dict[str, Any]:
 def file_attributes(
     study: str, model: Model, loads: Loads, contact: ContactSettings | None, own: Mapping[str, Any], **more: str
 ) -> dict[str, str]:
-<<<<<<< HEAD
-    """Return the attributes of a netCDF file, what was asked as JSON; own, more : tables and texts of a study."""
-=======
     """Return the global attributes of a netCDF file, with what was asked as JSON; own, more : those of its study."""
->>>>>>> figs
     tables = {
         **asked_tables(model, loads),
         "versions": versions(),
