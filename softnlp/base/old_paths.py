@@ -20,7 +20,7 @@ _MOVED = (
     ("", "scenario", "measured_rows pressures schema_design schema_identify schema_inverse schema_workspace"),
     ("", "statics", "body branch condensed loadcase stability unloaded"),
     ("evaluation", "base", "statistics"),
-    ("evaluation", "studies", "compare comparison observed simulated variants"),
+    ("evaluation", "studies", "compare comparison variants"),
     ("results", "base", "files netcdf"),
     ("results", "model", "inputs"),
     ("results", "studies", "fields"),
@@ -32,6 +32,8 @@ _MOVED = (
 )
 _RENAMED = {
     "columns": "base.csv_columns",
+    "evaluation.observed": "studies.comparison",
+    "evaluation.simulated": "studies.compare",
     "results.targets": "studies.fields",
     "runner": "scenario.run",
     "runner_blocked": "scenario.run_blocked",
@@ -47,8 +49,17 @@ _RENAMED = {
     "scenario_inverse": "scenario.inverse",
     "scenario_schema": "scenario.schema",
     "scenario_workspace": "scenario.workspace",
-    "studies.implicit": "nlp.directions",
+    "studies.aiming": "studies.targets",
+    "studies.design_search": "studies.design",
+    "studies.free_constants": "studies.identified",
+    "studies.identify_task": "studies.measurements",
+    "studies.implicit": "nlp.implicit",
+    "studies.inverse_task": "studies.targets",
+    "studies.predicted_force": "studies.predicted",
+    "studies.predicted_pose": "studies.predicted",
     "studies.statics": "statics.solver",
+    "studies.tip_map": "studies.targets",
+    "studies.trial": "studies.predicted",
 }
 _FOLDERS = {"workspace": "sweep", "plots": "figures", "mesh": "figures.mesh", "evaluation": "studies"}
 # Names that left a module which is still there.

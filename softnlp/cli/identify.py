@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from softnlp.scenario.read import Scenario
     from softnlp.studies.identified import Identified
-    from softnlp.studies.identify_task import TensileTask
+    from softnlp.studies.measurements import TensileTask
     from softnlp.studies.tensile import TensileFit
 
 
@@ -56,7 +56,7 @@ def identify(scenario: Path, /, *, out: Path | None = None, json: bool = False) 
 def run_study(asked: Scenario, out: Path | None, json: bool) -> int:
     """Identify what a scenario asks for, print it and write the results; return the exit status."""
     from softnlp.cli.folder import require_writable
-    from softnlp.studies.identify_task import TensileTask
+    from softnlp.studies.measurements import TensileTask
 
     folder = out if out is not None or json else Path("results") / asked.path.stem
     if folder is not None:
@@ -73,7 +73,7 @@ def _tensile(asked: Scenario, folder: Path | None, json: bool) -> int:
         tensile_table_text,
     )
     from softnlp.scenario.run_identify import run_tensile
-    from softnlp.studies.identify_task import TensileTask
+    from softnlp.studies.measurements import TensileTask
 
     task = asked.task
     assert isinstance(task, TensileTask)
@@ -129,7 +129,7 @@ def _say_tensile(task: TensileTask, fit: TensileFit) -> None:
 def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
     from softnlp.base.status import Status
     from softnlp.results.identify_document import document_text, identified_text, robot_document, robot_table_text
-    from softnlp.studies.identify_task import RobotTask
+    from softnlp.studies.measurements import RobotTask
 
     task = asked.task
     assert isinstance(task, RobotTask)
@@ -178,7 +178,7 @@ _GUESS = 40
 def _say_robots(asked: Scenario, found: Identified) -> None:
     """Print constants and misfits."""
     from softnlp.base.columns import OUTPUTS
-    from softnlp.studies.free_constants import file_name
+    from softnlp.studies.identified import file_name
 
     say(f"{asked.title}: {', '.join(d.label for d in found.data)}; {asked.material.name} ({asked.material.law.name})")
     for line in gravity_lines(asked.loads.gravity):

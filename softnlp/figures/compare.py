@@ -29,8 +29,7 @@ from softnlp.figures.compare_parts import (
 from softnlp.figures.compare_tips import tips_figure
 from softnlp.figures.style import GREY, INK, PALE, SMALL, TEXT, in_own_style, new_figure, plain
 from softnlp.scenario.compare import CompareTask
-from softnlp.studies.comparison import Comparison
-from softnlp.studies.observed import NUMBERS, OBSERVABLES
+from softnlp.studies.comparison import NUMBERS, OBSERVABLES, Comparison
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from softnlp.figures.boxes import draw_boxes
 from softnlp.figures.style import COLOURS, GREY, INK, SMALL, WRONG, colour, plain, user_text
-from softnlp.studies.comparison import Comparison
-from softnlp.studies.observed import OBSERVABLES
+from softnlp.studies.comparison import OBSERVABLES, Comparison
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,8 +13,7 @@ from softnlp.figures.cloud import mark_size
 from softnlp.figures.compare_parts import LEGEND_ROW, MEASURED, Look, legend, legend_rows, looks, shown_labels
 from softnlp.figures.space import around, space_axes
 from softnlp.figures.style import GREY, INK, SMALL, TEXT, WRONG, in_own_style, new_figure, plain
-from softnlp.studies.comparison import AXES, Comparison
-from softnlp.studies.observed import OBSERVABLES
+from softnlp.studies.comparison import AXES, OBSERVABLES, Comparison
 from softnlp.sweep.boundary import thinned
 
 if TYPE_CHECKING:

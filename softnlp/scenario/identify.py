@@ -22,9 +22,8 @@ from softnlp.model.robot import Robot
 from softnlp.scenario.measured_rows import RobotRows, rows_by_robot
 from softnlp.scenario.schema import ContactTable, RobotTable
 from softnlp.scenario.schema_identify import IdentifyFile, MeasurementsTable, SigmaTable, TensileTable
-from softnlp.studies.free_constants import free_constants
-from softnlp.studies.identify_task import RobotTask, TensileTask
-from softnlp.studies.measurements import OBSERVABLES, Measurements, checked_measurements
+from softnlp.studies.identified import free_constants
+from softnlp.studies.measurements import OBSERVABLES, Measurements, RobotTask, TensileTask, checked_measurements
 from softnlp.studies.plausibility import Check, area_check
 
 Array = NDArray[np.float64]

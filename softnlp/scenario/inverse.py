@@ -9,7 +9,7 @@ from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.model.robot import Robot
 from softnlp.scenario.schema_inverse import BoundsTable, TargetTable
-from softnlp.studies.inverse_task import InverseTask, Target
+from softnlp.studies.targets import InverseTask, Target
 
 Array = NDArray[np.float64]
 

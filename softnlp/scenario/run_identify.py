@@ -13,7 +13,7 @@ from softnlp.model.contact_settings import ContactSettings
 from softnlp.scenario.read import Scenario
 from softnlp.studies.identified import Identified
 from softnlp.studies.identify import identify
-from softnlp.studies.identify_task import RobotTask, TensileTask
+from softnlp.studies.measurements import RobotTask, TensileTask
 from softnlp.studies.tensile import LawFit, TensileFit, fit_tensile, tensile_misfit
 
 Progress = Callable[[int, float], None]

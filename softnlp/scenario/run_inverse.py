@@ -9,7 +9,7 @@ from softnlp.scenario.read import Scenario
 from softnlp.statics.step import Run, Step
 from softnlp.studies.inverse import follow_targets
 from softnlp.studies.inverse_solver import InverseSolver
-from softnlp.studies.inverse_task import InverseTask
+from softnlp.studies.targets import InverseTask
 
 Progress = Callable[[int, Step], None]
 

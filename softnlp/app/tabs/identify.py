@@ -36,8 +36,7 @@ from softnlp.results.identify_document import identified_text, robot_table_text,
 from softnlp.scenario.read import Scenario
 from softnlp.scenario.run_identify import run_robots
 from softnlp.studies.identified import Identified
-from softnlp.studies.identify_task import RobotTask
-from softnlp.studies.measurements import OBSERVABLES
+from softnlp.studies.measurements import OBSERVABLES, RobotTask
 
 STUDY = "identify"
 _GUESS = 40  # evaluations; most identifications need fewer

@@ -12,8 +12,7 @@ from softnlp.base.columns import OUTPUTS
 from softnlp.figures.style import colour
 from softnlp.model.conventions import Coefficients
 from softnlp.model.materials import Material
-from softnlp.studies.free_constants import COEFFICIENTS, file_name, free_constants
-from softnlp.studies.identified import Identified
+from softnlp.studies.identified import COEFFICIENTS, Identified, file_name, free_constants
 from softnlp.studies.measurements import OBSERVABLES, column_slice
 from softnlp.studies.tensile import TensileFit
 

@@ -13,7 +13,7 @@ from softnlp.base.errors import InputError
 from softnlp.results.identify_document import material_file_text, material_table, tensile_table_text
 from softnlp.scenario.read import Scenario
 from softnlp.scenario.run_identify import run_tensile
-from softnlp.studies.identify_task import TensileTask
+from softnlp.studies.measurements import TensileTask
 from softnlp.studies.tensile import LawFit, TensileFit
 
 STUDY = "identify"
