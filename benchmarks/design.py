@@ -30,7 +30,7 @@ from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.scenario.read import Scenario
 from softnlp.studies.blocked_force import blocked_force
-from softnlp.studies.design_evaluate import Evaluator, broken_rules, chamber_gaps, missed, pose_outputs, robot_outputs
+from softnlp.studies.design_evaluate import Evaluator, broken_rules, chamber_gaps, missed, robot_outputs, shape_outputs
 from softnlp.studies.design_task import Setting
 
 FILE = Path(__file__).parents[1] / "scenarios" / "design" / "D25L60_dimensions.toml"
@@ -96,7 +96,7 @@ def nelder_mead(scenario: Scenario, task: DesignTask, solve: Outputs, answer: fl
         outputs = solve(robot)
         if not outputs:
             return PENALTY * 10.0
-        off += sum(part for _, part in missed(outputs, task.requirements))
+        off += sum(part for _, _, part in missed(outputs, task.requirements))
         objective = outputs[task.objective.name]
         if off <= 1e-5 and task.sign * objective > best:
             best, place = task.sign * objective, unit
@@ -140,7 +140,7 @@ def as_run(scenario: Scenario, task: DesignTask) -> Outputs:
         pose = step.contact.free if step.contact is not None else step.pose
         if pose is None:
             return {}
-        found = {**robot_outputs(robot), **pose_outputs(pose, robot.length), "pressure": task.pressure}
+        found = {**robot_outputs(robot), **shape_outputs(robot, pose), "pressure": task.pressure}
         found["chamber_gap"] = min(float(gap) for gap in chamber_gaps(robot, pose.stretch))
         return found | ({"blocked_force": step.contact.force} if step.contact is not None else {})
 

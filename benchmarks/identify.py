@@ -25,11 +25,11 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.robot import robot
 from softnlp.model.rod import Loads
+from softnlp.statics.kept import pose_solver
 from softnlp.studies.forward import forward
 from softnlp.studies.identify import identify
 from softnlp.studies.measurements import Measurements
-from softnlp.studies.predicted_pose import ArcPoses
-from softnlp.studies.trial import TrialPoses
+from softnlp.studies.predicted import ArcPoses
 
 Array = NDArray[np.float64]
 
@@ -89,10 +89,10 @@ def by_search(values: Array, make: Callable[[], Callable[[Array], Array]]) -> Ti
 
 def forward_solves() -> Callable[[Array], Array]:
     """Return the observables by forward solves of the rod, each pose started from the one before."""
-    poses = TrialPoses(Model(ROBOT, SILICONE), Numerics())
+    poses = pose_solver(Model(ROBOT, SILICONE), Numerics())
 
     def observables(x: Array) -> Array:
-        solver, near, rows = poses.at(dict(zip(QUANTITIES, x, strict=True))), None, []
+        solver, near, rows = poses.with_values(dict(zip(QUANTITIES, x, strict=True))), None, []
         for pressure in P:
             step, near = solver.solve(pressure, Loads(), near)
             if step.pose is None:
@@ -106,7 +106,7 @@ def forward_solves() -> Callable[[Array], Array]:
 
 def closed_form() -> Callable[[Array], Array]:
     """Return the observables by the closed form that `identify` uses."""
-    poses = ArcPoses(TrialPoses(Model(ROBOT, SILICONE), Numerics()), P, QUANTITIES)
+    poses = ArcPoses(pose_solver(Model(ROBOT, SILICONE), Numerics()), P, QUANTITIES)
     return lambda x: poses.evaluate(dict(zip(QUANTITIES, x, strict=True))).values[:, :5]
 
 

@@ -25,11 +25,11 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.robot import robot
 from softnlp.model.rod import Loads
+from softnlp.statics.kept import pose_solver
 from softnlp.studies.identified import Identified
 from softnlp.studies.identify import identify
 from softnlp.studies.measurements import Measurements
-from softnlp.studies.predicted_pose import ArcPoses
-from softnlp.studies.trial import TrialPoses
+from softnlp.studies.predicted import ArcPoses
 
 Array = NDArray[np.float64]
 
@@ -184,8 +184,11 @@ def search(
     from scipy.optimize import least_squares
 
     rows = [measurements(name, forces=False, elongation=elongation) for name in ANGLES]
-    every = TrialPoses(Model(rows[0].robot, SILICONE, CALIBRATED, conventions), Numerics())
-    poses = [ArcPoses(every.of(m.robot), np.asarray(m.pressure), ()) for m in rows]
+    models = [Model(m.robot, SILICONE, CALIBRATED, conventions) for m in rows]
+    poses = [
+        ArcPoses(pose_solver(model, Numerics()), np.asarray(m.pressure), ())
+        for m, model in zip(rows, models, strict=True)
+    ]
 
     def residuals(z: Array) -> Array:
         parts = []

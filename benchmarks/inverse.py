@@ -30,7 +30,7 @@ from softnlp import BAR, Loads, Numerics, Status, material, robot
 from softnlp.model.quantities import Model
 from softnlp.statics.solver import PoseSolver, Solved
 from softnlp.studies.inverse_solver import InverseSolver
-from softnlp.studies.inverse_task import InverseTask, Target
+from softnlp.studies.targets import InverseTask, Target
 
 Array = NDArray[np.float64]
 TipOf = Callable[[Array, Any], tuple[Array, Any]]

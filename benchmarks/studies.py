@@ -30,7 +30,7 @@ from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.wall import standing_wall
 from softnlp.studies.inverse_solver import InverseSolver
-from softnlp.studies.inverse_task import Target
+from softnlp.studies.targets import Target
 
 REFERENCE = Numerics(intervals=160)
 LEVELS = 13  # of each set in the sweep

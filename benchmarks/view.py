@@ -16,9 +16,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from view_browser import FLAGS, STAGE, drawn, served
-
 from softnlp.app.view.message import frame_message, robot_message
+from view_browser import FLAGS, STAGE, drawn, served
 
 FRAMES = 40
 TIMED = """

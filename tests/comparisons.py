@@ -8,9 +8,8 @@ import numpy as np
 
 from softnlp import COEFFICIENT_SETS, ContactSettings, material, robot
 from softnlp.base.status import Status
-from softnlp.studies.comparison import Comparison
-from softnlp.studies.observed import Observed
-from softnlp.studies.simulated import Solved
+from softnlp.studies.comparison import Comparison, Solved
+from softnlp.studies.measurements import Observed
 from softnlp.studies.variants import every_variant
 
 ECOFLEX = material("Ecoflex 00-50")

@@ -21,7 +21,7 @@ from softnlp.app.session import LARGEST_FILE, Stage
 from softnlp.app.tabs.identify import LETTERS, bounds_of, first_free, identify_tab, with_bound, with_free
 from softnlp.base.units import DEGREE, MILLIMETRE
 from softnlp.scenario.read import scenario_from_text
-from softnlp.studies.free_constants import COEFFICIENTS
+from softnlp.studies.identified import COEFFICIENTS
 
 FILES = Path(__file__).parents[1] / "scenarios" / "files"
 TRUE = Coefficients(elongation=0.5, bending=1.0)

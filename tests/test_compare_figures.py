@@ -22,8 +22,7 @@ from softnlp.figures import observable_figure, tips_figure
 from softnlp.figures.compare_parts import looks
 from softnlp.results.comparison import STATISTICS
 from softnlp.scenario.compare import ALIASES, MEASURED_COLUMNS
-from softnlp.studies.comparison import Comparison
-from softnlp.studies.observed import OBSERVABLES
+from softnlp.studies.comparison import OBSERVABLES, Comparison
 
 ROOT = Path(__file__).parents[1]
 DOCUMENT = (ROOT / "docs" / "compare.md").read_text()

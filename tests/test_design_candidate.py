@@ -30,11 +30,11 @@ from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.materials import Material
 from softnlp.model.quantities import Model
 from softnlp.studies import design_optimise, design_problem
+from softnlp.studies.design import searched
 from softnlp.studies.design_candidate import Candidate, Workshop
 from softnlp.studies.design_evaluate import Evaluation, Evaluator, chamber_gaps, unmet
 from softnlp.studies.design_optimise import Optimiser, Optimum
 from softnlp.studies.design_problem import DesignProblem
-from softnlp.studies.design_search import searched
 from softnlp.studies.design_task import Setting
 
 D25, SOFT = robot("D25L60"), material("Ecoflex 00-50")

@@ -6,7 +6,6 @@ import json
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,8 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # benchmarks/ is not installed
+
+from at_once import identify_at_once
 
 from benchmarks.identify_data import TABLES
 from benchmarks.identify_data import main as write_shipped_files
@@ -38,18 +39,17 @@ from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.scenario.identify import run_robots
 from softnlp.scenario.read import load_scenario, scenario_from_text
+from softnlp.statics import loadcase
 from softnlp.statics.blocked_grid import BlockedGrid
-from softnlp.studies import predicted_force, predicted_pose
+from softnlp.statics.kept import blocked_solver, pose_solver
+from softnlp.statics.solver import PoseSolver
+from softnlp.studies import predicted
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.fit_statistics import uncertainty
 from softnlp.studies.identified import Identified
 from softnlp.studies.identify import _Fit
-from softnlp.studies.identify_nlp import identify_at_once
-from softnlp.studies.identify_task import RobotTask
-from softnlp.studies.measurements import checked_measurements
-from softnlp.studies.predicted_force import BlockedForces
-from softnlp.studies.predicted_pose import ArcPoses, FreePoses, LoadedPoses, Prediction
-from softnlp.studies.trial import TrialBlocked, TrialPoses
+from softnlp.studies.measurements import RobotTask, checked_measurements
+from softnlp.studies.predicted import ArcPoses, BlockedForces, FreePoses, LoadedPoses, Prediction
 
 ROOT = Path(__file__).parents[1]
 SCENARIOS = ROOT / "scenarios" / "identify"
@@ -74,14 +74,13 @@ def forward_poses(r: Robot, P: Any, coefficients: Coefficients, **options: Any) 
     )
 
 
-@cache
-def closed_form() -> TrialPoses:
-    return TrialPoses(Model(robot("D25L60"), SILICONE, TRUE), Numerics())
+def closed_form(r: Robot) -> PoseSolver:
+    return pose_solver(Model(r, SILICONE, TRUE), Numerics())
 
 
 def seen(r: Robot, P: Any, bending: float = 2.0) -> Measurements:
     """Return the unloaded poses of the true constants in closed form, which a test below holds against the rod."""
-    poses = closed_form().of(r).at({"stiffening.bending": bending})
+    poses = closed_form(r).with_values({"stiffening.bending": bending})
     values = ArcPoses(poses, np.asarray(P), ()).evaluate({"stiffening.bending": bending}).values
     return Measurements(r, P, tip_position=values[:, :3], bending_angle=values[:, 3], elongation=values[:, 4])
 
@@ -139,7 +138,7 @@ def test_constants_come_back_from_forces_and_angles() -> None:
 def test_the_closed_form_is_the_solution_of_the_rod() -> None:
     r = robot("D20L60")
     data = forward_poses(r, POSES, TRUE)
-    values = ArcPoses(closed_form().of(r), POSES, ()).evaluate({}).values
+    values = ArcPoses(closed_form(r), POSES, ()).evaluate({}).values
     assert values[:, :3] == pytest.approx(np.array(data.tip_position), abs=1e-8 * r.length)
     assert values[:, 3] == pytest.approx(np.array(data.bending_angle), abs=2e-8)
     assert values[:, 4] == pytest.approx(np.array(data.elongation), abs=1e-8 * r.length)
@@ -152,7 +151,7 @@ AT = {"stiffening.elongation": 0.5, "stiffening.bending": 1.5, "corrections.bore
 @pytest.mark.parametrize("loaded", [False, True])
 def test_derivatives_of_poses_are_those_of_differences(loaded: bool) -> None:
     numerics = Numerics(intervals=10)
-    solver = TrialPoses(Model(robot("D15L60"), SILICONE, TRUE), numerics)
+    solver = pose_solver(Model(robot("D15L60"), SILICONE, TRUE), numerics)
     P = POSES[[1, 3, 5]]
     poses: FreePoses = LoadedPoses(solver, P, LOADED, NAMES) if loaded else ArcPoses(solver, P, NAMES)
     slopes = poses.evaluate(AT).slopes
@@ -164,7 +163,7 @@ def test_derivatives_of_poses_are_those_of_differences(loaded: bool) -> None:
 
 
 def test_derivatives_of_forces_are_those_of_differences() -> None:
-    solver = TrialBlocked(TrialPoses(Model(robot("D25L60"), SILICONE, TRUE), Numerics(intervals=10)), ContactSettings())
+    solver = blocked_solver(Model(robot("D25L60"), SILICONE, TRUE), Numerics(intervals=10), ContactSettings())
     P = BAR * np.array([[0.9, 0, 0]])
     names, at = (*NAMES[1:], "contact.chamber_reaction"), {**AT, "contact.chamber_reaction": 1.2}
     poses, forces = ArcPoses(solver.poses, P, names), BlockedForces(solver, P, Loads(), names)
@@ -187,7 +186,7 @@ FAR = {"stiffening.bending": 0.2}, {"stiffening.bending": 6.0}
 
 def test_poses_that_jump_with_the_constants_are_followed_anew() -> None:
     """Newton from the pose at other constants is trusted nearby alone; where it jumps, all starts anew."""
-    solver = TrialPoses(Model(robot("D15L60"), SILICONE, TRUE), Numerics(intervals=10))
+    solver = pose_solver(Model(robot("D15L60"), SILICONE, TRUE), Numerics(intervals=10))
     P = POSES[[2, 1]]
     poses, fresh = (LoadedPoses(solver, P, LOADED, ("stiffening.bending",)) for _ in range(2))
     first = poses.evaluate(FAR[0])
@@ -201,7 +200,7 @@ def test_poses_that_jump_with_the_constants_are_followed_anew() -> None:
 def test_a_loaded_pose_that_is_lost_is_named_and_the_others_stand() -> None:
     soft = Model(robot("D25L60"), material("Ecoflex 00-20", "yeoh"), Coefficients(elongation=0.0))
     P = BAR * np.array([[0.1, 0, 0], [9.0, 9.0, 9.0], [0.2, 0, 0]])
-    found = LoadedPoses(TrialPoses(soft, Numerics(intervals=4)), P, LOADED, ("stiffening.bending",)).evaluate({})
+    found = LoadedPoses(pose_solver(soft, Numerics(intervals=4)), P, LOADED, ("stiffening.bending",)).evaluate({})
     (failure,) = found.failures
     assert failure.row == 1
     assert failure.status in (Status.NO_EQUILIBRIUM, Status.UNSTABLE_MATERIAL)
@@ -212,7 +211,7 @@ def test_a_loaded_pose_that_is_lost_is_named_and_the_others_stand() -> None:
 
 def test_a_straight_loaded_pose_gives_its_bending_angle_no_slope() -> None:
     """The angle has a kink there; it is 0 to both sides of every constant, and the elongation is not."""
-    solver = TrialPoses(Model(robot("D25L60"), SILICONE, TRUE), Numerics(intervals=4))
+    solver = pose_solver(Model(robot("D25L60"), SILICONE, TRUE), Numerics(intervals=4))
     hung = Loads(tip_force=(0.0, 0.0, 0.05))
     found = LoadedPoses(solver, POSES[-1:], hung, ("stiffening.elongation", "stiffening.bending")).evaluate({})
     assert found.values[0, 3] < 1e-8
@@ -222,11 +221,11 @@ def test_a_straight_loaded_pose_gives_its_bending_angle_no_slope() -> None:
 
 def test_roots_nearby_take_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
     """Newton's steps are bounded in number; from constants nearby a few are as good as following the branch."""
-    solver = TrialPoses(Model(robot("D25L60"), SILICONE, TRUE), Numerics())
+    solver = pose_solver(Model(robot("D25L60"), SILICONE, TRUE), Numerics())
     poses = ArcPoses(solver, POSES, ("stiffening.elongation",))
     poses.evaluate({"stiffening.elongation": 0.6})
     expected = ArcPoses(solver, POSES, ("stiffening.elongation",)).evaluate({"stiffening.elongation": 0.62}).values
-    monkeypatch.setattr(predicted_pose, "_NEWTON_STEPS", 3)
+    monkeypatch.setattr(loadcase, "_NEWTON_STEPS", 3)
     near = poses.evaluate({"stiffening.elongation": 0.62}).values
     assert near == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
@@ -234,7 +233,7 @@ def test_roots_nearby_take_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("why", ["far", "beyond a fold"])
 def test_forces_that_go_elsewhere_are_followed_anew(why: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Far from the known shape, or where the determinant that counts folds has changed its sign on the way."""
-    solver = TrialBlocked(TrialPoses(Model(robot("D25L60"), SILICONE, TRUE), Numerics(intervals=6)), ContactSettings())
+    solver = blocked_solver(Model(robot("D25L60"), SILICONE, TRUE), Numerics(intervals=6), ContactSettings())
     P, names = BAR * np.array([[1.2, 0, 0]]), ("stiffening.bending",)
     poses = ArcPoses(solver.poses, P, names)
     forces, fresh = (BlockedForces(solver, P, Loads(), names) for _ in range(2))
@@ -263,7 +262,7 @@ def test_forces_that_go_elsewhere_are_followed_anew(why: str, monkeypatch: pytes
     if why == "beyond a fold":
         monkeypatch.setattr(BlockedGrid, "determinants", turned)
     else:  # a blocked shape moves little with the constants
-        monkeypatch.setattr(predicted_force, "_LARGEST_JUMP", 1e-3)
+        monkeypatch.setattr(predicted, "_LARGEST_JUMP", 1e-3)
     found = force(forces, wanted)
     assert followed == [forces]
     assert not found.failures
@@ -273,7 +272,7 @@ def test_forces_that_go_elsewhere_are_followed_anew(why: str, monkeypatch: pytes
 
 def test_a_force_beyond_a_fold_is_lost_and_the_one_before_it_stands() -> None:
     rigid = ContactSettings(closure="rigid")
-    solver = TrialBlocked(TrialPoses(Model(robot("D20L60"), SILICONE), Numerics(intervals=6)), rigid)
+    solver = blocked_solver(Model(robot("D20L60"), SILICONE), Numerics(intervals=6), rigid)
     P = BAR * np.array([[1.5, 0, 0], [0.6, 0, 0]])
     poses = ArcPoses(solver.poses, P, ("stiffening.bending",)).evaluate({})
     forces = BlockedForces(solver, P, Loads(), ("stiffening.bending",))
@@ -328,7 +327,7 @@ def test_one_nlp_of_all_poses_gives_the_same_constants() -> None:
 def test_two_sigma_intervals_hold_the_constants(grows: bool) -> None:
     """Of the linearised problem with the default sigmas; benchmarks/identify.py draws with the whole one."""
     r, names = robot("D25L60"), NAMES[:3]
-    found = ArcPoses(closed_form().of(r), POSES, names).evaluate({})
+    found = ArcPoses(closed_form(r), POSES, names).evaluate({})
     exact, J = found.values[:, 3:5], found.slopes[:, 3:5]
     data = checked_measurements(Measurements(r, POSES, bending_angle=exact[:, 0], elongation=exact[:, 1]))
     sigma = data.sigma[:, 3:5]

@@ -13,7 +13,7 @@ from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser
 from softnlp.cli import main
 from softnlp.scenario.identify import MeasurementsTable, SigmaTable, TensileTable
 from softnlp.scenario.read import scenario_from_text
-from softnlp.studies.free_constants import COEFFICIENTS
+from softnlp.studies.identified import COEFFICIENTS
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "identify.md"

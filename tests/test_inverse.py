@@ -21,11 +21,9 @@ from softnlp.model.robot import Robot
 from softnlp.nlp.bounded import Limits, Measured, least_norm, nearest, quadratic_step
 from softnlp.results import load_run, to_json
 from softnlp.statics.solver import PoseSolver
-from softnlp.studies.aiming import Aim, aim_of, spread
 from softnlp.studies.derivatives import PoseDerivatives
 from softnlp.studies.inverse_solver import InverseSolver
-from softnlp.studies.inverse_task import InverseTask, Target
-from softnlp.studies.tip_map import ArcMap, GridMap
+from softnlp.studies.targets import Aim, ArcMap, GridMap, InverseTask, Target, aim_of, spread
 
 Array = NDArray[np.float64]
 

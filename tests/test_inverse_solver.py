@@ -21,12 +21,10 @@ from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
 from softnlp.studies import inverse_solver
-from softnlp.studies.aiming import Aim, aim_of
 from softnlp.studies.derivatives import PoseDerivatives
 from softnlp.studies.inverse_nlp import InverseProblem, inverse_problem, pressure_of
 from softnlp.studies.inverse_solver import InverseSolver, Reached
-from softnlp.studies.inverse_task import InverseTask, Target
-from softnlp.studies.tip_map import ArcMap, GridMap, TipPoint
+from softnlp.studies.targets import Aim, ArcMap, GridMap, InverseTask, Target, TipPoint, aim_of
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import pytest
 from softnlp import fit_tensile, load_materials, material
 from softnlp.cli import main
 from softnlp.scenario.read import load_scenario
-from softnlp.studies.identify_task import TensileTask
+from softnlp.studies.measurements import TensileTask
 from softnlp.studies.plausibility import Check, area_check, curve_checks, law_checks, messages
 
 STRETCH = np.linspace(1, 3, 41)

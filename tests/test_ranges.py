@@ -18,7 +18,7 @@ from softnlp.cli import main
 from softnlp.model.laws import LAWS
 from softnlp.scenario.compare import compare_task
 from softnlp.scenario.read import load_scenario, scenario_from_text
-from softnlp.studies.identify_task import RobotTask
+from softnlp.studies.measurements import RobotTask
 from softnlp.sweep.measured import load_measured
 
 D25L60, SOFT = robot("D25L60"), material("Ecoflex 00-50")

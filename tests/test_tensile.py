@@ -13,8 +13,8 @@ from softnlp import InputError, Numerics, fit_tensile, formula_law, load_materia
 from softnlp.cli import main
 from softnlp.model.laws import LAWS
 from softnlp.scenario.read import load_scenario, scenario_from_text
-from softnlp.studies.identify_task import TensileTask
 from softnlp.studies.law_curve import LawCurve
+from softnlp.studies.measurements import TensileTask
 from softnlp.studies.tensile import LawFit
 
 ROOT = Path(__file__).parents[1]

@@ -20,7 +20,7 @@ from softnlp.model.laws import LAWS
 from softnlp.scenario.read import Scenario
 from softnlp.statics.solver import PoseSolver
 from softnlp.studies.identify import identify
-from softnlp.studies.identify_task import RobotTask
+from softnlp.studies.measurements import RobotTask
 
 Array = NDArray[np.float64]
 

@@ -88,7 +88,7 @@ def _compared(task: CompareTask) -> Comparison:
 
 def _say(task: CompareTask, found: Comparison) -> None:
     """Print the statistics of each variant, and the mean error by robot where there are several."""
-    from softnlp.studies.observed import OBSERVABLES
+    from softnlp.studies.comparison import OBSERVABLES
 
     robots = ", ".join(o.label for o in found.observed)
     say(f"{task.scenario.title}: {robots}; {task.scenario.material.name}; {len(task.columns.rows)} rows measured")
@@ -117,7 +117,7 @@ def _say(task: CompareTask, found: Comparison) -> None:
 
 
 def _cells(found: Comparison, v: int, name: str) -> list[str]:
-    from softnlp.studies.observed import OBSERVABLES
+    from softnlp.studies.comparison import OBSERVABLES
 
     s, scale = found.statistics(v, name), OBSERVABLES[name].scale
     numbers = [_text(x / scale) for x in (s.mean, s.median, s.largest, s.bias)]

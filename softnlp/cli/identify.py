@@ -13,7 +13,7 @@ from softnlp.model.gravity import gravity_lines
 if TYPE_CHECKING:
     from softnlp.scenario.read import Scenario
     from softnlp.studies.identified import Identified
-    from softnlp.studies.identify_task import TensileTask
+    from softnlp.studies.measurements import TensileTask
     from softnlp.studies.tensile import TensileFit
 
 _GUESS = 40  # evaluations; nobody knows how many there will be
@@ -37,7 +37,7 @@ def identify(scenario: Path, /, *, out: Out = None, json: Json = False) -> int:
 
 def run_study(asked: Scenario, out: Path | None, json: bool) -> int:
     """Identify what a scenario asks for, print it and write the results; return the exit status."""
-    from softnlp.studies.identify_task import TensileTask
+    from softnlp.studies.measurements import TensileTask
 
     folder = results_folder(out, json, asked.path.stem)
     tensile = isinstance(asked.task, TensileTask)
@@ -48,7 +48,7 @@ def _tensile(asked: Scenario, folder: Path | None, json: bool) -> int:
     from softnlp.results import identify_document as results
     from softnlp.results.document import document_text
     from softnlp.scenario.tensile import run_tensile
-    from softnlp.studies.identify_task import TensileTask
+    from softnlp.studies.measurements import TensileTask
 
     task = asked.task
     assert isinstance(task, TensileTask)
@@ -102,7 +102,7 @@ def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
     from softnlp.base.status import Status
     from softnlp.results import identify_document as results
     from softnlp.results.document import document_text
-    from softnlp.studies.identify_task import RobotTask
+    from softnlp.studies.measurements import RobotTask
 
     task = asked.task
     assert isinstance(task, RobotTask)
@@ -144,7 +144,7 @@ def _identified(asked: Scenario) -> Identified:
 def _say_robots(asked: Scenario, found: Identified) -> None:
     """Print constants and misfits."""
     from softnlp.base.columns import OUTPUTS
-    from softnlp.studies.free_constants import file_name
+    from softnlp.studies.identified import file_name
 
     say(f"{asked.title}: {', '.join(d.label for d in found.data)}; {asked.material.name} ({asked.material.law.name})")
     for line in gravity_lines(asked.loads.gravity):

@@ -31,8 +31,7 @@ from softnlp.figures.compare_parts import (
 from softnlp.figures.space import around, draw_lines, mark_size, space_axes
 from softnlp.figures.style import GREY, INK, PALE, SMALL, TEXT, WRONG, in_own_style, mark, new_figure, plain
 from softnlp.scenario.compare import CompareTask
-from softnlp.studies.comparison import AXES, Comparison
-from softnlp.studies.observed import NUMBERS, OBSERVABLES
+from softnlp.studies.comparison import AXES, NUMBERS, OBSERVABLES, Comparison
 from softnlp.sweep.boundary import thinned
 
 if TYPE_CHECKING:

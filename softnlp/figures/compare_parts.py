@@ -11,8 +11,7 @@ import numpy as np
 
 from softnlp.base.arrays import Array
 from softnlp.figures.style import COLOURS, GREY, INK, SMALL, WRONG, colour, legend, mark, plain, user_text
-from softnlp.studies.comparison import Comparison
-from softnlp.studies.observed import OBSERVABLES
+from softnlp.studies.comparison import OBSERVABLES, Comparison
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -15,7 +15,7 @@ from softnlp.figures.compare_parts import draw_boxes
 from softnlp.figures.space import around, colour_bar, draw_cloud, space_axes
 from softnlp.figures.style import GREY, INK, SMALL, TEXT, colour, in_own_style, new_figure, plain
 from softnlp.model.gravity import gravity_lines, is_hanging
-from softnlp.studies.observed import OBSERVABLES
+from softnlp.studies.comparison import OBSERVABLES
 from softnlp.sweep.boundary import thinned
 from softnlp.sweep.comparison import Comparison
 from softnlp.sweep.read import Workspace

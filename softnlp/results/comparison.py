@@ -13,8 +13,7 @@ from softnlp.base.statistics import Statistics
 from softnlp.model.inputs import coefficients_table, contact_table, loads_table, package_version, pressure_bar, tidy
 from softnlp.results.document import csv_text, number
 from softnlp.scenario.compare import CompareTask
-from softnlp.studies.comparison import Comparison
-from softnlp.studies.observed import NUMBERS, OBSERVABLES, differences
+from softnlp.studies.comparison import NUMBERS, OBSERVABLES, Comparison, differences
 
 STATISTICS = ("count", "rmse", "mape_percent", "mean", "median", "max", "bias", "left_out_of_mape", "unit")
 _VARIANT = ("law", "coefficients", "conventions", "closure")

@@ -14,13 +14,13 @@ from softnlp.base.units import MEGAPASCAL
 from softnlp.model.inputs import loads_table, pressure_bar, tidy
 from softnlp.model.materials import Material
 from softnlp.results.document import csv_text, document_head, engine_table, number, plain
-from softnlp.studies.free_constants import COEFFICIENTS, file_name
+from softnlp.studies.identified import COEFFICIENTS, file_name
 from softnlp.studies.measurements import OBSERVABLES, column_slice
 
 if TYPE_CHECKING:
     from softnlp.scenario.read import Scenario
     from softnlp.studies.identified import Identified
-    from softnlp.studies.identify_task import RobotTask, TensileTask
+    from softnlp.studies.measurements import RobotTask, TensileTask
     from softnlp.studies.plausibility import Check
     from softnlp.studies.tensile import LawFit, TensileFit
 

@@ -23,9 +23,8 @@ from softnlp.scenario.data import Read, Scenario
 from softnlp.scenario.measured_rows import RobotRows, rows_by_robot
 from softnlp.scenario.schema import ContactTable, MaterialTable, Positive, RobotTable, ScenarioFile, optional_keys
 from softnlp.scenario.tensile import DataTable, TensileTable, run_tensile, tensile_task
-from softnlp.studies.free_constants import free_constants
-from softnlp.studies.identify_task import RobotTask, TensileTask
-from softnlp.studies.measurements import OBSERVABLES, Measurements, checked_measurements
+from softnlp.studies.identified import free_constants
+from softnlp.studies.measurements import OBSERVABLES, Measurements, RobotTask, TensileTask, checked_measurements
 
 if TYPE_CHECKING:  # imported where needed: to read a scenario takes none of them
     from softnlp.studies.identified import Identified

@@ -16,7 +16,7 @@ from softnlp.scenario.schema import MOST_STEPS, Normal, NotNegative, Positive, S
 from softnlp.statics.step import Run, Step
 from softnlp.studies.inverse import follow_targets
 from softnlp.studies.inverse_solver import InverseSolver
-from softnlp.studies.inverse_task import InverseTask, Target
+from softnlp.studies.targets import InverseTask, Target
 
 Array = NDArray[np.float64]
 Rows = Annotated[list[Vector], Field(min_length=1, max_length=MOST_STEPS)]

@@ -19,7 +19,7 @@ from softnlp.model.laws import LAWS, Law
 from softnlp.model.materials import Material
 from softnlp.scenario.data import Read, Scenario
 from softnlp.scenario.schema import FileName, Label, Positive, Table
-from softnlp.studies.identify_task import TensileTask
+from softnlp.studies.measurements import TensileTask
 from softnlp.studies.plausibility import Check, area_check
 
 if TYPE_CHECKING:  # imported where needed: to read a scenario takes none of them

@@ -20,24 +20,30 @@ Array = NDArray[np.float64]
 class Arc:
     """An unloaded shape. column : every quantity in its order, SI. stretch : lambda.
 
-    position, axis : (3,) of the tip [m], unit. lengths : (N,) of the chambers [m].
+    tip_position, axis : (3,) of the tip [m], unit. lengths : (N,) of the chambers [m]. bending_angle : [rad].
+    backbone_length : [m].
     """
 
     column: Array
     stretch: float
-    position: Array
+    tip_position: Array
     axis: Array
     lengths: Array
+    bending_angle: float
+    backbone_length: float
 
 
 def unloaded_arc(poses: PoseSolver, pressure: Array) -> tuple[BranchPoint, Arc]:
     """Return the arc at a pressure (sets,) [Pa], or where the branch to it ends and the arc there."""
     column = poses.column(poses.values(pressure, Loads()))
     branch = stretch_on_branch(poses.branch, column, pressure)
-    tip = np.asarray(poses.functions.arc(column, branch.stretch, 1.0)).ravel()
-    L_0 = float(poses.model.robot.length)
-    lengths = L_0 * _along(poses, column, branch.stretch)[: poses.model.robot.chambers]
-    return branch, Arc(column, branch.stretch, L_0 * tip[:3], tip[9:12], lengths)
+    state = np.asarray(poses.functions.arc(column, branch.stretch, 1.0)).ravel()
+    constants = poses.functions.section(column, branch.stretch)[0]
+    along = np.asarray(poses.functions.lengths(state, constants)).ravel()  # rates, which are constant on an arc
+    L_0, N = float(poses.model.robot.length), poses.model.robot.chambers
+    lengths, backbone = L_0 * along[:N], L_0 * float(along[N + 1])
+    arc = Arc(column, branch.stretch, L_0 * state[:3], state[9:12], lengths, float(along[N]), backbone)
+    return branch, arc
 
 
 def arc_pose(poses: PoseSolver, arc: Arc) -> Pose:
@@ -51,20 +57,12 @@ def arc_pose(poses: PoseSolver, arc: Arc) -> Pose:
     s = np.linspace(0, 1, SHAPE_POINTS)
     states = np.asarray(poses.functions.arc(column, stretch, s[None, :]))
     along = np.asarray(poses.shape.map(s.size)(states, constants, np.zeros((1, s.size))))
-    integrals = _along(poses, column, stretch)
-    N = poses.model.robot.chambers
     outputs = {
         "stretch": np.array([stretch]),
-        "tip_position": arc.position,
+        "tip_position": arc.tip_position,
         "tip_rotation": states[3:12, -1].reshape(3, 3).T,
         "chamber_lengths": arc.lengths,
-        "backbone_length": L_0 * integrals[N + 1 :],
+        "backbone_length": np.array([arc.backbone_length]),
     }
     shape = shape_of(along, s, L_0, F_0)
-    return pose_of(poses.model, outputs, shape, float(integrals[N]), arc.position, True)
-
-
-def _along(poses: PoseSolver, column: Array, stretch: float) -> Array:
-    """Return chamber lengths, bending angle and backbone length, scaled; their rates are constant on an arc."""
-    constants = poses.functions.section(column, stretch)[0]
-    return np.asarray(poses.functions.lengths(poses.functions.arc(column, stretch, 0.0), constants)).ravel()
+    return pose_of(poses.model, outputs, shape, arc.bending_angle, arc.tip_position, True)

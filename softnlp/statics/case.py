@@ -117,10 +117,7 @@ def first_guess(case: LoadCase | Chain, values: Mapping[str, Array]) -> Array:
     functions = case.functions
     column = np.concatenate([values[key] for key in kept_equations(functions.model).declared])
     stretch = stretch_on_branch(kept_equations(functions.model).branch, column, values["pressure"]).stretch
-    if case.method is None:
-        return np.array([stretch])
-    states = np.asarray(functions.arc(column, stretch, case.transcribed.points[None, :]))
-    return np.concatenate([[stretch], states.T.ravel(), np.zeros(functions.tip_unknowns)])
+    return case.arc(column, stretch)
 
 
 def unloaded_values(case: LoadCase | Chain, values: Mapping[str, Array]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from softnlp.base.status import Status
 from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.statics.arc import Arc, arc_pose, unloaded_arc
-from softnlp.statics.loadcase import RodFunctions, stretch_imbalance
+from softnlp.statics.loadcase import RodFunctions, stretch_imbalance, stretch_near
 from softnlp.statics.pose import between_nodes
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import SEARCHED_BY, PoseSolver
@@ -21,7 +21,6 @@ from softnlp.statics.wall import Situation, Wall
 
 Array = NDArray[np.float64]
 
-_NEWTON_STEPS = 30
 _SCAN = 17
 _HALVINGS = 40  # of a part of the scan, to round-off
 
@@ -69,7 +68,7 @@ def free_shape(poses: PoseSolver, pressure: Array, loads: Loads, tip_cap: float,
         branch, arc = unloaded_arc(poses, pressure)
         if branch.status is not Status.SOLVED:
             return Step(pressure, branch.status, branch.message)
-        return Free(arc.column, arc.stretch, arc.lengths, arc.position + tip_cap * arc.axis, arc=arc)
+        return Free(arc.column, arc.stretch, arc.lengths, arc.tip_position + tip_cap * arc.axis, arc=arc)
     ahead, poses.ahead = poses.ahead, None
     if ahead is not None and near is None and np.array_equal(ahead[0], poses.column(poses.values(pressure, loads))):
         step, solved = ahead[1]
@@ -108,13 +107,8 @@ class FreeShapes:
 
     def stretch(self, column: Array) -> float:
         """Return the root of the stretch balance next to the last one."""
-        found, x = self._last
-        for _ in range(_NEWTON_STEPS):
-            balance, slope = self._balance(column, found)
-            change = -float(balance) / float(slope)
-            found += change
-            if not abs(change) > 1e-13:
-                break
+        start, x = self._last
+        found = float(stretch_near(self._balance, column, np.array([start]))[0])
         self._last = found, x
         return found
 

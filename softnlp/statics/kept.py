@@ -21,15 +21,15 @@ MOST_KINDS = 8
 """How many rods are kept; those that were used least recently go."""
 
 
-def pose_solver(model: Model, numerics: Numerics) -> PoseSolver:
+def pose_solver(model: Model, numerics: Numerics, **settings: float) -> PoseSolver:
     """Return a solver for use in this thread, which shares what it compiles with all others for models of its kind."""
-    return PoseSolver(model, numerics, equations=kept_equations(model))
+    return PoseSolver(model, numerics, equations=kept_equations(model), **settings)
 
 
 def blocked_solver(model: Model, numerics: Numerics, contact: ContactSettings, *, wall: bool = True) -> BlockedSolver:
     """Return a solver for use in this thread, which shares what it compiles as `pose_solver`."""
     kept = kept_equations(model, (contact.closure, wall), lambda: tip_conditions(contact.closure, wall=wall))
-    poses = PoseSolver(model, numerics, unloaded_accuracy=numerics.accuracy, equations=kept_equations(model))
+    poses = pose_solver(model, numerics, unloaded_accuracy=numerics.accuracy)
     return BlockedSolver(model, numerics, contact, wall=wall, poses=poses, equations=kept)
 
 

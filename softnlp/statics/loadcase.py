@@ -7,12 +7,13 @@ stiffness of the unpressurised section. So one compiled problem is well scaled f
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from softnlp.base.quantity import Quantity
 from softnlp.model import rod
@@ -22,7 +23,10 @@ from softnlp.model.tip import DEAD_LOADS, AtTip, Given, TipConditions, gap, leng
 from softnlp.nlp.case import Equation
 from softnlp.nlp.transcription import Transcribed, Transcription
 
+Array = NDArray[np.float64]
+
 _SECTION_SIZE = len(rod.RodSection._fields)
+_NEWTON_STEPS = 30
 
 
 def _pack(model: Model, pressures: Any, gravity: Any, stretch: Any) -> list[Any]:
@@ -128,6 +132,22 @@ def stretch_imbalance(functions: RodFunctions) -> ca.Function:
     return ca.Function("imbalance", [column, stretch], [balance, ca.jacobian(balance, stretch)])
 
 
+def stretch_near(imbalance: ca.Function, columns: Array, start: Array) -> Array:
+    """Return the roots of the stretch balance next to known stretches (k,), by Newton's method.
+
+    imbalance : of `stretch_imbalance`. columns : (all quantities, k), SI.
+    """
+    found = start
+    for _ in range(_NEWTON_STEPS):
+        balance, slope = (np.asarray(part).ravel() for part in imbalance(columns, found[None, :]))
+        with np.errstate(all="ignore"):
+            change = -balance / slope
+        found = found + change
+        if not np.any(np.abs(change) > 1e-13):
+            break
+    return found
+
+
 def _given(model: Model, conditions: TipConditions, units: Any) -> tuple[Any, Given | None]:
     """Return the column a of what tip conditions take, SI, and its parts scaled."""
     if not conditions.has_contact:
@@ -183,6 +203,14 @@ class LoadCase:
         by_states, by_stretch = self.transcribed.slopes(ca.jacobian(self.constants, self.symbols[0]))
         others = [ca.MX(by_states.shape[0], symbol.numel()) for symbol in self.symbols[2:]]
         return ca.vertcat(first, ca.horzcat(by_stretch, by_states, *others), last)
+
+    def arc(self, column: Array, stretch: float) -> Array:
+        """Return x of the circular arc without loads. column : every quantity of the model in its order, SI."""
+        s = self.transcribed.points
+        if s.size == 0:
+            return np.array([stretch])
+        states = np.asarray(self.functions.arc(column, stretch, s[None, :]))
+        return np.concatenate([[stretch], states.T.ravel(), np.zeros(self.functions.tip_unknowns)])
 
 
 def load_case(name: str, functions: RodFunctions, given: Mapping[str, Quantity], method: Transcription) -> LoadCase:
@@ -271,3 +299,16 @@ def _equations(transcribed: Transcribed, conditions: TipConditions, L_0: ca.MX, 
     for k, name in enumerate(conditions.equations):
         named.append(Equation(name, np.array([end + 6 + k]), "m", L_0))
     return tuple(named)
+
+
+def blocked_case(
+    name: str, functions: RodFunctions, given: Mapping[str, Quantity], free: LoadCase, method: Transcription
+) -> LoadCase:
+    """Transcribe the rod against a wall, with the free chamber lengths that a free shape's states have.
+
+    given : every other name of `functions.declared()`.
+    """
+    declared = functions.declared()
+    lengths = replace(declared["contact.free_lengths"], symbol=free.outputs["chamber_lengths"])
+    every = {**given, "contact.free_lengths": lengths}
+    return load_case(name, functions, {key: every[key] for key in declared}, method)

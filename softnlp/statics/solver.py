@@ -17,12 +17,7 @@ from softnlp.base.status import Status
 from softnlp.model.numerics import Numerics, Transcribing
 from softnlp.model.quantities import Model
 from softnlp.model.rod import STATE_SIZE, Loads
-from softnlp.nlp.solver import (
-    Solution,
-    certificate,
-    discretisation_correction,
-    outputs,
-)
+from softnlp.nlp.solver import Solution, certificate, discretisation_correction, outputs
 from softnlp.nlp.transcription import method_named
 from softnlp.statics.attempts import LOADS, Attempt, Goal, Neighbour, Work, attempts, from_near
 from softnlp.statics.branch import BranchPoint, stretch_on_branch
@@ -105,6 +100,12 @@ class PoseSolver:
         self.model.check_kind(model)
         other = copy(self)
         other._set_model(model)
+        return other
+
+    def with_values(self, values: Mapping[str, Any]) -> PoseSolver:
+        """Return a solver with other values [SI] of its quantities, which need not be possible ones of a model."""
+        other = copy(self)
+        other._numbers = {**self._numbers, **{name: v for name, v in values.items() if name in self.quantities}}
         return other
 
     def grid(self, intervals: int, transcription: Transcribing | None = None) -> Grid:
@@ -304,9 +305,7 @@ class PoseSolver:
 
     def arc_guess(self, grid: Grid, p: Array, stretch: float) -> Array:
         """Return x of the unloaded circular arc at this pressure."""
-        s = grid.case.transcribed.points
-        states = np.asarray(self.functions.arc(p, stretch, s[None, :]))
-        return np.concatenate([[stretch], states.T.ravel()])
+        return grid.case.arc(p, stretch)
 
     def transfer(self, solved: Solved, grid: Grid) -> Array:
         """Return x of a solution on another grid."""

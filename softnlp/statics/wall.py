@@ -139,7 +139,7 @@ def standing_wall(poses: PoseSolver, contact: ContactSettings, pressures: Array,
     for pressure in (largest, 1e-3 * largest):
         branch, arc = unloaded_arc(poses, pressure)
         if branch.status is Status.SOLVED:
-            return _wall_at(contact.offset, rest, arc.position + contact.tip_cap * arc.axis)
+            return _wall_at(contact.offset, rest, arc.tip_position + contact.tip_cap * arc.axis)
     return _wall_at(contact.offset, rest, rest)
 
 

@@ -22,7 +22,7 @@ from softnlp.statics.kept import blocked_solver
 from softnlp.statics.multistart import other_equilibria
 from softnlp.statics.step import Run, Step
 from softnlp.statics.wall import Wall, checked_contact, standing_wall
-from softnlp.studies.forward import checked_loads, pressure_table
+from softnlp.studies.forward import checked_loads, followed, pressure_table
 from softnlp.studies.weight_sensitivity import given_weights, sensitivities
 
 Array = NDArray[np.float64]
@@ -82,23 +82,17 @@ def blocked_force(
         given_weights(contact)
     solver = blocked_solver(Model(robot, material, coefficients, conventions), numerics, contact)
     wall = standing_wall(solver.poses, solver.contact, P, loads)
-    steps: list[Step] = []
-    near: Blocked | None = None
-    for k, pressure in enumerate(P):
+
+    def solve(pressure: Array, near: Blocked | None) -> tuple[Step, Blocked | None]:
         step, solved = solver.solve(pressure, loads, wall, near)
-        near = solved or near
         if solved is not None and branches:
             step = replace(step, warnings=(*step.warnings, *other_equilibria(solver, solved, branches)))
         if solved is not None and step.contact is not None and weight_sensitivity:
             step = replace(step, contact=replace(step.contact, sensitivity=sensitivities(solver, solved)))
-        if times is not None:
-            step = replace(step, time=float(times[k]))
-        steps.append(step)
-        if progress is not None:
-            progress(k, step)
-    return Run(
-        "blocked-force", robot, material, coefficients, conventions, loads, tuple(steps), title, warnings, contact
-    )
+        return step, solved
+
+    steps = followed(solve, P, progress, times)
+    return Run("blocked-force", robot, material, coefficients, conventions, loads, steps, title, warnings, contact)
 
 
 def force_against_offset(

@@ -3,28 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Literal
+from dataclasses import replace
+from functools import partial
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.errors import InputError
 from softnlp.base.status import Status
+from softnlp.batch.chunk import ChunkSolver
+from softnlp.batch.plan import Plan
+from softnlp.batch.poses import STATUSES
 from softnlp.model.contact_settings import CLOSURES, ContactSettings
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.rod import Loads
-from softnlp.statics.wall import checked_contact
-from softnlp.studies.comparison import Comparison
-from softnlp.studies.forward import checked_loads
-from softnlp.studies.measurements import Measurements
-from softnlp.studies.observed import FORCE, NUMBERS, POSE, Observed, observed
-from softnlp.studies.simulated import RowSolver, Solved, SweepSolver, Tell, closed_by
+from softnlp.statics.kept import blocked_solver, pose_solver
+from softnlp.statics.step import Step
+from softnlp.statics.wall import checked_contact, standing_wall
+from softnlp.studies.comparison import NUMBERS, Comparison, Solved
+from softnlp.studies.forward import checked_loads, followed
+from softnlp.studies.measurements import Measurements, Observed, observed
 from softnlp.studies.variants import Variant
 
 Array = NDArray[np.float64]
 
 SHAPES = ("free", "blocked")
+_POSE, _FORCE = slice(0, 6), NUMBERS.index("blocked_force")
+Tell = Callable[[int], None]
+"""Called with how many rows were solved since the last call."""
 
 
 def compare(
@@ -79,40 +87,37 @@ def compare(
     for variant in asked:
         if variant.closure is not None and variant.closure not in CLOSURES:
             raise InputError(f"expected one of {', '.join(CLOSURES)}, got {variant.closure!r}", key="closure")
-    robots = tuple(observed(m) for m in given)
+    robots = tuple(observed(m, NUMBERS) for m in given)
     loads, contact = checked_loads(loads), checked_contact(contact, [o.robot for o in robots])
-    solver = (SweepSolver if together else RowSolver)(numerics, loads)
-    work = _Work(solver, contact, shape == "blocked", _Count(_solves(robots, asked, shape == "blocked"), progress))
+    done, total = 0, _solves(robots, asked, shape == "blocked")
+
+    def tell(rows: int) -> None:
+        nonlocal done
+        done += rows
+        if progress is not None:
+            progress(done, total)
+
+    solve = _solved_together if together else _solved_in_order
+    work = _Work(partial(solve, numerics, loads, tell), contact, shape == "blocked")
     simulated = tuple(tuple(work.solved(variant, o) for o in robots) for variant in asked)
     return Comparison(robots, asked, simulated, contact, shape)
-
-
-class _Count:
-    """Adds up solved rows."""
-
-    def __init__(self, total: int, progress: Callable[[int, int], None] | None) -> None:
-        self._done, self._total, self._progress = 0, total, progress
-
-    def __call__(self, rows: int) -> None:
-        self._done += rows
-        if self._progress is not None:
-            self._progress(self._done, self._total)
 
 
 class _Work:
     """Solves the rows of one robot after the other; free poses once for all closures."""
 
-    def __init__(self, solver: RowSolver | SweepSolver, contact: ContactSettings, blocked: bool, tell: Tell) -> None:
-        self._solver = solver
+    def __init__(
+        self, solve: Callable[[Model, Array, ContactSettings | None], Solved], contact: ContactSettings, blocked: bool
+    ) -> None:
+        self._solve = solve
         self._contact = contact
         self._blocked = blocked
-        self._tell = tell
         self._free: dict[tuple[int, ...], Solved] = {}
 
     def solved(self, variant: Variant, o: Observed) -> Solved:
         """Return what a variant says of the rows of a robot."""
         model = Model(o.robot, variant.material, variant.coefficients, variant.conventions)
-        contact = closed_by(self._contact, variant.closure)
+        closure: Any = variant.closure or self._contact.closure
         values = np.full((len(o.pressure), len(NUMBERS)), np.nan)
         status: list[Status | None] = [None] * len(values)
         message = [""] * len(values)
@@ -128,17 +133,17 @@ class _Work:
 
         free, at_wall = _rows(o, self._blocked)
         if free.size:
-            put(free, self._free_poses(variant, model, o, free), POSE)
+            put(free, self._free_poses(variant, model, o, free), _POSE)
         if at_wall.size:
-            found = self._solver.solve(model, o.pressure[at_wall], contact, self._tell)
-            put(at_wall, found, slice(0, len(NUMBERS)) if self._blocked else FORCE)
+            found = self._solve(model, o.pressure[at_wall], replace(self._contact, closure=closure))
+            put(at_wall, found, slice(0, len(NUMBERS)) if self._blocked else _FORCE)
         values[~np.isfinite(o.values)] = np.nan
         return Solved(values, tuple(status), tuple(message), frozenset(through))
 
     def _free_poses(self, variant: Variant, model: Model, o: Observed, rows: NDArray[np.intp]) -> Solved:
         key = _free_key(variant, o)
         if key not in self._free:
-            self._free[key] = self._solver.solve(model, o.pressure[rows], None, self._tell)
+            self._free[key] = self._solve(model, o.pressure[rows], None)
         return self._free[key]
 
 
@@ -146,7 +151,7 @@ def _rows(o: Observed, blocked: bool) -> tuple[NDArray[np.intp], NDArray[np.intp
     """Return which rows are solved free and which against the wall."""
     if blocked:
         return np.zeros(0, np.intp), np.arange(len(o.pressure))
-    return np.flatnonzero(o.has_pose), np.flatnonzero(o.has_force)
+    return np.flatnonzero(o.measured[:, _POSE].any(axis=1)), np.flatnonzero(o.measured[:, _FORCE])
 
 
 def _free_key(variant: Variant, o: Observed) -> tuple[int, ...]:
@@ -158,3 +163,58 @@ def _solves(robots: Sequence[Observed], variants: Sequence[Variant], blocked: bo
     """Return how many rows there are to solve."""
     free = {_free_key(variant, o): _rows(o, blocked)[0].size for variant in variants for o in robots}
     return sum(free.values()) + len(variants) * sum(_rows(o, blocked)[1].size for o in robots)
+
+
+def _solved_in_order(
+    numerics: Numerics, loads: Loads, tell: Tell, model: Model, pressure: Array, contact: ContactSettings | None
+) -> Solved:
+    """Return the poses at pressures (rows, sets) [Pa], each from the last, against the wall of `contact` if any."""
+    solver: Any = pose_solver(model, numerics) if contact is None else blocked_solver(model, numerics, contact)
+    wall = () if contact is None else (standing_wall(solver.poses, contact, pressure, loads),)
+    steps = followed(lambda P, near: solver.solve(P, loads, *wall, near), pressure, lambda *_: tell(1))
+    length = float(model.robot.length)
+    values = np.array([_numbers(step, length) for step in steps]).reshape(-1, len(NUMBERS))
+    through = frozenset(k for k, step in enumerate(steps) if step.pose and step.pose.fit.self_intersecting)
+    return Solved(values, tuple(step.status for step in steps), tuple(step.message for step in steps), through)
+
+
+def _numbers(step: Step, length: float) -> list[float]:
+    """Return `NUMBERS` of a step, nan where it has none."""
+    pose = step.pose
+    if pose is None or not step.status.has_solution:
+        return [np.nan] * len(NUMBERS)
+    force = np.nan if step.contact is None else step.contact.force
+    return [*pose.tip_position, pose.bending_angle, pose.backbone_length - length, pose.tilt, force]
+
+
+def _solved_together(
+    numerics: Numerics, loads: Loads, tell: Tell, model: Model, pressure: Array, contact: ContactSettings | None
+) -> Solved:
+    """Return the same of all rows at once, as a workspace sweep solves them."""
+    order = np.arange(len(pressure), dtype=np.int64)
+    plan = Plan(model, loads, numerics, contact, ("pressure",), np.ascontiguousarray(pressure), order)
+    solver = ChunkSolver(plan)
+    values = np.full((len(pressure), len(NUMBERS)), np.nan)
+    status = [Status.DIVERGED] * len(pressure)
+    message = [""] * len(pressure)
+    through: set[int] = set()
+    for chunk in range(plan.chunks):
+        block = solver.solve(chunk)
+        members, rows = plan.members(chunk), block.rows
+        through.update(members[rows["self_intersecting"] == 1].tolist())
+        axis = rows["tip_rotation"][:, :, 2]
+        tilt = np.arctan2(np.hypot(axis[:, 0], axis[:, 1]), axis[:, 2])
+        values[members, :3] = rows["tip_position"]
+        pose = (rows["bending_angle"], rows["backbone_length"] - float(model.robot.length), tilt)
+        values[members, 3:6] = np.column_stack(pose)
+        if contact is not None:
+            values[members, 6] = rows["blocked_force"]
+        for k, number in enumerate(members.tolist()):
+            status[number] = STATUSES[rows["status"][k]]
+            message[number] = status[number].advice
+        for number, words in block.messages:
+            message[number] = words
+        tell(len(members))
+    lost = np.array([not s.has_solution for s in status])
+    values[lost] = np.nan
+    return Solved(values, tuple(status), tuple(message), frozenset(through))

@@ -2,21 +2,60 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.columns import OUTPUTS, Output
 from softnlp.base.statistics import Statistics, statistics
+from softnlp.base.status import Status
 from softnlp.model.contact_settings import ContactSettings
-from softnlp.studies.observed import NUMBERS, OBSERVABLES, OF_LENGTH, Observed, differences
-from softnlp.studies.simulated import Solved
+from softnlp.studies.measurements import Observed
 from softnlp.studies.variants import Variant, labels
 
 Array = NDArray[np.float64]
 
-AXES = ("tip_x", "tip_y", "tip_z")
+NUMBERS = ("tip_x", "tip_y", "tip_z", "bending_angle", "elongation", "tilt", "blocked_force")
+"""What is measured, one number each; m, rad, N. A row of a table holds them in this order."""
+
+_TIP = "tip_position"
+
+_WORDS = {_TIP: "distance of the tips", "tilt": "tilt of the tip", **{f"tip_{x}": f"tip along {x}" for x in "xyz"}}
+OBSERVABLES: Mapping[str, Output] = {
+    name: replace(OUTPUTS[name], words=_WORDS.get(name, "")) for name in (_TIP, *NUMBERS)
+}
+"""What errors are told of: `NUMBERS`, and how far apart the tips are."""
+
+OF_LENGTH = (_TIP, *NUMBERS[:3])
+"""Those whose errors are told in % of the robot's length, not of the number measured."""
+
+AXES = NUMBERS[:3]
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """What came of rows.
+
+    Attributes
+    ----------
+    values
+        (rows, 7) as `NUMBERS` [m, rad, N]; nan where there is no solution, the force also
+        where there is no wall.
+    status
+        Of each row; None of one that nothing was asked of.
+    message
+        Of each row; "" of one that nothing was asked of.
+    self_intersecting
+        The rows whose shape passes through itself.
+    """
+
+    values: Array
+    status: tuple[Status | None, ...]
+    message: tuple[str, ...]
+    self_intersecting: frozenset[int] = frozenset()
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,3 +252,17 @@ class Comparison:
 
     def _of(self, robot: int | None) -> list[Observed]:
         return [self.observed[k] for k in self._which(robot)]
+
+
+def differences(name: str, simulated: Array, measured: Array, length: float) -> tuple[Array, Array]:
+    """Return the errors (rows,) of an observable and what each is compared with; nan where one of both is missing.
+
+    simulated, measured : (rows, 7). length : L_0 [m].
+    """
+    if name == _TIP:
+        distance = np.linalg.norm(simulated[:, :3] - measured[:, :3], axis=1)
+        return np.asarray(distance), np.full(len(measured), length)
+    k = NUMBERS.index(name)
+    error = simulated[:, k] - measured[:, k]
+    whole = np.full(len(measured), length) if name in OF_LENGTH else measured[:, k]
+    return error, whole

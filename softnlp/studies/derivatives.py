@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +21,7 @@ from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
-from softnlp.studies.force_inversion import joint_engine
+from softnlp.studies.force_inversion import joint_solution
 
 Array = NDArray[np.float64]
 
@@ -118,24 +120,15 @@ class LinearPoint:
 
     def value(self, output: str) -> Array:
         """Return an output, flat, SI; the rotation as the rotation vector of the tip's orientation."""
-        raw = self._raw(self.solution)
         if output == "tip_rotation":
-            return rotation_vector(raw["tip_rotation"].reshape(3, 3, order="F"))
-        return self._plain(output, raw, self.solution)
+            return rotation_vector(_rotation(self._here))
+        return self._here[output]
 
     def derivative(self, output: str) -> Array:
         """Return d output / d theta (size, k); of the rotation, the rotation vector in the world frame."""
-        raw = self.derivatives.outputs(self.solution.x, self.solution.p, self.moves)
         if output == "tip_rotation":
-            R = self._raw(self.solution)["tip_rotation"].reshape(3, 3, order="F")
-            return spin(raw[f"{self.prefix}tip_rotation"], R)
-        if output == "blocked_force":
-            return raw[f"{self.prefix}tip_forces"][:1]
-        if output != "elongation":
-            return raw[f"{self.prefix}{output}"]
-        by_length = np.concatenate([np.full(q.size, 1.0 if q.name == "robot.length" else 0.0) for q in self.quantities])
-        change: Array = raw[f"{self.prefix}backbone_length"] - by_length
-        return change
+            return spin(self._slopes["tip_rotation"], _rotation(self._here))
+        return self._slopes[output]
 
     def solved_at(self, theta: Array) -> Solution:
         """Solve again with other values of the quantities, from the first-order prediction."""
@@ -151,31 +144,40 @@ class LinearPoint:
 
     def change(self, output: str, other: Solution) -> Array:
         """Return how an output differs at another solution; of the rotation, the rotation vector from here to there."""
-        here, there = self._raw(self.solution), self._raw(other)
+        there = self._outputs(other)
         if output == "tip_rotation":
-            R_0, R_1 = (raw["tip_rotation"].reshape(3, 3, order="F") for raw in (here, there))
-            return rotation_vector(R_1 @ R_0.T)
-        difference: Array = self._plain(output, there, other) - self._plain(output, here, self.solution)
-        return difference
+            return rotation_vector(_rotation(there) @ _rotation(self._here).T)
+        return there[output] - self._here[output]
 
-    def _raw(self, solution: Solution) -> dict[str, Array]:
-        values = self.problem.outputs(x=solution.x, p=solution.p)
-        return {
-            name.removeprefix(self.prefix): np.asarray(value).ravel(order="F")
-            for name, value in values.items()
-            if name.startswith(self.prefix)
-        }
+    @cached_property
+    def _here(self) -> dict[str, Array]:
+        return self._outputs(self.solution)
 
-    def _plain(self, output: str, raw: Mapping[str, Array], solution: Solution) -> Array:
-        """Return an output that is a vector or a number."""
-        if output == "blocked_force":
-            return raw["tip_forces"][:1]
-        if output != "elongation":
-            return raw[output]
+    @cached_property
+    def _slopes(self) -> dict[str, Array]:
+        by_length = [np.full(q.size, 1.0 if q.name == "robot.length" else 0.0) for q in self.quantities]
+        raw = self.derivatives.outputs(self.solution.x, self.solution.p, self.moves)
+        return self._named(raw, np.concatenate(by_length) if by_length else np.zeros(0))
+
+    def _outputs(self, solution: Solution) -> dict[str, Array]:
+        """Return every output at a solution, flat, SI."""
+        raw = self.problem.outputs(x=solution.x, p=solution.p)
         names = [q.name for q in self.problem.fixed]
         start = sum(q.size for q in self.problem.fixed[: names.index("robot.length")])
-        length: Array = raw["backbone_length"] - solution.p[start]
-        return length
+        flat = {name: np.asarray(value).ravel(order="F") for name, value in raw.items()}
+        return self._named(flat, solution.p[start])
+
+    def _named(self, raw: Mapping[str, Array], length: Any) -> dict[str, Array]:
+        """Return outputs of the problem, or their derivatives, by the names of `UNITS`; length : that of the robot."""
+        found = {name.removeprefix(self.prefix): v for name, v in raw.items() if name.startswith(self.prefix)}
+        found["elongation"] = found["backbone_length"] - length
+        if "tip_forces" in found:
+            found["blocked_force"] = found["tip_forces"][:1]
+        return found
+
+
+def _rotation(outputs: Mapping[str, Array]) -> Array:
+    return outputs["tip_rotation"].reshape(3, 3, order="F")
 
 
 def spin(dR: Array, R: Array) -> Array:
@@ -212,25 +214,13 @@ def blocked_point(solver: BlockedSolver, found: Blocked, names: Sequence[str]) -
 
     Free and blocked shape are one problem here, solved once more together. Raises as `PoseDerivatives.at`.
     """
-    intervals = found.grid.intervals
-    engine = joint_engine(solver, intervals, free_pressure=False)
-    problem = engine.problem
-    values = solver.values(found.situation, found.pressed, np.zeros(0))
-    del values["contact.free_lengths"]
-    grid = solver.poses.grid(intervals)
-    values_free = solver.poses.values(found.situation.pressure, found.situation.loads)
-    near = found.free
-    arc = solver.poses.arc_guess(grid, near.column, near.stretch)
-    guess = arc if near.solved is None else solver.poses.transfer(near.solved, grid)
-    free = grid.engine.solve(grid.problem.pack(values_free), guess)
-    start = np.concatenate([free.x, found.solution.x])
-    solution = engine.solve(problem.pack(values), start)
+    engine, solution, start = joint_solution(solver, found, {}, free_pressure=False)
     # The blocked shape took its free lengths from the closed form or from another grid: nearly the same ones.
     if not solution.holds(solver.numerics.tolerance) or float(np.max(np.abs(solution.x - start))) > 1e-2:
         return None
     chosen = tuple(dict.fromkeys(names))
-    key = ("derivatives", solver.numerics.transcription, intervals, chosen)
-    derivatives = solver.equations.kept(key, lambda: ImplicitDerivatives(problem, chosen))
+    key = ("derivatives", solver.numerics.transcription, found.grid.intervals, chosen)
+    derivatives = solver.equations.kept(key, lambda: ImplicitDerivatives(engine.problem, chosen))
     return LinearPoint(engine, solution, derivatives, derivatives.states(solution.x, solution.p), "blocked_")
 
 

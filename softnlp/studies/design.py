@@ -6,11 +6,13 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from math import isfinite, prod
 from multiprocessing.queues import Queue
 from multiprocessing.synchronize import Event
 from queue import Empty
 from typing import Any
 
+from softnlp.base.errors import InputError
 from softnlp.base.processes import begin_worker, process_context
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
@@ -27,6 +29,7 @@ from softnlp.studies.forward import checked_loads
 
 Progress = Callable[[int, Candidate], None]
 _CHUNK = 8  # candidates that a process is given at once; most of one structure, which is compiled once
+_SEED = 7  # of a search
 _PATIENCE = 0.2  # [s] without a candidate, after which it is asked whether a process has failed
 
 
@@ -142,12 +145,7 @@ def finished(setting: Setting, task: DesignTask, candidates: Sequence[Candidate]
 def _candidates(setting: Setting, task: DesignTask, workers: int) -> Iterator[Candidate]:
     """Yield every candidate as it is done."""
     workshop = Workshop(setting, task)
-    total = 1
-    for values in task.lists.values():
-        total *= len(values)
-    if total > MOST_ENUMERATED:
-        from softnlp.studies.design_search import searched
-
+    if prod(len(values) for values in task.lists.values()) > MOST_ENUMERATED:
         yield from searched(workshop)
         return
     every = list(enumerate(task.combinations(), start=1))
@@ -156,6 +154,47 @@ def _candidates(setting: Setting, task: DesignTask, workers: int) -> Iterator[Ca
         return
     for number, combination in every:
         yield workshop.candidate(number, combination)
+
+
+def searched(workshop: Workshop) -> Iterator[Candidate]:
+    """Yield the candidates of a search by optuna's tree-structured Parzen estimator; none twice, at most `trials`.
+
+    A candidate that is not feasible counts as worse than every feasible one that was met before it.
+
+    Raises
+    ------
+    InputError
+        Where optuna is not installed.
+    """
+    try:
+        import optuna
+    except ImportError:
+        raise InputError(
+            "so many combinations are searched by optuna, which is not installed: pip install 'softnlp[design]', or "
+            "list fewer values",
+            key="choices",
+        ) from None
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    task = workshop.task
+    study = optuna.create_study(
+        direction="maximize" if task.maximise else "minimize", sampler=optuna.samplers.TPESampler(seed=_SEED)
+    )
+    met: dict[tuple[int, ...], float] = {}
+    worst = 0.0
+    for _ in range(task.trials):
+        trial = study.ask()
+        place = tuple(trial.suggest_categorical(name, list(range(len(values)))) for name, values in task.lists.items())
+        if place not in met:
+            combination = {name: values[k] for k, (name, values) in zip(place, task.lists.items(), strict=True)}
+            candidate = workshop.candidate(len(met) + 1, combination)
+            if candidate.is_feasible and isfinite(candidate.objective):
+                value = candidate.objective / task.objective.scale
+                worst = min(worst, task.sign * value)
+            else:
+                value = task.sign * (worst - 1.0)
+            met[place] = value
+            yield candidate
+        study.tell(trial, met[place])
 
 
 def _in_processes(

@@ -148,7 +148,7 @@ class Workshop:
                 if not found.outputs:
                     ended = f"; at {pressure / 1e5:.4g} bar {reasons[0]}"
                     continue
-            off = sum(part for _, part in missed(found.outputs, self.task.requirements))
+            off = sum(part for _, _, part in missed(found.outputs, self.task.requirements))
             if nearest is None or off < nearest[0]:
                 nearest = off, found
         if nearest is None:
@@ -160,12 +160,11 @@ class Workshop:
         """Optimise the pressure alone, unless one requirement is missed at every pressure."""
         optimiser = self.optimiser(model)
         looked = [optimiser.evaluator.free(model, float(P)) for P in np.linspace(*_ends(pressure), _LEVELS)]
-        missing = [dict(missed_names(e, self.task)) for e in looked if e.outputs]
-        always = set.intersection(*(set(m) for m in missing)) if missing else set()
-        if always:
-            nearest = min(
-                (e for e in looked if e.outputs), key=lambda e: sum(dict(missed_names(e, self.task)).values())
-            )
+        missing = [
+            (e, {name: off for name, _, off in missed(e.outputs, self.task.requirements)}) for e in looked if e.outputs
+        ]
+        if missing and set.intersection(*(set(names) for _, names in missing)):
+            nearest = min(missing, key=lambda found: sum(found[1].values()))[0]
             reasons = "; ".join(unmet(nearest, self.task))
             return Optimised(nearest, (f"no pressure meets everything; nearest is {reasons}",))
         return optimiser.best(model, pressure)
@@ -189,14 +188,6 @@ class Workshop:
 def _ends(pressure: Range) -> tuple[float, float]:
     """Return the pressures between which to look; not zero, where nothing bends."""
     return max(pressure.lower, pressure.upper / _LEVELS), pressure.upper
-
-
-def missed_names(found: Evaluation, task: DesignTask) -> list[tuple[str, float]]:
-    """Return the names of the requirements that known outputs miss, with the part of the limit."""
-    names = []
-    for name, limits in task.requirements.items():
-        names += [(name, part) for _, part in missed(found.outputs, {name: limits})]
-    return names
 
 
 def structure(robot: Robot, material: Material) -> tuple[int, int, str]:

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,13 +15,12 @@ from softnlp.base.status import Status
 from softnlp.model.quantities import Model
 from softnlp.model.robot import SELF_INTERSECTION, Robot, touching_stretch, violations
 from softnlp.model.rules import neighbours
+from softnlp.statics.arc import Arc, unloaded_arc
 from softnlp.statics.blocked_grid import Blocked
-from softnlp.statics.branch import stretch_on_branch
 from softnlp.statics.kept import blocked_solver, pose_solver
 from softnlp.statics.loadcase import RodFunctions
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.step import Pose, Step
-from softnlp.statics.unloaded import unloaded_case
 from softnlp.statics.wall import Wall, standing_wall
 from softnlp.studies.design_task import OUTPUTS, DesignTask, Limits, Setting
 
@@ -64,16 +62,15 @@ def chamber_gaps(robot: Robot, stretch: Any) -> list[Any]:
     return [chord * stretch**-0.5 - 2 * robot.chamber_radius for chord, _, _ in neighbours(robot)]
 
 
-def pose_outputs(pose: Pose, length: float) -> dict[str, float]:
-    """Return the outputs of kind "free" of a solved pose."""
-    case = {key: getattr(pose, key) for key in ("bending_angle", "stretch", "backbone_length", "tip_position")}
-    return {name: float(value) for name, value in free_outputs(case, length).items()}
+def shape_outputs(robot: Robot, shape: Pose | Arc) -> dict[str, float]:
+    """Return the outputs of kind "free" of a solved shape, with the smallest gap between neighbouring chambers.
 
-
-def _smallest_gap(robot: Robot, stretch: float) -> float:
-    """Return the smallest gap between neighbouring reinforced chambers at a stretch [m]; inf for a single chamber."""
-    touching = touching_stretch(robot)
-    return 2 * float(robot.chamber_radius) * (float(np.sqrt(touching / stretch)) - 1)
+    The gap is between reinforced chambers, at the shape's stretch [m]; inf for a single chamber.
+    """
+    case = {key: getattr(shape, key) for key in ("bending_angle", "stretch", "backbone_length", "tip_position")}
+    outputs = {name: float(value) for name, value in free_outputs(case, float(robot.length)).items()}
+    gap = 2 * float(robot.chamber_radius) * (float(np.sqrt(touching_stretch(robot) / shape.stretch)) - 1)
+    return {**outputs, "chamber_gap": gap}
 
 
 def shown(output: Output, value: float) -> str:
@@ -82,8 +79,8 @@ def shown(output: Output, value: float) -> str:
     return f"{value / output.scale:.5g}{unit}"
 
 
-def missed(outputs: Mapping[str, float], requirements: Mapping[str, Limits]) -> Iterator[tuple[str, float]]:
-    """Yield, for each requirement that known outputs miss: in words, and by which part of its limit."""
+def missed(outputs: Mapping[str, float], requirements: Mapping[str, Limits]) -> Iterator[tuple[str, str, float]]:
+    """Yield, for each requirement that known outputs miss: its name, in words, and by which part of its limit."""
     for name, limits in requirements.items():
         if name not in outputs:
             continue
@@ -94,7 +91,8 @@ def missed(outputs: Mapping[str, float], requirements: Mapping[str, Limits]) -> 
         ):
             size = max(abs(limit), 1e-3 * output.scale) if np.isfinite(limit) else np.inf
             if not off <= FEASIBLE * size:
-                yield f"{output.key}: {shown(output, value)}, at {words} {shown(output, limit)} wanted", off / size
+                said = f"{output.key}: {shown(output, value)}, at {words} {shown(output, limit)} wanted"
+                yield name, said, off / size
 
 
 def broken_rules(robot: Robot, task: DesignTask) -> list[str]:
@@ -104,7 +102,7 @@ def broken_rules(robot: Robot, task: DesignTask) -> list[str]:
     except RobotError as error:
         return [str(error)]
     rules = [f"{v.rule}: {v.message}" for v in found if not (v.lowerable and v.rule in task.allow)]
-    return rules + [words for words, _ in missed(robot_outputs(robot), task.requirements)]
+    return rules + [words for _, words, _ in missed(robot_outputs(robot), task.requirements)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,11 +138,6 @@ class Evaluator:
         numerics = setting.numerics
         self.solver = blocked_solver(model, numerics, setting.contact) if task.needs_force else None
         self.poses = self.solver.poses if self.solver else pose_solver(model, numerics)
-        case = unloaded_case("free", self.functions, self.poses.quantities)
-        found = free_outputs(case.outputs, self.poses.quantities["robot.length"].symbol)
-        symbols = [q.symbol for q in self.poses.quantities.values()]
-        self._names = list(found)
-        self._arc = ca.Function("arc", [*symbols, case.symbols[0]], list(found.values()))
 
     @property
     def functions(self) -> RodFunctions:
@@ -155,19 +148,14 @@ class Evaluator:
         """Return the free shape at a pressure [Pa]: in closed form without loads, else solved."""
         P = pressure * self.direction
         poses = self.poses.with_model(model)
-        values = poses.values(P, self.setting.loads)
         known = {**robot_outputs(model.robot), "pressure": pressure}
         if self.setting.loads.act:
             step, solved = poses.solve(P, self.setting.loads)
             return self._of_pose(model, pressure, known, step, step.pose, solved)
-        branch = stretch_on_branch(poses.branch, poses.column(values), P)
+        branch, arc = unloaded_arc(poses, P)
         if branch.status is not Status.SOLVED:
             return Evaluation(model, pressure, branch.status, branch.message, {})
-        numbers = [values.get(name, q.nominal) for name, q in poses.quantities.items()]
-        found = zip(self._names, self._arc.call([*numbers, branch.stretch]), strict=True)
-        outputs = {**known, **{name: float(value) for name, value in found}}
-        outputs["chamber_gap"] = _smallest_gap(model.robot, branch.stretch)
-        return Evaluation(model, pressure, Status.SOLVED, branch.message, outputs)
+        return Evaluation(model, pressure, Status.SOLVED, branch.message, {**known, **shape_outputs(model.robot, arc)})
 
     def full(self, model: Model, pressure: float) -> Evaluation:
         """Return everything that the task asks of a design at a pressure [Pa], to the accuracy of the setting."""
@@ -191,8 +179,7 @@ class Evaluator:
     ) -> Evaluation:
         if pose is None:
             return Evaluation(model, pressure, step.status, step.message, {}, step)
-        outputs = {**known, **pose_outputs(pose, float(model.robot.length))}
-        outputs["chamber_gap"] = _smallest_gap(model.robot, pose.stretch)
+        outputs = {**known, **shape_outputs(model.robot, pose)}
         return Evaluation(model, pressure, step.status, step.message, outputs, step, free)
 
 
@@ -200,7 +187,7 @@ def unmet(found: Evaluation, task: DesignTask) -> list[str]:
     """Return why a design at a pressure is not feasible, in words; nothing where it is."""
     if not found.outputs:
         return [f"{found.status.value}: {found.message}"]
-    reasons = [words for words, _ in missed(found.outputs, task.requirements)]
+    reasons = [words for _, words, _ in missed(found.outputs, task.requirements)]
     contact = found.step and found.step.contact
     free = found.step and (contact.free if contact else found.step.pose)
     if free and free.stable is False:

@@ -234,17 +234,8 @@ class Optimiser:
     def _at_rest(self, posed: DesignProblem, column: Array) -> Array:
         """Return x of the straight robot without pressure or wall force."""
         head = posed.problem.pack_free({q.name: 0.0 if q.name == PRESSURE else q.nominal for q in posed.problem.free})
-        parts = [head]
-        for case in posed.cases:
-            s, none = (
-                case.transcribed.points,
-                np.where(np.arange(column.size) < len(self.evaluator.direction), 0.0, column),
-            )
-            states = np.asarray(case.functions.arc(none, 1.0, s[None, :])) if s.size else np.zeros(0)
-            parts.append(
-                np.concatenate([[1.0], states.T.ravel(), np.zeros(case.functions.tip_unknowns * bool(s.size))])
-            )
-        return np.concatenate(parts)
+        none = np.where(np.arange(column.size) < len(self.evaluator.direction), 0.0, column)
+        return np.concatenate([head, *(case.arc(none, 1.0) for case in posed.cases)])
 
     def _plane(self, begun: Evaluation) -> Array | None:
         """Return the normal of the plane that the blocked shape of a design keeps to."""
@@ -255,31 +246,26 @@ class Optimiser:
 
     def _guess(self, case: LoadCase, begun: Evaluation, column: Array) -> Array:
         """Return the unknowns of a case at a solved design; where there is none of the case, the arc's."""
-        stretch = begun.outputs["stretch"]
-        s = case.transcribed.points
-        if s.size == 0:
-            return np.array([stretch])
+        stretch, s = begun.outputs["stretch"], case.transcribed.points
         functions, free, blocked = case.functions, begun.free, begun.blocked
-        forces = np.zeros(functions.tip_unknowns)
-        if case.name == "blocked" and blocked is not None:
+        if s.size and case.name == "blocked" and blocked is not None:
             nodes = blocked.grid.nodes(blocked.solution.x)
             states = between_nodes(self._shape, nodes, blocked.constants, s)[: functions.state_size]
-            forces = blocked.grid.tip_forces(blocked.solution.x)
-        elif case.name == "free" and free is not None:
+            return np.concatenate([[stretch], states.T.ravel(), blocked.grid.tip_forces(blocked.solution.x)])
+        if s.size and case.name == "free" and free is not None:
             states = between_nodes(self.evaluator.poses.shape, free.nodes, free.constants, s)[:STATE_SIZE]
-        else:
-            states = np.asarray(functions.arc(column, stretch, s[None, :]))
-        return np.concatenate([[stretch], states.T.ravel(), forces])
+            return np.concatenate([[stretch], states.T.ravel()])
+        return case.arc(column, stretch)
 
     def _active(self, posed: DesignProblem, lam_g: Array, lam_x: Array, scale: float) -> Iterator[Active]:
         """Yield the limits with a multiplier, rows first, then bounds of the choices."""
         problem = posed.problem
         # f = -sign objective / scale and df/d(upper) = -lam, so loosening an upper limit gains sign scale lam.
         sign = self.evaluator.task.sign
-        for limit in posed.limits:
-            lam = float(lam_g[limit.row])
+        for row, limit in posed.limits:
+            lam = float(lam_g[row])
             if abs(lam) > _ACTIVE:
-                bound = (posed.upper if lam > 0 else posed.lower)[limit.row] * limit.scale
+                bound = (posed.upper if lam > 0 else posed.lower)[row] * limit.scale
                 has_limit = limit.name in OUTPUTS or limit.unit == "m"
                 yield Active(
                     limit.name,

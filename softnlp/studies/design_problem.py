@@ -20,7 +20,7 @@ from softnlp.nlp.optimality import Bounds, slopes
 from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
 from softnlp.nlp.transcription import MultipleShooting
 from softnlp.statics.condensed import CondensedSolver
-from softnlp.statics.loadcase import LoadCase, load_case
+from softnlp.statics.loadcase import LoadCase, blocked_case, load_case
 from softnlp.statics.unloaded import unloaded_case
 from softnlp.studies.design_evaluate import Evaluator, chamber_gaps, free_outputs, robot_outputs
 from softnlp.studies.design_task import OUTPUTS, DesignTask, Range
@@ -37,31 +37,18 @@ _SLOPE = 1e-3  # of the scaled stretch balance: the branch from zero pressure en
 
 
 @dataclass(frozen=True, eq=False)
-class Limit:
-    """One side-limited row of the problem, in words people know.
-
-    name : of an output, a rule of manufacture, or what else limits designs. row : in the residual. scale : SI value of
-    a scaled one. unit : SI.
-    """
-
-    name: str
-    row: int
-    scale: float
-    unit: str
-
-
-@dataclass(frozen=True, eq=False)
 class DesignProblem:
     """The compiled program of one structure on one grid; material and what is not chosen are fixed values.
 
-    cases : "free", and "blocked" where a force is asked. limits : of its inequality rows.
+    cases : "free", and "blocked" where a force is asked. limits : of its inequality rows,
+    each with the constraint that it is of.
     guard : (x, p) -> the determinant of the blocked tip equations, over a fixed value; it keeps
     its sign on the branch. options : of IPOPT, which have the last word.
     """
 
     problem: CompiledProblem
     cases: tuple[LoadCase, ...]
-    limits: tuple[Limit, ...]
+    limits: tuple[tuple[int, Constraint], ...]
     guard: ca.Function | None
     options: Mapping[str, Any]
 
@@ -155,10 +142,8 @@ def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) ->
     outputs = {**robot_outputs(robot), **free_outputs(free_case.outputs, robot.length), "pressure": applied.symbol}
     outputs["chamber_gap"] = ca.vertcat(*chamber_gaps(robot, free_case.outputs["stretch"]))
     if free_lengths is not None:
-        lengths = replace(free_lengths, symbol=free_case.outputs["chamber_lengths"])
-        order = {name: lengths if name == "contact.free_lengths" else given[name] for name in functions.declared()}
-        blocked = load_case("blocked", functions, order, method)
-        column = ca.vertcat(*(q.symbol for q in order.values()))
+        blocked = blocked_case("blocked", functions, given, free_case, method)
+        column = ca.vertcat(*(q.symbol for q in blocked.given.values()))
         size = CondensedSolver(functions, method, plane).determinant_expression(ca.vertcat(*blocked.symbols), column)
         fold = declared[FOLD_SCALE] = quantity(FOLD_SCALE, "1", 1.0)
         cases.append(replace(blocked, outputs={**blocked.outputs, "determinant": size / fold.symbol}))
@@ -179,25 +164,18 @@ def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) ->
         objective=-task.sign * outputs[task.objective.name] / scale.symbol,
     )
     guard = _guard(problem) if len(cases) > 1 else None
-    options = dict(evaluator.setting.numerics.ipopt)
-    return DesignProblem(problem, tuple(cases), tuple(_limits(constraints, problem)), guard, options)
+    sides = [c for c in constraints for _ in range(c.expression.numel())]
+    first = problem.lower_g.size - len(sides)
+    if guard is not None:
+        sides.append(Constraint("fold of the blocked shape", ca.MX(), FOLD, np.inf))
+    sided = tuple(enumerate(sides, start=first))
+    return DesignProblem(problem, tuple(cases), sided, guard, dict(evaluator.setting.numerics.ipopt))
 
 
 def _guard(problem: CompiledProblem) -> ca.Function:
     """Return the blocked tip equations' determinant over its value at the start, by (x, p)."""
     x, p = (problem.nlp[key] for key in "xp")
     return ca.Function("guard", [x, p], [problem.outputs.call({"x": x, "p": p})["blocked_determinant"]])
-
-
-def _limits(constraints: list[Constraint], problem: CompiledProblem) -> Iterator[Limit]:
-    """Name the inequality rows."""
-    row = problem.lower_g.size - sum(c.expression.numel() for c in constraints)
-    for c in constraints:
-        for _ in range(c.expression.numel()):
-            yield Limit(c.name, row, float(c.scale), c.unit)
-            row += 1
-    if len(problem.cases) > 1:
-        yield Limit("fold of the blocked shape", row, 1.0, "1")
 
 
 def _rules(robot: Robot, task: DesignTask) -> Iterator[Constraint]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.errors import InputError
-from softnlp.base.quantity import Quantity, quantity
+from softnlp.base.quantity import quantity
 from softnlp.base.status import Status
 from softnlp.base.units import BAR
 from softnlp.model.contact_settings import ContactSettings
@@ -20,13 +21,13 @@ from softnlp.model.quantities import Model
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
 from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
-from softnlp.nlp.solver import Engine
+from softnlp.nlp.solver import Engine, Solution
 from softnlp.nlp.transcription import method_named
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
 from softnlp.statics.condensed import linear_solver
 from softnlp.statics.kept import blocked_solver
-from softnlp.statics.loadcase import LoadCase, load_case
+from softnlp.statics.loadcase import blocked_case, load_case
 from softnlp.statics.step import Step
 from softnlp.statics.wall import checked_contact, standing_wall
 from softnlp.studies.forward import checked_loads
@@ -148,18 +149,6 @@ def _bracketed(
     return P, step, solved
 
 
-def joint_cases(solver: BlockedSolver, given: Mapping[str, Quantity], intervals: int) -> tuple[LoadCase, LoadCase]:
-    """Return the free and the blocked shape of the same quantities; the blocked one takes the free one's lengths.
-
-    given : every name of `solver.functions.declared()`; its "contact.free_lengths" is not used.
-    """
-    method = method_named(solver.numerics.transcription, intervals)
-    free = load_case("free", solver.poses.functions, given, method)
-    lengths = replace(given["contact.free_lengths"], symbol=free.outputs["chamber_lengths"])
-    order = {name: lengths if name == "contact.free_lengths" else q for name, q in given.items()}
-    return free, load_case("blocked", solver.functions, order, method)
-
-
 def joint_problem(solver: BlockedSolver, intervals: int, *, free_pressure: bool) -> CompiledProblem:
     """Return the problem of the free and the blocked shape with shared pressure, geometry and material.
 
@@ -173,7 +162,9 @@ def joint_problem(solver: BlockedSolver, intervals: int, *, free_pressure: bool)
     if free_pressure:
         pressure = declared["pressure"]
         shared["pressure"] = replace(pressure, symbol=scale.symbol * pressure.symbol)
-    free, blocked = joint_cases(solver, shared, intervals)
+    method = method_named(solver.numerics.transcription, intervals)
+    free = load_case("free", solver.poses.functions, shared, method)
+    blocked = blocked_case("blocked", solver.functions, shared, free, method)
     del declared["contact.free_lengths"]
     if not free_pressure:
         return compile_problem(list(declared.values()), [free, blocked])
@@ -199,22 +190,29 @@ def joint_engine(solver: BlockedSolver, intervals: int, *, free_pressure: bool) 
     return solver.equations.kept(key, made)
 
 
+def joint_solution(
+    solver: BlockedSolver, near: Blocked, given: Mapping[str, Any], *, free_pressure: bool
+) -> tuple[Engine, Solution, Array]:
+    """Solve both shapes at once from a blocked solution nearby; return what solved them, the solution, and its start.
+
+    given : values of `joint_problem` by name other than those of the blocked solution.
+    """
+    engine = joint_engine(solver, near.grid.intervals, free_pressure=free_pressure)
+    values = solver.values(near.situation, near.pressed, np.zeros(0))
+    del values["contact.free_lengths"]
+    p = engine.problem.pack({**values, **given})
+    grid, shape = solver.poses.grid(near.grid.intervals), near.free
+    arc = solver.poses.arc_guess(grid, shape.column, shape.stretch)
+    guess = arc if shape.solved is None else solver.poses.transfer(shape.solved, grid)
+    free = grid.engine.solve(shape.column, guess)
+    start = np.concatenate([[1.0] * free_pressure, free.x, near.solution.x])
+    return engine, engine.solve(p, start), start
+
+
 def _jointly(solver: BlockedSolver, near: Blocked, direction: Array, pressure: float, force: float) -> float | None:
     """Solve both shapes with the pressure free, from a blocked solution nearby; return the pressure [Pa]."""
-    intervals = near.grid.intervals
-    engine = joint_engine(solver, intervals, free_pressure=True)
-    problem = engine.problem
-    values = solver.values(near.situation, near.pressed, np.zeros(0))
-    values.pop("contact.free_lengths")
-    p = problem.pack({**values, "pressure": direction * pressure, "target force": force})
-    grid = solver.poses.grid(intervals)
-    x_free = (
-        solver.poses.transfer(near.free.solved, grid)
-        if near.free.solved is not None
-        else solver.poses.arc_guess(grid, near.free.column, near.free.stretch)
-    )
-    free = grid.engine.solve(near.free.column, x_free)
-    solution = engine.solve(p, np.concatenate([[1.0], free.x, near.solution.x]))
+    given = {"pressure": direction * pressure, "target force": force}
+    engine, solution, _ = joint_solution(solver, near, given, free_pressure=True)
     if not solution.holds(solver.numerics.tolerance):
         return None
-    return float(problem.free_values(solution.x)["pressure scale"][0]) * pressure
+    return float(engine.problem.free_values(solution.x)["pressure scale"][0]) * pressure

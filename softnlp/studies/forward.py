@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -73,17 +73,28 @@ def forward(
     if times is not None and len(times) != len(P):
         raise InputError(f"expected one time a step, got {len(times)} times for {len(P)} steps", key="times")
     solver = pose_solver(Model(robot, material, coefficients, conventions), numerics)
+    steps = followed(lambda pressure, near: solver.solve(pressure, loads, near), P, progress, times)
+    return Run("forward", robot, material, coefficients, conventions, loads, steps, title, warnings)
+
+
+def followed(
+    solve: Callable[[Any, Any], tuple[Step, Any]],
+    asked: Iterable[Any],
+    progress: Callable[[int, Step], None] | None,
+    times: Sequence[float] | None = None,
+) -> tuple[Step, ...]:
+    """Solve what is asked in order, each begun from the last that was found; each step is told, with its time."""
     steps: list[Step] = []
     near = None
-    for k, pressure in enumerate(P):
-        step, solved = solver.solve(pressure, loads, near)
-        near = solved or near
+    for k, one in enumerate(asked):
+        step, found = solve(one, near)
+        near = found or near
         if times is not None:
             step = replace(step, time=float(times[k]))
         steps.append(step)
         if progress is not None:
             progress(k, step)
-    return Run("forward", robot, material, coefficients, conventions, loads, tuple(steps), title, warnings)
+    return tuple(steps)
 
 
 def pressure_table(pressures: Any, sets: int) -> NDArray[np.float64]:

@@ -24,11 +24,21 @@ from softnlp.model.quantities import Model
 from softnlp.model.rod import Loads
 from softnlp.nlp.optimality import OPTIMAL, misfit_slope, not_optimal
 from softnlp.statics.closing import DisputedError
+from softnlp.statics.kept import blocked_solver, pose_solver
 from softnlp.statics.wall import checked_contact
 from softnlp.studies.fit_statistics import Uncertainty, open_constants, uncertainty
 from softnlp.studies.forward import checked_loads
-from softnlp.studies.free_constants import FreeConstants, constants_text, file_name, free_constants
-from softnlp.studies.identified import Identified, grown_errors, unexplained, without_constants
+from softnlp.studies.identified import (
+    FreeConstants,
+    Identified,
+    constants_text,
+    file_name,
+    free_constants,
+    grown_errors,
+    unexplained,
+    weighted_residuals,
+    without_constants,
+)
 from softnlp.studies.identify_nlp import closed_fit
 from softnlp.studies.measurements import (
     POSE_COLUMNS,
@@ -36,9 +46,7 @@ from softnlp.studies.measurements import (
     Measurements,
     checked_measurements,
 )
-from softnlp.studies.predicted import Predicted
-from softnlp.studies.predicted_pose import Prediction
-from softnlp.studies.trial import TrialBlocked, TrialPoses
+from softnlp.studies.predicted import Predicted, Prediction
 
 Array = NDArray[np.float64]
 
@@ -99,7 +107,7 @@ def identify(
         raise InputError("expected measurements of at least one robot", key="measurements")
     data = tuple(checked_measurements(m) for m in given)
     chosen = free_constants(free, material, coefficients, bounds)
-    count = sum(int(np.sum(d.measured[d.root_weight > 0])) for d in data)
+    count = sum(int(np.sum(d.fitted)) for d in data)
     if count < len(free):
         raise InputError(f"{count} numbers measured cannot determine {len(free)} constants", key="free")
     loads = checked_loads(loads)
@@ -107,16 +115,13 @@ def identify(
     if contact.closure == "weighted" and any(np.any(d.measured[:, -1]) for d in data):
         raise InputError("expected a closure that has a definite force; 'weighted' depends on weights", key="closure")
     searching = numerics if numerics.engine == "ipopt" else numerics.without_ipopt()
-    poses: dict[tuple[int, int], TrialPoses] = {}
-    forces: dict[tuple[int, int], TrialBlocked] = {}
     models = []
     for d in data:
-        kind = (d.robot.chamber_sets, d.robot.chambers_per_set)
-        if kind not in poses:
-            poses[kind] = TrialPoses(Model(d.robot, material, coefficients, conventions), searching)
-        if kind not in forces and np.any(d.measured[:, -1]):
-            forces[kind] = TrialBlocked(poses[kind], contact)
-        models.append(Predicted(d, poses[kind].of(d.robot), forces.get(kind), chosen, loads))
+        # Where nothing loads free shapes they are known in closed form.
+        model = Model(d.robot, material, coefficients, conventions)
+        poses = pose_solver(model, searching, unloaded_accuracy=searching.accuracy)
+        blocked = blocked_solver(model, searching, contact) if np.any(d.measured[:, -1]) else None
+        models.append(Predicted(d, poses, blocked, chosen, loads))
     found = _Fit(data, models, chosen, material, coefficients, progress).solve()
     if found.status is not Status.SOLVED:
         return found
@@ -149,8 +154,6 @@ class _Fit:
         self.coefficients = coefficients
         self.progress = progress
         self.evaluations = 0
-        self.measured = [d.measured for d in data]
-        self.fitted = [d.measured & (d.root_weight[:, None] > 0) for d in data]
         self._last: tuple[Array, list[Prediction]] | None = None
         self._cost = np.inf  # half the sum of squares at the end of the last search
 
@@ -197,17 +200,12 @@ class _Fit:
 
     def residuals(self, found: Sequence[Prediction]) -> Array:
         """Return the weighted residuals of all numbers measured; nan where a pose was not found."""
-        parts = []
-        for d, prediction, mask in zip(self.data, found, self.fitted, strict=True):
-            parts.append(((prediction.values - d.values) / d.sigma * d.root_weight[:, None])[mask])
-        return np.concatenate(parts)
+        return weighted_residuals(self.data, [prediction.values for prediction in found])
 
     def jacobian(self, found: Sequence[Prediction]) -> Array:
         """Return the derivative of the weighted residuals by the constants."""
-        parts = []
-        for d, prediction, mask in zip(self.data, found, self.fitted, strict=True):
-            parts.append((prediction.slopes / d.sigma[:, :, None] * d.root_weight[:, None, None])[mask])
-        return np.concatenate(parts)
+        pairs = [(d, prediction.slopes) for d, prediction in zip(self.data, found, strict=True)]
+        return np.concatenate([(J / d.sigma[:, :, None] * d.root_weight[:, None, None])[d.fitted] for d, J in pairs])
 
     def _minimise(self, start: Array) -> Array:
         """Return the constants at the minimum within the bounds.
@@ -275,15 +273,10 @@ class _Fit:
             if not np.max(J[:, k]) > 0:
                 raise InputError(f"no measurement depends on {name!r}; fix it", key="free")
 
-    def _at_bounds(self, x: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Whether each constant is at its lower bound, and at its upper one."""
-        near = _AT_BOUND * np.maximum(self.free.scale, np.abs(x))
-        return x - self.free.lower < near, self.free.upper - x < near
-
     def _found(self, x: Array, first: Sequence[Prediction], last: Sequence[Prediction]) -> Identified:
-        low, high = self._at_bounds(x)
+        near = _AT_BOUND * np.maximum(self.free.scale, np.abs(x))
+        low, high = x - self.free.lower < near, self.free.upper - x < near
         held = [bool(h) for h in low | high]
-        at_bound = tuple(name for name, h in zip(self.free.names, held, strict=True) if h)
         J, r = self.jacobian(last), self.residuals(last)
         known = uncertainty(self.free.names, J, r, held)
         units = np.array([unit for _, unit in self.keys])
@@ -293,15 +286,21 @@ class _Fit:
             *self._stretched(last),
             *self._impossible(x, last),
         ]
-        status, message = Status.SOLVED, "the sum of squares is at a minimum"
+        found = replace(
+            self._result(x, first, last),
+            at_bound=tuple(name for name, h in zip(self.free.names, held, strict=True) if h),
+            uncertainty=known,
+            warnings=tuple(warnings),
+        )
         if (kkt := misfit_slope(J, r, low, high)) > OPTIMAL:
-            status, message = Status.NOT_OPTIMAL, not_optimal(kkt, f"{self.evaluations} evaluations")
-        material, coefficients = self.material, self.coefficients
+            words = not_optimal(kkt, f"{self.evaluations} evaluations")
+            found = replace(found, status=Status.NOT_OPTIMAL, message=words)
         try:
-            material, coefficients = self.free.applied(x, material, coefficients)
+            material, coefficients = self.free.applied(x, self.material, self.coefficients)
+            found = replace(found, material=material, coefficients=coefficients)
         except MaterialError as error:
-            status, message = Status.UNSTABLE_MATERIAL, f"the constants found are no material: {error.message}"
-        found = self._result(status, message, x, at_bound, known, material, coefficients, first, last, warnings)
+            words = f"the constants found are no material: {error.message}"
+            found = replace(found, status=Status.UNSTABLE_MATERIAL, message=words)
         return replace(found, warnings=(*found.warnings, *unexplained(found), *grown_errors(found)))
 
     def _stretched(self, found: Sequence[Prediction]) -> list[str]:
@@ -326,40 +325,26 @@ class _Fit:
                 yield from (f"{d.label}, measurement {row + 1}: {words}" for words in fit.warnings)
 
     def _unsolved(self, status: Status, message: str, first: Sequence[Prediction]) -> Identified:
-        found = self._result(
-            *(status, message, self.free.start, (), _NOTHING, self.material, self.coefficients, first, first, [])
-        )
-        return without_constants(found, status, message)
+        return without_constants(self._result(self.free.start, first, first), status, message)
 
-    def _result(
-        self,
-        status: Status,
-        message: str,
-        x: Array,
-        at_bound: tuple[str, ...],
-        known: Uncertainty,
-        material: Material,
-        coefficients: Coefficients,
-        first: Sequence[Prediction],
-        last: Sequence[Prediction],
-        warnings: Sequence[str],
-    ) -> Identified:
+    def _result(self, x: Array, first: Sequence[Prediction], last: Sequence[Prediction]) -> Identified:
+        """Return constants with the model at the start and at the end, before anything is said of them."""
         before, after = (
-            tuple(np.where(m, p.values, np.nan) for p, m in zip(every, self.measured, strict=True))
+            tuple(np.where(d.measured, p.values, np.nan) for p, d in zip(every, self.data, strict=True))
             for every in (first, last)
         )
         return Identified(
-            status=status,
-            message=message,
+            status=Status.SOLVED,
+            message="the sum of squares is at a minimum",
             free=self.free,
             constants=x,
-            at_bound=at_bound,
-            uncertainty=known,
-            material=material,
-            coefficients=coefficients,
+            at_bound=(),
+            uncertainty=_NOTHING,
+            material=self.material,
+            coefficients=self.coefficients,
             data=self.data,
             before=before,
             after=after,
             evaluations=self.evaluations,
-            warnings=tuple(warnings),
+            warnings=(),
         )

@@ -1,13 +1,13 @@
 """Identification as one NLP: every pose of every measurement an unknown, the constants shared, the misfit minimised.
 
 It is the same problem as that of `softnlp.studies.identify`, which eliminates the poses; here IPOPT moves poses and
-constants together. It closes what that search proposes, or solves alone: nothing but the rod is shared.
+constants together. It closes what that search proposes: nothing but the rod is shared.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -17,55 +17,36 @@ from softnlp.base.errors import InputError
 from softnlp.base.quantity import Quantity, quantity
 from softnlp.base.status import Status
 from softnlp.model.contact_settings import ContactSettings
-from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
-from softnlp.model.materials import Material
+from softnlp.model.conventions import Conventions
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.rod import Loads
 from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
 from softnlp.nlp.solver import FROM_SOLUTION, Engine
-from softnlp.nlp.transcription import Transcription, method_named
+from softnlp.nlp.transcription import method_named
 from softnlp.statics.blocked_grid import Blocked
 from softnlp.statics.closing import DisputedError, disputed
 from softnlp.statics.kept import blocked_solver, pose_solver
-from softnlp.statics.loadcase import LoadCase, load_case
+from softnlp.statics.loadcase import LoadCase, blocked_case, load_case
 from softnlp.statics.pose_grid import Solved
-from softnlp.statics.solver import PoseSolver
 from softnlp.statics.unloaded import unloaded_case
-from softnlp.statics.wall import checked_contact, standing_wall
-from softnlp.studies.forward import checked_loads
-from softnlp.studies.free_constants import FreeConstants, constants_text, file_name, free_constants
-from softnlp.studies.identified import Identified
-from softnlp.studies.measurements import COLUMNS, POSE_COLUMNS, RELATIVE_NOISE, Data, Measurements, checked_measurements
-from softnlp.studies.predicted_pose import STRAIGHT
+from softnlp.statics.wall import standing_wall
+from softnlp.studies.identified import FreeConstants, Identified, constants_text, file_name
+from softnlp.studies.measurements import COLUMNS, POSE_COLUMNS, RELATIVE_NOISE, Data
+from softnlp.studies.predicted import STRAIGHT
 
 Array = NDArray[np.float64]
 
 MOST_RODS = 200
 """Loaded and blocked shapes that IPOPT takes as unknowns at once; half a second of each."""
 
-_TOLERANCE = 1e-10
+TOLERANCE = 1e-10
 _ANGLE = POSE_COLUMNS.index("bending_angle")  # which has no derivative where a shape is straight
 _OF_ERROR = 1e-3  # of a constant's standard error: what IPOPT may move it by
 _MISFITS = "misfits"  # residuals times the noise that is assumed, so that they are about as large as the equations
 
 
-@dataclass(frozen=True, eq=False)
-class IdentifiedAtOnce:
-    """What the NLP gave. constants : by name as asked, SI, nan unless solved. cost : half the sum of squares.
-
-    status : "not_optimal" where the poses hold but the sum of squares is not at a minimum. residual : largest scaled
-    violation of any equation, evaluated again.
-    """
-
-    status: Status
-    constants: Mapping[str, float]
-    cost: float
-    residual: float
-    iterations: int
-
-
-class _Nlp:
+class AtOnce:
     """Load cases, values and first guesses, gathered measurement by measurement."""
 
     def __init__(self, free: FreeConstants, numerics: Numerics) -> None:
@@ -109,7 +90,11 @@ class _Nlp:
             if near_free is None:
                 raise InputError(f"measurement {row + 1}: no pose to start from: {step.message}", key="measurements")
             at = given | {"pressure": self.own(f"{here}.pressure", given["pressure"], P)}
-            free = self._free(f"{here} free", poses, at, near_free if loads.act else None)
+            if loads.act:
+                method = method_named(self.numerics.transcription, near_free.intervals)
+                free = load_case(f"{here} free", poses.functions, at, method)
+            else:
+                free = unloaded_case(f"{here} free", poses.functions, at)
             self.cases.append(free)
             self.guesses.append(near_free.solution.x[: None if loads.act else 1])
             assert step.pose is not None
@@ -123,29 +108,17 @@ class _Nlp:
             step, near = blocked.solve(P, loads, wall, near)
             if near is None:
                 raise InputError(f"measurement {row + 1}: no blocked shape: {step.message}", key="measurements")
-            lengths = free.outputs["chamber_lengths"]
             contact_values = blocked.values(near.situation, near.pressed, np.zeros(0))
             for name, q in blocked.functions.declared(model).items():
-                if name == "contact.free_lengths":
-                    at[name] = replace(q, symbol=lengths)
-                elif name == "contact.chamber_reaction":
+                if name == "contact.chamber_reaction":
                     at[name] = self.declared.setdefault(name, q)
-                elif name.startswith("contact."):
+                elif name.startswith("contact.") and name != "contact.free_lengths":
                     at[name] = self.own(f"{here}.{name}", q, np.asarray(contact_values.get(name, q.nominal), float))
-            ordered = {name: at[name] for name in blocked.functions.declared()}
-            pressed = load_case(f"{here} blocked", blocked.functions, ordered, self._method(near.grid.intervals))
+            method = method_named(self.numerics.transcription, near.grid.intervals)
+            pressed = blocked_case(f"{here} blocked", blocked.functions, at, free, method)
             self.cases.append(pressed)
             self.guesses.append(near.solution.x)
             self._add_squares([pressed.outputs["tip_forces"][0]], data, row, [len(COLUMNS) - 1])
-
-    def _method(self, intervals: int) -> Transcription:
-        return method_named(self.numerics.transcription, intervals)
-
-    def _free(self, name: str, poses: PoseSolver, given: Mapping[str, Quantity], solved: Solved | None) -> LoadCase:
-        """Return the case of a free shape on the grid of its solution; None: in closed form, without loads."""
-        if solved is None:
-            return unloaded_case(name, poses.functions, given)
-        return load_case(name, poses.functions, given, self._method(solved.intervals))
 
     def _add_squares(self, observed: Sequence[ca.MX], data: Data, row: int, columns: Sequence[int]) -> None:
         """Add the squared residuals of what was measured."""
@@ -212,7 +185,7 @@ def closed_fit(
     if rods > MOST_RODS:
         note = f"IPOPT did not close the constants: {rods} rods would be its unknowns, and it takes at most {MOST_RODS}"
         return replace(found, engine=numerics.engine, warnings=(*found.warnings, note))
-    nlp = _Nlp(found.free, numerics)
+    nlp = AtOnce(found.free, numerics)
     for k, data in enumerate(every):
         model = Model(data.robot, found.material, found.coefficients, conventions)
         try:
@@ -220,7 +193,7 @@ def closed_fit(
         except InputError as error:
             raise DisputedError(f"{Status.DISPUTED.advice}; {error.message}") from None
     problem = nlp.compiled()
-    engine = Engine(problem, tolerance=_TOLERANCE, options={**FROM_SOLUTION, **dict(numerics.ipopt)})
+    engine = Engine(problem, tolerance=TOLERANCE, options={**FROM_SOLUTION, **dict(numerics.ipopt)})
     solution = engine.solve(nlp.packed(problem), nlp.start(problem, found.constants))
     values = problem.free_values(solution.x)
     constants = np.concatenate([values[name] for name in found.free.quantities])
@@ -238,48 +211,3 @@ def _pressing(data: Data, after: Array) -> Data:
     values = data.values.copy()
     values[after[:, -1] == 0, -1] = np.nan
     return replace(data, values=values)
-
-
-def identify_at_once(
-    measurements: Measurements | Sequence[Measurements],
-    material: Material,
-    free: Sequence[str],
-    *,
-    coefficients: Coefficients = Coefficients(),
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    contact: ContactSettings = ContactSettings(),
-    loads: Loads = Loads(),
-    conventions: Conventions = REPRODUCTION,
-    intervals: int = 20,
-) -> IdentifiedAtOnce:
-    """Find the constants as `softnlp.studies.identify.identify` does, with all poses as unknowns of one NLP.
-
-    The arguments are those of `identify`; intervals : of every rod. It starts from the poses at the first constants.
-    The bending angle of a straight shape, which has no derivative, is left out.
-
-    Raises
-    ------
-    InputError
-        As `identify`, and where a measurement has no pose at the start.
-    """
-    given = (measurements,) if isinstance(measurements, Measurements) else tuple(measurements)
-    chosen = free_constants(free, material, coefficients, bounds)
-    nlp = _Nlp(chosen, Numerics(intervals=intervals))
-    loads, contact = checked_loads(loads), checked_contact(contact)
-    for k, m in enumerate(given):
-        data = checked_measurements(m)
-        nlp.add_robot(data, Model(data.robot, material, coefficients, conventions), contact, loads, f"robot {k + 1}")
-    problem = nlp.compiled()
-    p = nlp.packed(problem)
-    solution = Engine(problem, tolerance=_TOLERANCE).solve(p, nlp.start(problem, chosen.start))
-    cost = float(ca.Function("cost", [problem.nlp["x"], problem.nlp["p"]], [problem.nlp["f"]])(solution.x, p))
-    cost /= RELATIVE_NOISE**2
-    holds = solution.holds(nlp.numerics.tolerance)
-    solved = holds and solution.optimal
-    found = problem.free_values(solution.x)
-    constants = {
-        name: float(found[q][0]) if solved else float("nan")
-        for name, q in zip(chosen.names, chosen.quantities, strict=True)
-    }
-    status = Status.SOLVED if solved else Status.NOT_OPTIMAL if holds else Status.DIVERGED
-    return IdentifiedAtOnce(status, constants, cost if solved else float("nan"), solution.residual, solution.iterations)

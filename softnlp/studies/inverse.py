@@ -16,9 +16,9 @@ from softnlp.model.quantities import Model
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
 from softnlp.statics.step import Run, Step
-from softnlp.studies.forward import checked_loads
-from softnlp.studies.inverse_solver import InverseSolver, Reached
-from softnlp.studies.inverse_task import InverseTask, Target
+from softnlp.studies.forward import checked_loads, followed
+from softnlp.studies.inverse_solver import InverseSolver
+from softnlp.studies.targets import InverseTask, Target
 
 Array = NDArray[np.float64]
 
@@ -94,15 +94,7 @@ def inverse(
 
 def follow_targets(solver: InverseSolver, progress: Callable[[int, Step], None] | None) -> tuple[Step, ...]:
     """Solve the targets of a solver's task in order, each begun from the last."""
-    steps: list[Step] = []
-    near: Reached | None = None
-    for k, target in enumerate(solver.task.targets):
-        step, reached = solver.solve(target, near)
-        near = reached or near
-        steps.append(step)
-        if progress is not None:
-            progress(k, step)
-    return tuple(steps)
+    return followed(solver.solve, solver.task.targets, progress)
 
 
 def checked_bounds(bounds: Any, sets: int) -> tuple[Array, Array]:

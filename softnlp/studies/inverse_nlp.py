@@ -28,8 +28,7 @@ from softnlp.statics.loadcase import load_case
 from softnlp.statics.pose_grid import TIP, Solved
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
-from softnlp.studies.aiming import Aim
-from softnlp.studies.tip_map import TipPoint
+from softnlp.studies.targets import Aim, TipPoint
 
 Array = NDArray[np.float64]
 

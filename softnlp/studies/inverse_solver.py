@@ -28,11 +28,21 @@ from softnlp.statics.branch import stretch_on_branch
 from softnlp.statics.kept import pose_solver
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.step import Aimed, Step
-from softnlp.studies.aiming import Aim, Table, aim_of, spread, tabulated
 from softnlp.studies.derivatives import PoseDerivatives
 from softnlp.studies.inverse_nlp import Programs, moving_sets
-from softnlp.studies.inverse_task import InverseTask, Target
-from softnlp.studies.tip_map import ArcMap, GridMap, TipMap, TipPoint
+from softnlp.studies.targets import (
+    Aim,
+    ArcMap,
+    GridMap,
+    InverseTask,
+    Table,
+    Target,
+    TipMap,
+    TipPoint,
+    aim_of,
+    spread,
+    tabulated,
+)
 
 Array = NDArray[np.float64]
 
@@ -88,10 +98,10 @@ class InverseSolver:
         self._method = "nlp" if numerics.engine == "ipopt" else method
         self._maps: dict[int, GridMap] = {}
         self._programs = Programs(self.poses, loads, self.limits, numerics)
-        self._table: Table | None = None
-        self._arcs: Table | None = None
+        self._tables: dict[TipMap, Table] = {}
         self._intervals: int | None = None
-        self._coarse: TipMap = ArcMap(self.poses)
+        self._arcs = ArcMap(self.poses)
+        self._coarse: TipMap = self._arcs
         if loads.act:
             self._coarse = self._map(numerics.intervals or self._coarse_intervals())
 
@@ -140,7 +150,7 @@ class InverseSolver:
 
     def forget_table(self) -> None:
         """Drop the tables of starts, for timing what they cost."""
-        self._table = self._arcs = None
+        self._tables.clear()
 
     def _candidates(self, aim: Aim, near: Reached | None) -> Iterator[Found]:
         """Yield where coarse searches end, best first; the first that meets the target at once if no choice is left.
@@ -170,23 +180,22 @@ class InverseSolver:
                 yield point, True
         loaded = isinstance(self._coarse, GridMap)
         if loaded:  # an arc is near enough to begin with, and costs nothing; most targets need no other start
-            if self._arcs is None:
-                self._arcs = tabulated(ArcMap(self.poses), spread(self.limits, _ARCS) * BAR)
-            for k in self._arcs.starts(aim, self.limits, 1):
-                if (point := self._coarse.at(self._arcs.pressures[k], None)) is not None:
+            arcs = self._tips(self._arcs)
+            for k in arcs.starts(aim, self.limits, 1):
+                if (point := self._coarse.at(arcs.pressures[k], None)) is not None:
                     yield point, False
-        table = self._tips()
+        table = self._tips(self._coarse)
         for k in table.starts(aim, self.limits, _STARTS):
             point = table.points[k]
             assert point is not None
             yield point, False
 
-    def _tips(self) -> Table:
-        """Return the tips of the coarse map over the bounds."""
-        if self._table is None:
-            most = _POSES if isinstance(self._coarse, GridMap) else _ARCS
-            self._table = tabulated(self._coarse, spread(self.limits, most) * BAR)
-        return self._table
+    def _tips(self, tips: TipMap) -> Table:
+        """Return the tips of a map over the bounds."""
+        if tips not in self._tables:
+            most = _POSES if isinstance(tips, GridMap) else _ARCS
+            self._tables[tips] = tabulated(tips, spread(self.limits, most) * BAR)
+        return self._tables[tips]
 
     def _search(self, aim: Aim, start: TipPoint, *, continues: bool) -> Found:
         """Search on the coarse map from a tip."""
@@ -212,12 +221,11 @@ class InverseSolver:
 
     def _measure(self, aim: Aim, tips: TipMap, *, met: bool = False) -> Map:
         """Return the misfit by pressure on a map."""
+        of = aim.conditioned if met else aim.measured
 
         def measure(z: Array, near: Measured) -> Measured | None:
             point = tips.at(z * BAR, near.memo)
-            if point is None:
-                return None
-            return aim.conditioned(point) if met else aim.measured(point)
+            return None if point is None else of(point)
 
         return measure
 
@@ -242,11 +250,8 @@ class InverseSolver:
             unasked = k == 0 and self._method == "nlp"  # the program has not been solved yet
             if not unasked and (settled or found_already):
                 break
-            if (
-                not unasked
-                and judged.cost <= exact
-                and (self._intervals == solved.intervals or not self._redundant(aim))
-            ):
+            on_its_grid = self._intervals == solved.intervals or not self._redundant(aim)
+            if not unasked and judged.cost <= exact and on_its_grid:
                 break
             self._intervals = solved.intervals
             refined = self._refined(aim, found, solved.intervals, solved)
@@ -299,7 +304,7 @@ class InverseSolver:
         """
         span = (self.limits.upper - self.limits.lower) * BAR
         here = best
-        table = self._tips()
+        table = self._tips(self._coarse)
         misfit = np.linalg.norm(aim.misfit(table.states), axis=0)
         for k in table.starts(aim, self.limits, len(table.pressures)):
             if best is not None and misfit[k] >= best.cost:

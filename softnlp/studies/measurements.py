@@ -1,8 +1,8 @@
-"""Measurements of one robot: what was seen of its pose and of its blocked force at each pressure."""
+"""What a person measured: a robot's pose and blocked force at each pressure, and what a scenario asks of it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,8 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.errors import InputError, nearest
+from softnlp.model.laws import Law
+from softnlp.model.materials import Material
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.studies.forward import pressure_table
+from softnlp.studies.plausibility import Check
 
 Array = NDArray[np.float64]
 
@@ -71,7 +74,34 @@ class Measurements:
 
 
 @dataclass(frozen=True, eq=False)
-class Data:
+class Observed:
+    """A table of measurements of one robot.
+
+    Attributes
+    ----------
+    robot
+        Whose they are.
+    label
+        Of the robot in results.
+    pressure
+        (rows, sets) gauge [Pa].
+    values
+        (rows, numbers) in the order that they were asked for in [m, rad, N]; nan where nothing was measured.
+    """
+
+    robot: Robot
+    label: str
+    pressure: Array
+    values: Array
+
+    @property
+    def measured(self) -> NDArray[np.bool_]:
+        """Which entries of `values` there are, (rows, numbers) [1]."""
+        return np.asarray(np.isfinite(self.values))
+
+
+@dataclass(frozen=True, eq=False)
+class Data(Observed):
     """Checked measurements of one robot.
 
     Attributes
@@ -86,17 +116,13 @@ class Data:
         (rows,) what a residual is multiplied by [1].
     """
 
-    robot: Robot
-    label: str
-    pressure: Array
-    values: Array
     sigma: Array
     root_weight: Array
 
     @property
-    def measured(self) -> NDArray[np.bool_]:
-        """Which entries of `values` there are, (rows, 6) [1]."""
-        return np.asarray(np.isfinite(self.values))
+    def fitted(self) -> NDArray[np.bool_]:
+        """Which entries of `values` count in a fit, (rows, 6) [1]."""
+        return self.measured & (self.root_weight[:, None] > 0)
 
     def of(self, observable: str) -> Array:
         """Return the columns of an observable.
@@ -125,24 +151,28 @@ def checked_measurements(given: Measurements) -> Data:
     """Return measurements as arrays, or raise `InputError` naming what is not right."""
     if given.tilt is not None:
         raise InputError("expected none: a tilt can be compared, not fitted", key="tilt")
-    check(given.robot, allow=LOWERABLE_RULES)
-    P = pressure_table(given.pressure, given.robot.chamber_sets)
-    rows = len(P)
-    values = np.full((rows, len(COLUMNS)), np.nan)
-    for observable, parts in OBSERVABLES.items():
-        value = getattr(given, observable)
-        if value is None:
-            continue
-        shape = (rows,) if len(parts) == 1 else (rows, len(parts))
-        column = number_array(value, shape, observable)
-        values[:, column_slice(observable)] = column.reshape(rows, -1)
-    if not np.any(np.isfinite(values)):
-        raise InputError(f"expected at least one number of {', '.join(OBSERVABLES)}", key="measurements")
+    found = observed(given, COLUMNS)
+    rows = len(found.pressure)
     weight = np.ones(rows) if given.weight is None else number_array(given.weight, (rows,), "weight")
     if not np.all(weight >= 0):
         raise InputError("expected weights that are not negative", key="weight")
-    data = Data(given.robot, given.label or given.robot.name, P, values, np.ones_like(values), np.sqrt(weight))
+    data = Data(**vars(found), sigma=np.ones_like(found.values), root_weight=np.sqrt(weight))
     return replace(data, sigma=_sigmas(data, given.sigma))
+
+
+def observed(given: Measurements, columns: Sequence[str]) -> Observed:
+    """Return what was measured, a tip's three columns first, or raise `InputError` naming what is not right."""
+    check(given.robot, allow=LOWERABLE_RULES)
+    P = pressure_table(given.pressure, given.robot.chamber_sets)
+    values = np.full((len(P), len(columns)), np.nan)
+    names = ("tip_position", *columns[3:])
+    for k, name in enumerate(names):
+        if (value := getattr(given, name)) is not None:
+            shape, place = ((len(P),), k + 2) if k else ((len(P), 3), slice(3))
+            values[:, place] = number_array(value, shape, name)
+    if not np.any(np.isfinite(values)):
+        raise InputError(f"expected at least one number of {', '.join(names)}", key="measurements")
+    return Observed(given.robot, given.label or given.robot.name, P, values)
 
 
 def _sigmas(data: Data, given: Mapping[str, Any]) -> Array:
@@ -182,3 +212,56 @@ def number_array(value: Any, shape: tuple[int, ...], key: str) -> Array:
     if np.any(np.isinf(array)):
         raise InputError("expected finite numbers, or nan where nothing was measured", key=key)
     return array
+
+
+@dataclass(frozen=True, eq=False)
+class TensileTask:
+    """Laws to fit to a tensile test.
+
+    stretch, stress : (points,), [-] and engineering [Pa], of every file. file_of_point : (points,) from 0. files : as
+    they were named. name, density : of the silicone. start : of a person's law, SI. before : to compare with, or None.
+    stretch_range : (2,) as asked for, or None. dropped : how many points lay outside of it. checks : of the specimen.
+    """
+
+    stretch: Array
+    stress: Array
+    file_of_point: NDArray[np.intp]
+    files: tuple[str, ...]
+    laws: tuple[Law, ...]
+    name: str
+    density: float
+    start: Mapping[str, float] | None
+    before: Material | None
+    stretch_range: tuple[float, float] | None = None
+    dropped: int = 0
+    checks: tuple[Check, ...] = ()
+
+    @property
+    def left_out(self) -> str:
+        """What is said of points that the range asked for leaves out, "" where there is none."""
+        asked = self.stretch_range
+        return "" if asked is None else f"; {self.dropped} points outside stretch = {list(asked)}"
+
+    def step_count(self, pressures: int) -> int:
+        """Return one: it is solved as a whole."""
+        return 1
+
+
+@dataclass(frozen=True, eq=False)
+class RobotTask:
+    """Constants to identify from measurements of robots.
+
+    measurements : of each robot. free : names of constants. bounds : by name, SI. columns : the header of the file.
+    cells : for each robot and row, the cells of the file as they were read. notes : on readings that count as 0.
+    """
+
+    measurements: tuple[Measurements, ...]
+    free: tuple[str, ...]
+    bounds: Mapping[str, tuple[float, float]]
+    columns: tuple[str, ...]
+    cells: tuple[tuple[tuple[str, ...], ...], ...]
+    notes: tuple[str, ...] = ()
+
+    def step_count(self, pressures: int) -> int:
+        """Return one: it is solved as a whole."""
+        return 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -196,7 +196,8 @@ def pose_sensitivities(
     if solved is None:
         return _empty(derivatives.poses, step, rows, columns, step.message)
     try:
-        return _assembled(step, derivatives.at(solved, columns), rows, columns)
+        found = _empty(derivatives.poses, step, rows, columns, "")
+        return _assembled(found, derivatives.at(solved, columns), rows)
     except np.linalg.LinAlgError:
         return _empty(derivatives.poses, step, rows, columns, _SINGULAR)
 
@@ -226,18 +227,20 @@ def _blocked_sensitivities(
     columns = checked_names(by, list(quantities_of(solver)), "by")
     wall = standing_wall(solver.poses, contact, pressure[None, :], loads)
     step, found = solver.solve(pressure, loads, wall)
+    why = _SINGULAR
     if found is None and step.status is Status.SOLVED:
-        touching = "the tip only touches the wall: pressed further it has a force, moved away it has none"
-        return _empty(solver, step, rows, columns, touching)
-    if found is None and not step.status.has_solution:
-        return _empty(solver, step, rows, columns, step.message)
-    try:
-        if found is not None:
-            point = blocked_point(solver, found, columns)
-            return _assembled(step, point, rows, columns) if point else _empty(solver, step, rows, columns, _SINGULAR)
-        return _away_from_wall(solver, step, loads, rows, columns)
-    except np.linalg.LinAlgError:
-        return _empty(solver, step, rows, columns, _SINGULAR)
+        why = "the tip only touches the wall: pressed further it has a force, moved away it has none"
+    elif found is None and not step.status.has_solution:
+        why = step.message
+    else:
+        try:
+            if found is None:
+                return _away_from_wall(solver, step, loads, rows, columns)
+            if (point := blocked_point(solver, found, columns)) is not None:
+                return _assembled(_empty(solver, step, rows, columns, ""), point, rows)
+        except np.linalg.LinAlgError:
+            pass
+    return _empty(solver, step, rows, columns, why)
 
 
 def _away_from_wall(
@@ -251,72 +254,54 @@ def _away_from_wall(
         [name for name in rows if name != "blocked_force"] or TIP,
         [name for name in columns if not name.startswith("contact.")] or ("pressure",),
     )
-    empty = _empty(solver, step, rows, columns, "")
-    matrix, values, nominal = np.zeros_like(empty.matrix), np.zeros_like(empty.values), empty.nominal.copy()
-    for k, name in enumerate(empty.outputs):
-        if name in free.outputs:
-            values[k] = free.values[free.outputs.index(name)]
-            for j, quantity in enumerate(empty.quantities):
-                if quantity in free.quantities:
-                    matrix[k, j] = free.matrix[free.outputs.index(name), free.quantities.index(quantity)]
-    for j, quantity in enumerate(empty.quantities):
-        if quantity in free.quantities:
-            nominal[j] = free.nominal[free.quantities.index(quantity)]
-    return Sensitivities(
-        step,
-        empty.outputs,
-        empty.output_units,
-        empty.quantities,
-        empty.quantity_units,
-        values,
-        nominal,
-        matrix,
-        None,
-        free.warnings,
-    )
+    found = _empty(solver, step, rows, columns, "")
+    matrix, values, nominal = np.zeros_like(found.matrix), np.zeros_like(found.values), found.nominal.copy()
+    (k, k_free), (j, j_free) = _common(found.outputs, free.outputs), _common(found.quantities, free.quantities)
+    matrix[np.ix_(k, j)] = free.matrix[np.ix_(k_free, j_free)]
+    values[k], nominal[j] = free.values[k_free], free.nominal[j_free]
+    return replace(found, values=values, nominal=nominal, matrix=matrix, warnings=free.warnings)
 
 
-def _named(
-    solver: PoseSolver | BlockedSolver, rows: tuple[str, ...], columns: tuple[str, ...]
-) -> tuple[list[str], list[str], list[str], list[str]]:
-    """Return names and units of all rows and columns."""
-    known = quantities_of(solver)
-    sizes = {"tip_position": 3, "tip_rotation": 3, "chamber_lengths": solver.model.robot.chambers}
-    out = [(label, UNITS[name]) for name in rows for label in labels(name, sizes.get(name, 1))]
-    of = [(label, known[name].unit) for name in columns for label in labels(name, known[name].size)]
-    return [n for n, _ in out], [u for _, u in out], [n for n, _ in of], [u for _, u in of]
+def _common(names: Sequence[str], others: Sequence[str]) -> tuple[list[int], list[int]]:
+    """Return where the names that are in both stand in each."""
+    both = [name for name in names if name in others]
+    return [names.index(name) for name in both], [others.index(name) for name in both]
 
 
 def _empty(
     solver: PoseSolver | BlockedSolver, step: Step, rows: tuple[str, ...], columns: tuple[str, ...], why: str
 ) -> Sensitivities:
     """Return sensitivities without numbers."""
-    out, out_units, of, of_units = _named(solver, rows, columns)
-    nothing, known = np.full(len(out), np.nan), quantities_of(solver)
-    nominal = np.concatenate([known[name].nominal for name in columns])
+    known, sizes = (
+        quantities_of(solver),
+        {"tip_position": 3, "tip_rotation": 3, "chamber_lengths": solver.model.robot.chambers},
+    )
+    out = [(label, UNITS[name]) for name in rows for label in labels(name, sizes.get(name, 1))]
+    of = [(label, known[name].unit) for name in columns for label in labels(name, known[name].size)]
     return Sensitivities(
-        step, tuple(out), tuple(out_units), tuple(of), tuple(of_units), nothing, nominal,
-        np.full((len(out), len(of)), np.nan), None, (why,) if why else (),
-    )  # fmt: skip
+        step=step,
+        outputs=tuple(name for name, _ in out),
+        output_units=tuple(unit for _, unit in out),
+        quantities=tuple(name for name, _ in of),
+        quantity_units=tuple(unit for _, unit in of),
+        values=np.full(len(out), np.nan),
+        nominal=np.concatenate([known[name].nominal for name in columns]),
+        matrix=np.full((len(out), len(of)), np.nan),
+        point=None,
+        warnings=(why,) if why else (),
+    )
 
 
-def _assembled(step: Step, point: LinearPoint, rows: tuple[str, ...], columns: tuple[str, ...]) -> Sensitivities:
-    """Stack the derivatives of a solved point."""
-    values = {name: point.value(name) for name in rows}
+def _assembled(found: Sensitivities, point: LinearPoint, rows: tuple[str, ...]) -> Sensitivities:
+    """Fill in the derivatives of a solved point."""
     blocks = {name: point.derivative(name) for name in rows}
-    warnings = list(step.warnings)
+    warnings = list(found.step.warnings)
     if "bending_angle" in rows and is_straight(point):
         blocks["bending_angle"] = np.full_like(blocks["bending_angle"], np.nan)
         warnings.append("the robot is straight: its bending angle has a kink there, so it has no derivative")
-    units = {q.name: q.unit for q in point.quantities}
-    sizes = {q.name: q.size for q in point.quantities}
-    return Sensitivities(
-        step=step,
-        outputs=tuple(label for name in rows for label in labels(name, values[name].size)),
-        output_units=tuple(UNITS[name] for name in rows for _ in range(values[name].size)),
-        quantities=tuple(label for name in columns for label in labels(name, sizes[name])),
-        quantity_units=tuple(units[name] for name in columns for _ in range(sizes[name])),
-        values=np.concatenate([values[name] for name in rows]),
+    return replace(
+        found,
+        values=np.concatenate([point.value(name) for name in rows]),
         nominal=point.theta,
         matrix=np.vstack([blocks[name] for name in rows]),
         point=point,

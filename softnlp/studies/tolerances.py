@@ -153,8 +153,10 @@ def monte_carlo(
         theta[columns] += draw
         solution = point.solved_at(np.maximum(theta, lower))
         if point.is_solution(solution, 1e-8):
-            changes = {name: point.change(name, solution) for name in names}
-            found.append(_ordered(sensitivities.outputs, changes))
+            row = np.full(len(sensitivities.outputs), np.nan)
+            for name in names:
+                row[entries_of(sensitivities.outputs, name)] = point.change(name, solution)
+            found.append(row)
         if progress is not None:
             progress(k + 1)
     table = np.array(found).reshape(len(found), len(sensitivities.outputs))
@@ -163,14 +165,6 @@ def monte_carlo(
         return Sampled(nothing, nothing, nothing, len(table), samples)
     deviation = np.std(table, axis=0, ddof=1)
     return Sampled(deviation, np.mean(table, axis=0), deviation / np.sqrt(2 * (len(table) - 1)), len(table), samples)
-
-
-def _ordered(labels: tuple[str, ...], changes: Mapping[str, Array]) -> Array:
-    """Return changes in the order of the outputs."""
-    row = np.full(len(labels), np.nan)
-    for name, change in changes.items():
-        row[entries_of(labels, name)] = change
-    return row
 
 
 def _columns(sensitivities: Sensitivities, tolerances: Mapping[str, float]) -> tuple[list[int], Array]:

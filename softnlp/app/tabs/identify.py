@@ -25,10 +25,8 @@ from softnlp.model.materials import Material
 from softnlp.results.identify_document import identified_text, robot_table_text, scenario_tables
 from softnlp.scenario.identify import run_robots
 from softnlp.scenario.read import Scenario
-from softnlp.studies.free_constants import COEFFICIENTS, file_name, free_constants
-from softnlp.studies.identified import Identified
-from softnlp.studies.identify_task import RobotTask
-from softnlp.studies.measurements import OBSERVABLES, column_slice
+from softnlp.studies.identified import COEFFICIENTS, Identified, file_name, free_constants
+from softnlp.studies.measurements import OBSERVABLES, RobotTask, column_slice
 
 Table = dict[str, Any]
 Rows = list[list[Any]]

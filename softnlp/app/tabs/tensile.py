@@ -17,7 +17,7 @@ from softnlp.figures.style import colour
 from softnlp.results.identify_document import material_file_text, material_table, tensile_table_text
 from softnlp.scenario.read import Scenario
 from softnlp.scenario.tensile import run_tensile
-from softnlp.studies.identify_task import TensileTask
+from softnlp.studies.measurements import TensileTask
 from softnlp.studies.tensile import TensileFit
 
 T = TypeVar("T")

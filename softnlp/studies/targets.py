@@ -1,23 +1,162 @@
-"""The misfit of a tip to a target, as residuals with their Jacobian; and where the search for a target begins."""
+"""Targets of inverse kinematics: the tip by pressures, its misfit to a target, and where the search for one begins."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
+from typing import Protocol
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.units import BAR
+from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.nlp.bounded import Limits, Measured
+from softnlp.nlp.solver import Engine, Solution
+from softnlp.statics.branch import stretch_on_branch
+from softnlp.statics.loadcase import stretch_imbalance, stretch_near
+from softnlp.statics.pose_grid import Solved
+from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Aimed, Pose
-from softnlp.studies.inverse_task import InverseTask, Target
-from softnlp.studies.tip_map import TipMap, TipPoint
+from softnlp.studies.derivatives import PoseDerivatives
 
 Array = NDArray[np.float64]
 
 _AXIS = slice(9, 12)  # of a tip state: R e3
 _APART = 0.35  # starts differ by at least this part of the bounds in some set
+_HOLDS = 1e-9  # scaled residual of a tip on a grid
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """Where the tip is to be: position (3,) [m], direction (3,) of its axis, unit; one or both, world frame."""
+
+    position: Array | None
+    direction: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class InverseTask:
+    """A path of targets and the bounds of each set's pressure.
+
+    lower, upper : (sets,) [Pa]. length_per_radian : how much of a distance [m] a radian of misfit counts for where
+    position and direction cannot both be met. allow : with "self_intersection" in it, shapes that no body can take
+    without passing through itself are answers too.
+    """
+
+    targets: tuple[Target, ...]
+    lower: Array
+    upper: Array
+    length_per_radian: float
+    allow: tuple[str, ...] = ()
+
+    def step_count(self, pressures: int) -> int:
+        """Return how many steps the run has: one a target."""
+        return len(self.targets)
+
+
+@dataclass(frozen=True, eq=False)
+class TipPoint:
+    """The tip at pressures (sets,) [Pa]: state (12,) is p [L_0] and R column by column, slope (12, sets) d state / dP.
+
+    x, dx : the solution on a grid and its derivative; empty for an arc.
+    """
+
+    pressure: Array
+    state: Array
+    slope: Array
+    x: Array
+    dx: Array
+
+
+class TipMap(Protocol):
+    """What inverse kinematics asks of a model."""
+
+    def at(self, pressure: Array, near: TipPoint | None) -> TipPoint | None:
+        """Return the tip at a pressure, from one nearby where there is one; None where it is not found."""
+        ...
+
+
+class ArcMap:
+    """The tip of the robot without gravity and tip load, exact."""
+
+    def __init__(self, poses: PoseSolver) -> None:
+        self._poses = poses
+        functions = poses.functions
+        sets = poses.model.robot.chamber_sets
+        column, stretch = ca.SX.sym("p", functions.section.size1_in(0)), ca.SX.sym("stretch")
+        P = column[:sets]
+        _, balance, _ = functions.section(column, stretch)
+        self._imbalance = stretch_imbalance(functions)
+        tip = functions.arc(column, stretch, 1.0)[:12]
+        by_pressure = -ca.jacobian(balance, P) / ca.jacobian(balance, stretch)
+        slope = ca.jacobian(tip, P) + ca.jacobian(tip, stretch) @ by_pressure
+        self._tip = ca.Function("tip", [column, stretch], [tip, ca.densify(slope)], {"cse": True})
+
+    def at(self, pressure: Array, near: TipPoint | None) -> TipPoint | None:
+        """Return the tip of the arc; the stretch is the root next to that of `near`."""
+        column = self._poses.column({"pressure": pressure})
+        if near is None:
+            branch = stretch_on_branch(self._poses.branch, column, pressure)
+            if not branch.status.has_solution:
+                return None
+            stretch = branch.stretch
+        else:
+            stretch = float(stretch_near(self._imbalance, column, near.x)[0])
+            if not (stretch >= 0.5 and abs(float(self._imbalance(column, stretch)[0])) < 1e-9):
+                return None
+        state, by_pressure = self._tip(column, stretch)
+        return TipPoint(pressure, np.asarray(state).ravel(), np.asarray(by_pressure), np.array([stretch]), np.zeros(0))
+
+
+class GridMap:
+    """The tip of the loaded robot on one grid, followed from point to point."""
+
+    def __init__(self, derivatives: PoseDerivatives, intervals: int, loads: Loads) -> None:
+        poses = derivatives.poses
+        self.intervals = intervals
+        self._poses = poses
+        self._grid = poses.grid(intervals)
+        self._engine = Engine(self._grid.problem, linear=self._grid.engine.linear, newton_only=True)
+        self._derivatives = derivatives.on_grid(intervals, ("pressure",))
+        self._loads = loads
+
+    def at(self, pressure: Array, near: TipPoint | None) -> TipPoint | None:
+        """Return the tip of the solution that Newton's method reaches from what `near` predicts, or from the arc."""
+        p = self._grid.problem.pack(self._poses.values(pressure, self._loads))
+        if near is None:
+            branch = stretch_on_branch(self._poses.branch, p, pressure)
+            if not branch.status.has_solution:
+                return None
+            guess = self._poses.arc_guess(self._grid, p, branch.stretch)
+        else:
+            guess = near.x + near.dx @ (pressure - near.pressure)
+        return self._reached(pressure, guess, p)
+
+    def of(self, solved: Solved) -> TipPoint | None:
+        """Return the tip of a pose solved on any grid, on this map's grid."""
+        pressure = solved.solution.p[: self._poses.model.robot.chamber_sets]
+        guess = solved.solution.x if solved.grid is self._grid else self._poses.transfer(solved, self._grid)
+        return self._reached(pressure, guess, solved.solution.p)
+
+    def solved(self, point: TipPoint) -> Solved:
+        """Return a point as a pose on this grid, not examined, for going on to another grid."""
+        p = self._grid.problem.pack(self._poses.values(point.pressure, self._loads))
+        solution, nodes = Solution(point.x, p, 0.0, 0, ""), self._grid.nodes(point.x)
+        return Solved(self._grid, solution, nodes, nodes, self._grid.constants(solution), 0.0, 0.0, stable=True)
+
+    def _reached(self, pressure: Array, x: Array, p: Array) -> TipPoint | None:
+        """Return the tip of the solution that Newton's method reaches from x, None where there is none."""
+        solution = self._engine.solve(p, x)
+        if not solution.holds(_HOLDS):
+            return None
+        try:
+            dx = self._derivatives.states(solution.x, p)
+        except np.linalg.LinAlgError:
+            return None
+        tip = slice(x.size - STATE_SIZE, x.size - STATE_SIZE + 12)
+        return TipPoint(pressure, solution.x[tip], dx[tip], solution.x, dx)
 
 
 @dataclass(frozen=True, eq=False)
