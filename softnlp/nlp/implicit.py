@@ -67,7 +67,18 @@ class ImplicitDerivatives:
 
         Raises `numpy.linalg.LinAlgError` where the Jacobian is singular: at a fold or a branch point.
         """
-        G = np.asarray(self._residual(x, p))
+        return self._solved(x, p, np.asarray(self._residual(x, p)))
+
+    def newton(self, x: Array, p: Array, g: Array) -> tuple[Array, Array]:
+        """Return Newton's step (n,) for the residual g at x and d x / d theta (n, k), for the cost of one of them.
+
+        Raises as `states`.
+        """
+        moves = self._solved(x, p, np.column_stack([np.asarray(self._residual(x, p)), g]))
+        return moves[:, -1], moves[:, :-1]
+
+    def _solved(self, x: Array, p: Array, G: Array) -> Array:
+        """Return -J^-1 G."""
         return self._linear.solve_many(x, p, G) if G.size else G
 
     def outputs(self, x: Array, p: Array, moves: Array | None = None) -> dict[str, Array]:

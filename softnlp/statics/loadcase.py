@@ -137,14 +137,14 @@ def stretch_near(imbalance: ca.Function, columns: Array, start: Array) -> Array:
 
     imbalance : of `stretch_imbalance`. columns : (all quantities, k), SI.
     """
-    found = start
-    for _ in range(_NEWTON_STEPS):
-        balance, slope = (np.asarray(part).ravel() for part in imbalance(columns, found[None, :]))
-        with np.errstate(all="ignore"):
+    found, given = start, ca.DM(columns)
+    with np.errstate(all="ignore"):
+        for _ in range(_NEWTON_STEPS):
+            balance, slope = (np.array(part.nonzeros()) for part in imbalance(given, found[None, :]))
             change = -balance / slope
-        found = found + change
-        if not np.any(np.abs(change) > 1e-13):
-            break
+            found = found + change
+            if not np.abs(change).max() > 1e-13:
+                break
     return found
 
 

@@ -71,6 +71,11 @@ class Found:
     met: bool
     continues: bool
 
+    @property
+    def cost(self) -> float:
+        """The weighed misfit [L_0]."""
+        return float(np.linalg.norm(self.point.r))
+
 
 @dataclass(frozen=True, eq=False)
 class Reached:
@@ -96,7 +101,6 @@ class InverseSolver:
         self.limits, self.ends = self._limits()
         self._derivatives = PoseDerivatives(self.poses)
         self._method = "nlp" if numerics.engine == "ipopt" else method
-        self._maps: dict[int, GridMap] = {}
         self._programs = Programs(self.poses, loads, self.limits, numerics)
         self._tables: dict[TipMap, Table] = {}
         self._intervals: int | None = None
@@ -122,7 +126,7 @@ class InverseSolver:
                 continue
             if best is None or judged.cost < best.cost * (1 - _SAME_SPOT):
                 best, chosen = judged, found
-            if self._meets(aim, best) or judged.cost <= aim_cost(found) * (1 + _SAME_SPOT):
+            if self._meets(aim, best) or judged.cost <= found.cost * (1 + _SAME_SPOT):
                 break
         if rejected is not None and (best is None or not self._meets(aim, best)):
             searched = self._searched(aim, best)
@@ -168,7 +172,7 @@ class InverseSolver:
         for found in ends:
             if all(np.max(np.abs(found.point.z - other.point.z)) > _SAME_PLACE for other in apart):
                 apart.append(found)
-        apart.sort(key=lambda f: (not f.met, float(f.point.z @ f.point.z) if f.met else aim_cost(f)))
+        apart.sort(key=lambda f: (not f.met, float(f.point.z @ f.point.z) if f.met else f.cost))
         yield from (found for found in apart if redundant or not found.met)
 
     def _starts(self, aim: Aim, near: Reached | None) -> Iterator[tuple[TipPoint, bool]]:
@@ -246,7 +250,7 @@ class InverseSolver:
             # A later one is of the pose's own grid; among answers as near it has the smaller pressures.
             if not isinstance(best, Reached) or judged.cost <= best.cost * (1 + 1e-6) + exact:
                 best = judged
-            found_already = isinstance(self._coarse, ArcMap) and judged.cost <= aim_cost(found) + exact
+            found_already = isinstance(self._coarse, ArcMap) and judged.cost <= found.cost + exact
             unasked = k == 0 and self._method == "nlp"  # the program has not been solved yet
             if not unasked and (settled or found_already):
                 break
@@ -363,9 +367,7 @@ class InverseSolver:
         return text if rejected is None else f"{text}; nearer equilibria are not stable or not found"
 
     def _map(self, intervals: int) -> GridMap:
-        if intervals not in self._maps:
-            self._maps[intervals] = GridMap(self._derivatives, intervals, self.loads)
-        return self._maps[intervals]
+        return GridMap(self._derivatives, intervals, self.loads)  # what is compiled is kept with the poses
 
     def _limits(self) -> tuple[Limits, tuple[Status, str] | None]:
         """Return the bounds and the largest sum of pressures that has an equilibrium, with what ends it.
@@ -393,8 +395,3 @@ class InverseSolver:
             branch = stretch_on_branch(self.poses.branch, column, z * BAR)
             most = max(most, self.poses.first_intervals(column, branch.stretch))
         return most
-
-
-def aim_cost(found: Found) -> float:
-    """Return the weighed misfit of a coarse answer [L_0]."""
-    return float(np.linalg.norm(found.point.r))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from softnlp.base.units import BAR
 from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.nlp.bounded import Limits, Measured
-from softnlp.nlp.solver import Engine, Solution
+from softnlp.nlp.solver import Solution
 from softnlp.statics.branch import stretch_on_branch
 from softnlp.statics.loadcase import stretch_imbalance, stretch_near
 from softnlp.statics.pose_grid import Solved
@@ -25,7 +25,8 @@ Array = NDArray[np.float64]
 
 _AXIS = slice(9, 12)  # of a tip state: R e3
 _APART = 0.35  # starts differ by at least this part of the bounds in some set
-_HOLDS = 1e-9  # scaled residual of a tip on a grid
+_NEWTON_STEPS = 30
+_LOST, _NEAR = 1e4, 1e-7  # scaled residuals: nothing leads back from it; one more step ends at round-off
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +119,6 @@ class GridMap:
         self.intervals = intervals
         self._poses = poses
         self._grid = poses.grid(intervals)
-        self._engine = Engine(self._grid.problem, linear=self._grid.engine.linear, newton_only=True)
         self._derivatives = derivatives.on_grid(intervals, ("pressure",))
         self._loads = loads
 
@@ -132,13 +132,13 @@ class GridMap:
             guess = self._poses.arc_guess(self._grid, p, branch.stretch)
         else:
             guess = near.x + near.dx @ (pressure - near.pressure)
-        return self._reached(pressure, guess, p)
+        return self._newton(pressure, guess, p)
 
     def of(self, solved: Solved) -> TipPoint | None:
         """Return the tip of a pose solved on any grid, on this map's grid."""
         pressure = solved.solution.p[: self._poses.model.robot.chamber_sets]
         guess = solved.solution.x if solved.grid is self._grid else self._poses.transfer(solved, self._grid)
-        return self._reached(pressure, guess, solved.solution.p)
+        return self._newton(pressure, guess, solved.solution.p)
 
     def solved(self, point: TipPoint) -> Solved:
         """Return a point as a pose on this grid, not examined, for going on to another grid."""
@@ -146,17 +146,23 @@ class GridMap:
         solution, nodes = Solution(point.x, p, 0.0, 0, ""), self._grid.nodes(point.x)
         return Solved(self._grid, solution, nodes, nodes, self._grid.constants(solution), 0.0, 0.0, stable=True)
 
-    def _reached(self, pressure: Array, x: Array, p: Array) -> TipPoint | None:
-        """Return the tip of the solution that Newton's method reaches from x, None where there is none."""
-        solution = self._engine.solve(p, x)
-        if not solution.holds(_HOLDS):
-            return None
-        try:
-            dx = self._derivatives.states(solution.x, p)
-        except np.linalg.LinAlgError:
-            return None
-        tip = slice(x.size - STATE_SIZE, x.size - STATE_SIZE + 12)
-        return TipPoint(pressure, solution.x[tip], dx[tip], solution.x, dx)
+    def _newton(self, pressure: Array, x: Array, p: Array) -> TipPoint | None:
+        """Take Newton steps, each with the derivatives by pressure; those of the last step belong to the point."""
+        residual = self._grid.problem.residual
+        for _ in range(_NEWTON_STEPS):
+            g = np.asarray(residual(x, p)).ravel()
+            size = float(np.max(np.abs(g)))
+            if not size < _LOST:
+                return None
+            try:
+                step, dx = self._derivatives.newton(x, p, g)
+            except np.linalg.LinAlgError:
+                return None
+            x = x + step
+            if size < _NEAR:  # the step leaves the square of it
+                tip = slice(x.size - STATE_SIZE, x.size - STATE_SIZE + 12)
+                return TipPoint(pressure, x[tip], dx[tip], x, dx)
+        return None
 
 
 @dataclass(frozen=True, eq=False)
