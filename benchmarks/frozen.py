@@ -75,7 +75,12 @@ def leaves(value: Any, key: str = "", path: str = "") -> Iterator[tuple[str, str
         for k, item in enumerate(value):
             yield from leaves(item, key, f"{path}[{k}]")
     else:
-        yield path, key, re.sub(r"[-+]?\d[\d.e+-]*", "#", value) if isinstance(value, str) else value
+        yield path, key, _words(value) if isinstance(value, str) else value
+
+
+def _words(text: str) -> str:
+    """Return a message without its numbers and without the folder of the checkout."""
+    return re.sub(r"[-+]?\d[\d.e+-]*", "#", re.sub(r"/\S*/scenarios/", "scenarios/", text))
 
 
 def differences(old: Any, new: Any, close: float) -> list[str]:
@@ -125,11 +130,11 @@ def main() -> int:
     """Write or compare."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("file", type=Path, help="of the numbers, .json.gz")
-    parser.add_argument("--write", action="store_true", help="write it instead of comparing with it")
+    parser.add_argument("--write", action="store_true", help="write it, or what --only chooses of it, and compare not")
     parser.add_argument("--close", type=float, default=CLOSE, help="of numbers that agree, where the grid decides")
     parser.add_argument("--only", default="", help="scenarios whose path contains this")
     asked = parser.parse_args()
-    kept = {} if asked.write else json.loads(gzip.decompress(asked.file.read_bytes()))
+    kept = json.loads(gzip.decompress(asked.file.read_bytes())) if asked.file.exists() else {}
     found, bad = {}, 0
     for path in sorted(SCENARIOS.rglob("*.toml")):
         name = path.relative_to(SCENARIOS).with_suffix("").as_posix()
@@ -137,13 +142,14 @@ def main() -> int:
             continue
         began = time.process_time()
         found[name] = json.loads(json.dumps(numbers(path)))
-        lines = differences(kept[name], found[name], asked.close) if name in kept else []
+        lines = differences(kept[name], found[name], asked.close) if name in kept and not asked.write else []
         bad += bool(lines)
         print(f"{name}: {time.process_time() - began:.1f} s, {len(lines)} differences", flush=True)
         for line in lines[:5]:
             print(f"    {line}")
         if asked.write:
-            asked.file.write_bytes(gzip.compress(json.dumps(found).encode(), mtime=0))
+            kept[name] = found[name]
+            asked.file.write_bytes(gzip.compress(json.dumps(kept).encode(), mtime=0))
     print(f"{len(found)} scenarios, {bad} of them differ")
     return 1 if bad else 0
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -23,6 +24,7 @@ from softnlp import (
     Material,
     MultipleShooting,
     Numerics,
+    RobotError,
     Segment,
     Status,
     blocked_force,
@@ -309,6 +311,17 @@ def test_what_cannot_be_posed_is_refused_by_name() -> None:
         solve(posed, start=solve(posed_pose(), {"pressure": PRESSURE}, engine="newton"))
     with pytest.raises(IllPosedError, match="'tip_farce' is not a fixed quantity"):
         solve(posed, {"tip_farce": 1.0})
+    with pytest.raises(InputError, match="engine: expected one of auto, ipopt, newton, got 'Newton'"):
+        solve(posed, engine="Newton")  # type: ignore[arg-type]
+    with pytest.raises(IllPosedError, match="two cases are named 'a'"):
+        problem([case("a", body), case("a", body, own=["pressure"])])
+    with pytest.raises(RobotError, match="chamber"):
+        Body([Segment(replace(D25, chamber_diameter=9 * MILLIMETRE), SOFT)])
+    start = solve(posed, {"pressure": PRESSURE}, engine="newton")
+    with pytest.raises(IllPosedError, match="begins at a solution of this problem"):
+        follow(posed_pose(), start, {"tip_force": (0.0, 0.0, 0.0)})
+    with pytest.raises(InputError, match="steps: expected at least one step, got 0"):
+        follow(posed, start, {}, steps=0)
 
 
 def test_the_sparsity_is_drawn_with_its_names() -> None:

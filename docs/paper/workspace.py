@@ -72,7 +72,7 @@ def _arcs(solvers: Solvers, model: Model, pressures: Array | None = None) -> Arr
     tips = []
     for pressure in scenario.pressures if pressures is None else pressures:
         branch, arc = unloaded_arc(poses, pressure)
-        tips.append(arc.position if branch.status.has_solution else np.full(3, np.nan))
+        tips.append(arc.tip_position if branch.status.has_solution else np.full(3, np.nan))
     return np.array(tips)
 
 

@@ -14,7 +14,7 @@ from softnlp.base.quantity import Quantity, quantity
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.model.materials import Material
 from softnlp.model.quantities import Model, contact_quantities, quantities
-from softnlp.model.robot import Robot
+from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 
 T = TypeVar("T")
 
@@ -54,6 +54,8 @@ class Body:
     ------
     InputError
         Without a segment.
+    RobotError
+        For a robot that is geometrically impossible.
     """
 
     segments: Sequence[Segment]
@@ -64,6 +66,8 @@ class Body:
     def __post_init__(self) -> None:
         if not self.segments:
             raise InputError("expected at least one segment", key="segments")
+        for segment in self.segments:
+            check(segment.robot, allow=LOWERABLE_RULES)
 
     @cached_property
     def models(self) -> tuple[Model, ...]:

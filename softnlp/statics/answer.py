@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.base.errors import IllPosedError, nearest
+from softnlp.base.errors import IllPosedError, InputError, nearest
 from softnlp.base.status import Status
 from softnlp.nlp.continuation import follow as follow_path
 from softnlp.nlp.optimality import not_optimal
@@ -130,7 +130,11 @@ def solve(
     ------
     IllPosedError
         For names that are not quantities of the problem, and values of another size.
+    InputError
+        For another engine.
     """
+    if engine not in get_args(EngineName):
+        raise InputError(f"expected one of {', '.join(get_args(EngineName))}, got {engine!r}", key="engine")
     values = dict(values or {})
     compiled = problem.compiled
     p = compiled.pack(values)
@@ -191,8 +195,10 @@ def follow(
     IllPosedError
         For a problem that is not square, a start without a solution, and as `solve`.
     """
-    if not problem.compiled.is_square or start.status is not Status.SOLVED:
-        raise IllPosedError("a path begins at a solution of a problem with as many equations as unknowns")
+    if not problem.compiled.is_square or start.status is not Status.SOLVED or start.problem is not problem:
+        raise IllPosedError("a path begins at a solution of this problem, which has as many equations as unknowns")
+    if steps < 1:
+        raise InputError(f"expected at least one step, got {steps}", key="steps")
     compiled = problem.compiled
     fixed = {q.name: start.values[q.name] for q in compiled.fixed}
     compiled.pack(values)  # for its errors

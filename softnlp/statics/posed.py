@@ -198,6 +198,9 @@ def problem(
     """
     if not cases:
         raise IllPosedError("expected at least one case")
+    names = [c.name for c in cases]
+    if len(set(names)) < len(names):
+        raise IllPosedError(f"two cases are named '{next(n for n in names if names.count(n) > 1)}'")
     known = {q.symbol.__hash__(): q for q in [q for c in cases for q in own_quantities(c)] + list(given)}
     column = ca.vertcat(*map(ca.vec, residuals)) if residuals else None
     alone = column if objective is None else None
