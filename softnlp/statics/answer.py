@@ -11,15 +11,13 @@ from numpy.typing import NDArray
 
 from softnlp.base.errors import IllPosedError, InputError, nearest
 from softnlp.base.status import Status
-from softnlp.nlp.continuation import follow as follow_path
 from softnlp.nlp.optimality import not_optimal
 from softnlp.nlp.reduced import Reduced
 from softnlp.nlp.solver import FROM_SOLUTION, EquationResidual, Solution, certificate, outputs
 from softnlp.statics.case import pose_entries
 from softnlp.statics.chain import Chain
 from softnlp.statics.condensed import linear_solver
-from softnlp.statics.loadcase import LoadCase
-from softnlp.statics.posed import LARGEST_JUMP, Problem
+from softnlp.statics.posed import Problem, followed
 
 Array = NDArray[np.float64]
 EngineName = Literal["auto", "ipopt", "newton"]
@@ -207,13 +205,11 @@ def follow(
     answers = [start]
     for k in range(steps):
         a, b = (begin + (end - begin) * j / steps for j in (k, k + 1))
-        found = follow_path(
+        found = followed(
             problem._engine(newton_only=True),
             lambda t, a=a, b=b: b if t >= 1.0 else a + t * (b - a),  # type: ignore[misc]
             answers[-1].solution.x,
-            distance=lambda change: float(np.max(np.abs(change[entries]), initial=0.0)),
-            first_step=1.0,
-            largest_jump=LARGEST_JUMP,
+            entries,
         )
         answer = _judged(problem, found.solution, tolerance)
         if not found.arrived:
@@ -227,10 +223,9 @@ def follow(
 def _pose_entries(problem: Problem) -> NDArray[np.intp]:
     start, found = problem.compiled.free_size, []
     for case in problem.cases:
-        if not (isinstance(case, LoadCase) and case.method is None):
-            found.append(start + pose_entries(case))
+        found.append(start + pose_entries(case))
         start += sum(symbol.numel() for symbol in case.symbols)
-    return np.concatenate(found) if found else np.zeros(0, np.intp)
+    return np.concatenate(found)
 
 
 def _judged(problem: Problem, solution: Solution, tolerance: float) -> Answer:

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from softnlp.base.errors import IllPosedError
 from softnlp.base.quantity import Quantity
-from softnlp.nlp.continuation import follow as follow_path
-from softnlp.nlp.continuation import straight_path
+from softnlp.nlp.continuation import Followed, Path, follow, straight_path
 from softnlp.nlp.optimality import Bounds
 from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
 from softnlp.nlp.solver import Engine
@@ -26,8 +25,9 @@ from softnlp.statics.loadcase import LoadCase
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
-LARGEST_JUMP = 0.6
-"""Of a position or direction cosine between a solution on a path and its prediction: another branch is further."""
+_LARGEST_JUMP = (
+    0.6  # of a position or direction cosine between a solution and its prediction: another branch is further
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,15 +149,20 @@ class Problem:
         resting = unloaded_values(case, values)
         guess = first_guess(case, resting)
         path = straight_path(engine.problem, resting, values)
-        found = follow_path(
-            engine,
-            path,
-            guess,
-            distance=lambda change: float(np.max(np.abs(change[entries]), initial=0.0)),
-            first_step=1.0,
-            largest_jump=LARGEST_JUMP,
-        )
+        found = followed(engine, path, guess, entries)
         return found.solution.x if np.isfinite(found.solution.residual) else guess
+
+
+def followed(engine: Engine, path: Path, start: Array, entries: NDArray[np.intp]) -> Followed:
+    """Follow a solution along a path, at once where Newton's method allows. entries : of x that tell branches apart."""
+    return follow(
+        engine,
+        path,
+        start,
+        distance=lambda change: float(np.max(np.abs(change[entries]), initial=0.0)),
+        first_step=1.0,
+        largest_jump=_LARGEST_JUMP,
+    )
 
 
 def problem(
