@@ -72,6 +72,7 @@ def _app() -> App:
     )
     add(app, "run workspace sweep inverse sensitivity identify compare design gui mesh example")
     add(app, "robots materials", "library")
+    app.command(import_module("softnlp.cli.importing").import_, name="import")
     plot = App(name="plot", help="Draw a cross-section, silicones, or the results of a run.")
     add(plot, "section material run", "plot", "plot_")
     app.command(plot)

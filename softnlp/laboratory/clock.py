@@ -1,0 +1,139 @@
+"""The clock of a file: the column or columns that hold the time, in seconds from the first sample or as they stand."""
+
+from __future__ import annotations
+
+import re
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.base.reading import shown
+from softnlp.laboratory.choices import AskError, Choices
+from softnlp.laboratory.imported import ANY
+from softnlp.laboratory.table import RawTable, in_si
+from softnlp.studies.plausibility import Check
+
+Array = NDArray[np.float64]
+
+_NAMES = r"^(test |elapsed |relative |run |rel\.? ?)?(time|zeit|t|x_value|seconds|timestamp|time ?stamp)\b"
+_PARTS = (("hour", 3600.0), ("minute", 60.0), ("second", 1.0), (r"ms|millisecond", 1e-3))
+_RATES = (0.1, 5000.0)  # samples a second that a laboratory's logger takes
+_CLOCK = re.compile(r"^(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)$")
+_DAY = 86400.0
+
+
+def time_of(table: RawTable, choices: Choices, need: bool = False) -> tuple[Array | None, list[Check]]:
+    """Return the time of each row [s], and the check of a second clock in the same file.
+
+    Raises
+    ------
+    AskError
+        Where the unit of the time is not known, or `need` and there is none.
+    """
+    found = table.named(_NAMES, r"date|delta|step|out")
+    asked = choices.get("column.time")
+    if asked is not None:
+        found = [k for k, name in enumerate(table.names) if name == asked and table.is_number(k)]
+    found = [k for k in found if (unit := table.units[k]) is None or unit.kind == "time"]
+    clocks = [(k, _seconds(table, k, choices)) for k in found]
+    known = [(k, t) for k, t in clocks if t is not None]
+    if known:
+        # one that counts from the start comes before one that counts from midnight
+        k, time = min(known, key=lambda pair: abs(float(pair[1][0])))
+        return time, [check for j, other in known if j != k for check in _two_clocks(time, other)]
+    made = _from_parts(table)
+    if made is None:
+        made = _from_text(table)
+    if made is None:
+        made = _from_step(table, choices)
+    if made is None and need:
+        raise AskError(f"{table.file}: no column tells the time; say --set rate_Hz=…, or --set column.time=…")
+    return made, []
+
+
+def _seconds(table: RawTable, k: int, choices: Choices) -> Array | None:
+    """Return a column as seconds; without a unit the rate at which it was sampled tells, or asks."""
+    known = in_si(table, k, "time", choices, "time")
+    if known is not None:
+        return known
+    plain: Array = table.columns[k]
+    steps = np.diff(plain[np.isfinite(plain)])
+    step = float(np.median(steps)) if steps.size else 0.0
+    if not step > 0:
+        return None
+    likely = [
+        (unit, scale) for unit, scale in (("s", 1.0), ("ms", 1e-3)) if _RATES[0] <= 1 / (step * scale) <= _RATES[1]
+    ]
+    if len(likely) != 1:
+        name = shown(table.names[k])
+        raise AskError(
+            f"{table.file}: column {name} has no unit and rises by {step:g}: {1 / step:.4g} samples a second in s "
+            f"(--set unit.time=s), {1e3 / step:.4g} in ms (--set unit.time=ms)"
+        )
+    unit, scale = likely[0]
+    choices.take("unit.time", unit, f"{1 / (step * scale):.4g} samples a second, as loggers take")
+    return np.asarray(plain * scale)
+
+
+def _two_clocks(time: Array, other: Array) -> list[Check]:
+    """Return the check of how two clocks of a file differ, each counted from its round start."""
+    offset = float(np.median(time - (other - other[0])))
+    drift = float(np.ptp(time - other))
+    likely = (
+        "the log began later than its clock; the lag to the other files is found from what they hold, or --set lag_s=…"
+    )
+    return [
+        Check("offset between two clocks of a file", offset, (-0.01, 0.01), ANY, likely, "s"),
+        Check("drift between two clocks of a file", drift, (-0.01, 0.01), ANY, "one of the clocks runs fast", "s"),
+    ]
+
+
+def _from_parts(table: RawTable) -> Array | None:
+    """Return the time of columns of hours, minutes, seconds and milliseconds, from the first row on."""
+    total = np.zeros(table.rows)
+    used = 0
+    for pattern, scale in _PARTS:
+        found = table.named(rf"^({pattern})s?$")
+        if found:
+            total = total + table.columns[found[0]] * scale
+            used += 1
+    if used < 2:
+        return None
+    total = total - total[0]
+    days = np.cumsum(np.concatenate([[0.0], np.diff(total) < -_DAY / 2]))
+    return np.asarray(total + _DAY * days)
+
+
+def _from_text(table: RawTable) -> Array | None:
+    """Return the time of a column of dates or times of day, from the first row on."""
+    for k in range(len(table.names)):
+        if table.is_number(k):
+            continue
+        values = [_moment(cell) for cell in table.columns[k]]
+        if values and all(value is not None for value in values):
+            moments = np.array(values, float)
+            return np.asarray(moments - moments[0])
+    return None
+
+
+def _moment(cell: Any) -> float | None:
+    text = str(cell).strip()
+    if found := _CLOCK.match(text):
+        return 3600.0 * int(found[1]) + 60.0 * int(found[2]) + float(found[3].replace(",", "."))
+    try:
+        return datetime.fromisoformat(text).timestamp() if len(text) > 9 else None
+    except ValueError:
+        return None
+
+
+def _from_step(table: RawTable, choices: Choices) -> Array | None:
+    """Return the time of rows at equal steps: a rate that is given, or LabVIEW's Delta_X."""
+    rate = choices.number("rate_Hz")
+    if rate is not None:
+        return np.asarray(np.arange(table.rows) / rate)
+    step = table.values.get("delta_x")
+    if step is None or not step[0] > 0:
+        return None
+    return np.asarray(np.arange(table.rows) * step[0])

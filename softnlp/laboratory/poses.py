@@ -1,0 +1,243 @@
+"""The sensors of a tracker's file: position and quaternion of each, and the rows in which it was not seen."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.base.errors import InputError, listed
+from softnlp.base.reading import shown
+from softnlp.laboratory.choices import AskError, Choices
+from softnlp.laboratory.table import RawTable, in_si
+from softnlp.laboratory.units import UNITS
+
+Array = NDArray[np.float64]
+
+_POSITION = re.compile(r"^(?:tip[ _.]?|pos(?:ition)?[ _.]?|t|p)?([xyz])(?:[ _.]?(\w{1,12}))?$", re.IGNORECASE)
+_QUATERNION = re.compile(r"^q(?:uat(?:ernion)?)?[ _.]?([ow0-4xyzrs])(?:[ _.]?(\w{1,12}))?$", re.IGNORECASE)
+_PREFIXED = re.compile(r"^(.+?)[ _.:/]+(?:pos(?:ition)?[ _.:/]+)?(t?[xyz]|q[ow0-4xyz])$", re.IGNORECASE)
+_STATE = re.compile(r"state|status", re.IGNORECASE)
+_SEEN = ("ok", "valid", "visible", "tracked", "enabled", "good", "1", "true")
+_TOOL = re.compile(r"^(tool|sensor|body|marker|rigid ?body|port ?handle|tool ?info|name)s?\b", re.IGNORECASE)
+_REACH = (1e-3, 3.0)  # [m]: how far a tip moves in a test
+_NORM = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """position : (rows, 3) [m]. quaternion : (rows, 4) x, y, z, w, or None. seen : (rows,)."""
+
+    name: str
+    position: Array
+    quaternion: Array | None
+    seen: NDArray[np.bool_]
+    order: str = ""
+
+    @property
+    def spread(self) -> float:
+        """How far it moves [m]."""
+        seen = self.position[self.seen]
+        return float(np.linalg.norm(np.ptp(seen, axis=0))) if len(seen) else 0.0
+
+
+def pose_groups(table: RawTable) -> dict[str, tuple[list[int], list[int], str]]:
+    """Return the columns x, y, z and of the quaternion of each sensor by its name, and the order of the latter.
+
+    The order is "wxyz" or "xyzw" as the names say, "" where they are only numbered.
+    """
+    positions: dict[str, dict[str, int]] = {}
+    quaternions: dict[str, dict[str, int]] = {}
+    seen: Counter[str] = Counter()
+    loads = bool(table.named(r"^f[xyz]$"))
+    for k, name in enumerate(table.names):
+        if not table.is_number(k) or (table.units[k] is not None and table.units[k] not in _LENGTHS):
+            continue
+        if loads and re.match(r"^[tm][xyz]$", name, re.IGNORECASE):
+            continue  # a moment
+        repeat = seen[name.lower()]
+        seen[name.lower()] += 1
+        again = f"{repeat + 1}" if repeat else ""
+        if found := _PREFIXED.match(name):
+            tool, plain = found[1], found[2]
+        else:
+            tool, plain = "", name
+        if found := _QUATERNION.match(plain):
+            quaternions.setdefault(f"{tool}{found[2] or ''}{again}", {})[found[1].lower()] = k
+        elif found := _POSITION.match(plain):
+            positions.setdefault(f"{tool}{found[2] or ''}{again}", {})[found[1].lower()] = k
+    made: dict[str, tuple[list[int], list[int], str]] = {}
+    whole = {tool: q for tool, q in quaternions.items() if len(q) == 4}
+    for tool, parts in positions.items():
+        if len(parts) < 3:
+            continue
+        q = whole.get(tool, next(iter(whole.values())) if len(whole) == 1 and len(positions) == 1 else {})
+        columns = sorted(q.values())
+        made[tool] = (
+            [parts[axis] for axis in "xyz"],
+            columns,
+            _order([next(n for n in q if q[n] == c) for c in columns]),
+        )
+    return made
+
+
+_LENGTHS = tuple(unit for unit in UNITS.values() if unit.kind in ("length", "ratio"))
+
+
+def _order(letters: Sequence[str]) -> str:
+    """Return the order that the letters of a quaternion's columns say."""
+    word = "".join(letters)
+    if word in ("1234", "0123") or not word:
+        return "wxyz" if word == "0123" else ""
+    plain = word.replace("o", "w").replace("0", "w").replace("r", "w").replace("s", "w").replace("4", "w")
+    return plain if sorted(plain) == sorted("wxyz") else ""
+
+
+def sensors(table: RawTable, choices: Choices) -> dict[str, tuple[RawTable, Sensor]]:
+    """Return every sensor of a file by its name, with the rows of the file that are its own.
+
+    Raises
+    ------
+    AskError
+        Where the unit of the positions is not known.
+    InputError
+        For a file without positions.
+    """
+    groups = pose_groups(table)
+    if not groups:
+        raise InputError(f"{table.file}: expected columns x, y, z of a tracker; it has {listed(table.names)}")
+    found: dict[str, tuple[RawTable, Sensor]] = {}
+    for tool, part in _by_tool(table).items():
+        for suffix, group in groups.items():
+            name = " ".join(word for word in (tool, suffix) if word) or "tip"
+            found[name] = part, _sensor(part, name, group, choices)
+    return found
+
+
+def _by_tool(table: RawTable) -> dict[str, RawTable]:
+    """Return the rows of each tool of a file that has a column for its name, by that."""
+    for k, name in enumerate(table.names):
+        cells = table.columns[k]
+        if _TOOL.match(name) and not table.is_number(k):
+            tools = list(dict.fromkeys(cells))
+            if 1 < len(tools) <= 20:
+                return {tool: table.kept(np.array([cell == tool for cell in cells])) for tool in tools}
+    return {"": table}
+
+
+def _sensor(table: RawTable, name: str, group: tuple[list[int], list[int], str], choices: Choices) -> Sensor:
+    places, turns, order = group
+    columns = [in_si(table, k, "length", choices, "position") for k in places]
+    raw = np.column_stack([table.columns[k] for k in places])
+    q = np.column_stack([table.columns[k] for k in turns]) if turns else None
+    seen = np.all(np.isfinite(raw), axis=1) & _state(table)
+    if q is not None:
+        norm = np.linalg.norm(np.nan_to_num(q), axis=1)
+        seen &= np.isfinite(q).all(axis=1) & (norm > 0.5)
+        seen &= ~((raw == 0).all(axis=1) & (norm < 0.5))
+    else:
+        zeros = (raw == 0).all(axis=1)
+        seen &= ~zeros | bool(np.mean(zeros) > 0.5)
+    known = [column for column in columns if column is not None]
+    position = np.column_stack(known) if len(known) == 3 else raw * _scale(raw[seen], table, choices)
+    asked = choices.get("quaternion")
+    if q is not None and asked is not None:
+        if asked not in ("wxyz", "xyzw"):
+            raise InputError(f"expected 'wxyz' or 'xyzw', got {shown(asked)}", key="quaternion")
+        order = str(asked)
+    return Sensor(name, position, q if q is None else _as_xyzw(q, order or "wxyz"), seen, order)
+
+
+def _as_xyzw(q: Array, order: str) -> Array:
+    """Return quaternions x, y, z, w of columns in another order."""
+    return q[:, [order.index(letter) for letter in "xyzw"]]
+
+
+def _state(table: RawTable) -> NDArray[np.bool_]:
+    """Return in which rows the words of a state column say that the sensor was seen."""
+    seen = np.ones(table.rows, bool)
+    for k, name in enumerate(table.names):
+        if _STATE.search(name) and not table.is_number(k):
+            words = [str(cell).strip().lower() for cell in table.columns[k]]
+            if any(word in _SEEN for word in words):
+                seen &= np.array([word in _SEEN for word in words])
+    return seen
+
+
+def _scale(position: Array, table: RawTable, choices: Choices) -> float:
+    """Return the unit of positions without one: that in which a robot's tip moves as far as it can."""
+    reach = float(np.linalg.norm(np.ptp(position, axis=0))) if len(position) else 0.0
+    size = max(reach, float(np.linalg.norm(np.median(position, axis=0))) if len(position) else 0.0)
+    likely = [u for u in ("mm", "m") if _REACH[0] <= size * UNITS[u].scale <= _REACH[1]]
+    if len(likely) != 1:
+        raise AskError(
+            f"{table.file}: its positions have no unit and lie within {size:.4g}: --set unit.position=mm, or m"
+        )
+    unit = choices.take(
+        "unit.position", likely[0], f"the positions lie within {size:.4g}, {size * UNITS[likely[0]].scale:.3g} m"
+    )
+    return UNITS[str(unit)].scale
+
+
+def tip_and_base(found: Mapping[str, Sensor], choices: Choices) -> tuple[str, str | None]:
+    """Return which sensor is at the tip and which one at the base, where there is one.
+
+    Raises
+    ------
+    AskError
+        Where neither the settings nor what moves tells.
+    """
+    names = list(found)
+    tip, base = choices.get("tip"), choices.get("base")
+    for key, asked in (("tip", tip), ("base", base)):
+        if asked is not None and asked not in names:
+            raise InputError(f"expected a sensor of {listed(names)}, got {shown(asked)}", key=key)
+    if tip is None and base is None and len(names) == 2:
+        still, moves = sorted(names, key=lambda name: found[name].spread)
+        if found[still].spread < 0.2 * found[moves].spread:
+            spreads = (
+                f"it moves by {1e3 * found[still].spread:.3g} mm, sensor {moves} by {1e3 * found[moves].spread:.3g}"
+            )
+            base = choices.take("base", still, spreads)
+            tip = moves
+    if tip is None:
+        others = [name for name in names if name != base]
+        if len(others) != 1:
+            raise AskError(
+                f"which sensor is at the tip? There are {listed(names)}: --set tip={names[-1]}, --set base={names[0]}"
+            )
+        tip = others[0]
+    return str(tip), None if base is None else str(base)
+
+
+def order_misfits(sensor: Sensor) -> dict[str, float]:
+    """Return how far turns are from being about an axis across the motion, 0 to 1, by the order of the quaternion.
+
+    A robot without a load bends in a plane: the axis of the turn from the first pose to another is normal to the path
+    of its tip, wherever the sensor sits and however it is turned.
+    """
+    from scipy.spatial.transform import Rotation
+
+    q, p = sensor.quaternion, sensor.position
+    if q is None:
+        return {}
+    q, p = q[sensor.seen], p[sensor.seen]
+    other = "xyzw" if sensor.order != "xyzw" else "wxyz"
+    w_first = np.roll(q, 1, axis=1)
+    misread = w_first if other == "xyzw" else np.roll(q, -1, axis=1)
+    found = {}
+    for order, turned in ((sensor.order or "wxyz", q), (other, misread), ("inverse", q * [-1, -1, -1, 1])):
+        R = Rotation.from_quat(turned / np.linalg.norm(turned, axis=1)[:, None])
+        axis = (R * R[0].inv()).as_rotvec()
+        moved = p - p[0]
+        turn, far = np.linalg.norm(axis, axis=1), np.linalg.norm(moved, axis=1)
+        used = (turn > 0.1) & (far > 0.2 * far.max())
+        if np.sum(used) < 3:
+            return {}
+        cosine = np.abs(np.sum(axis * moved, axis=1)[used]) / (turn * far)[used]
+        found[order] = float(np.mean(cosine))
+    return found

@@ -1,0 +1,134 @@
+"""Signals of any kind: load cycles, the break, static plateaus, and the lag between two clocks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+_TURN = 0.1  # of the range: a smaller fall is noise and no turn
+_BROKEN = 0.5  # of the largest stress: what is left of it after a break
+_NOISE = 6.0  # standard deviations of the change between samples
+
+
+class Leg(NamedTuple):
+    """Rows first to before `end` over which a quantity rises, or falls."""
+
+    first: int
+    end: int
+    rising: bool
+
+
+def legs(values: Array) -> list[Leg]:
+    """Return the loadings and unloadings of a test, by the turns that are larger than a tenth of its range."""
+    span = float(np.ptp(values)) * _TURN
+    found: list[Leg] = []
+    first = turn = 0
+    rising: bool | None = None
+    for k, value in enumerate(values):
+        if rising is None:
+            if abs(value - values[first]) > span:
+                rising, turn = bool(value > values[first]), k
+        elif (value >= values[turn]) == rising or value == values[turn]:
+            turn = k if value != values[turn] else turn
+        elif abs(value - values[turn]) > span:
+            found.append(Leg(first, turn + 1, rising))
+            first, rising, turn = turn, not rising, k
+    found.append(Leg(first, len(values), True if rising is None else rising))
+    return found
+
+
+def break_row(stress: Array) -> int:
+    """Return the row of the largest stress where the specimen then broke, else how many rows there are."""
+    top = int(np.argmax(stress))
+    after = stress[top:]
+    if stress[top] > 0 and len(after) > 1 and np.median(after[-max(1, len(after) // 10) :]) < _BROKEN * stress[top]:
+        falls = np.flatnonzero(after < _BROKEN * stress[top])
+        # a fall at once is a break; one as slow as the rise is an unloading
+        if falls[0] <= max(5, 0.05 * top):
+            return top
+    return len(stress)
+
+
+def enclosed_area(x: Array, y: Array) -> float:
+    """Return the work along a curve, by trapezia."""
+    return float(np.sum(np.diff(x) * (y[1:] + y[:-1]) / 2))
+
+
+def noise(signal: Array) -> float:
+    """Return the standard deviation of a signal (samples,) about its steps."""
+    changes = np.abs(np.diff(signal))
+    return float(1.4826 * np.median(changes) / np.sqrt(2)) if changes.size else 0.0
+
+
+def plateaus(signals: Array, shortest: int = 3) -> Iterator[Rows]:
+    """Yield the rows of each stretch over which signals (samples, channels) stand still.
+
+    A sample belongs to the one before unless a channel changes by six times its noise, and by a hundredth of its range;
+    the first and the last tenth of a plateau, which may move, are left out.
+    """
+    if len(signals) < shortest:
+        return
+    limit = np.array([max(_NOISE * np.sqrt(2) * noise(c), 0.02 * float(np.ptp(c)), 1e-12) for c in signals.T])
+    moved = np.any(np.abs(np.diff(signals, axis=0)) > limit, axis=1)
+    edges = np.concatenate([[0], np.flatnonzero(moved) + 1, [len(signals)]])
+    for first, end in pairwise(edges):
+        if end - first < shortest:
+            continue
+        third = max(1, (end - first) // 3)
+        drift = np.abs(signals[first : first + third].mean(axis=0) - signals[end - third : end].mean(axis=0))
+        if np.all(drift <= limit):
+            cut = (end - first) // 10
+            yield np.arange(first + cut, end - cut)
+
+
+def lag_between(time: Array, response: Array, command_time: Array, command: Array) -> tuple[float, float, float]:
+    """Return how much later the clock of a command reads than that of a response [s], its uncertainty, and R^2.
+
+    time : (n,). response : (n, channels) of one unit. command_time : (m,). command : (m, sets). The lag is the shift at
+    which the commands, as a linear map, explain the most of the response, but for samples at which they step.
+    """
+    step = min(float(np.median(np.diff(time))), float(np.median(np.diff(command_time)))) / 2
+    reach = max(np.ptp(time), np.ptp(command_time)) / 2
+    offset = 0.0 if abs(time[0] - command_time[0]) <= reach else float(command_time[0] - time[0])
+    tried = offset + np.arange(-reach, reach + step, max(step, 2 * reach / 2000))
+    quality = np.array([_explained(time, response, command_time - lag, command) for lag in tried])
+    best = int(np.argmax(quality))
+    fine = tried[best] + np.linspace(-2, 2, 41) * max(step, 2 * reach / 2000)
+    sharp = np.array([_explained(time, response, command_time - lag, command) for lag in fine])
+    good = fine[sharp >= sharp.max() - 1e-9 - 0.02 * (1 - sharp.min())]
+    return float(np.mean(good)), float(max(np.ptp(good) / 2, step / 2)), float(sharp.max())
+
+
+def _switching(time: Array, command_time: Array, command: Array) -> NDArray[np.bool_]:
+    """Return which times lie where a command steps between two of its samples, none where it moves all the time."""
+    limits = np.array([max(_NOISE * np.sqrt(2) * noise(c), 0.02 * float(np.ptp(c))) for c in command.T])
+    steps = np.any(np.abs(np.diff(command, axis=0)) > limits, axis=1)
+    if np.mean(steps) > 0.5:
+        return np.zeros(len(time), bool)
+    at = np.clip(np.searchsorted(command_time, time, side="right") - 1, 0, len(steps) - 1)
+    found: NDArray[np.bool_] = steps[at]
+    return found
+
+
+def _explained(time: Array, response: Array, command_time: Array, command: Array) -> float:
+    """Return the part of a response that commands explain, 0 where they share less than half of the shorter record."""
+    inside = (time >= command_time[0]) & (time <= command_time[-1]) & ~_switching(time, command_time, command)
+    shared = min(time[-1], command_time[-1]) - max(time[0], command_time[0])
+    if np.sum(inside) < 10 or shared < 0.5 * min(np.ptp(time), np.ptp(command_time)):
+        return 0.0
+    P = np.column_stack([np.interp(time[inside], command_time, c) for c in command.T])
+    size = np.maximum(np.ptp(command, axis=0), 1e-30)
+    P = P / size
+    A = np.column_stack([np.ones(len(P)), P])  # with squares and products another lag of few steps fits as well
+    y = response[inside]
+    y = y - y.mean(axis=0)
+    left = y - A @ np.linalg.lstsq(A, y, rcond=None)[0]
+    total = float(np.sum(y**2))
+    return 1 - float(np.sum(left**2)) / total if total > 0 else 0.0

@@ -1,0 +1,272 @@
+"""One specimen of a testing machine's file: which columns are its stretch and stress, their units, and its size."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.base.errors import InputError
+from softnlp.base.reading import shown
+from softnlp.base.units import MEGAPASCAL, MILLIMETRE
+from softnlp.laboratory.choices import AskError, Choices
+from softnlp.laboratory.imported import ANY
+from softnlp.laboratory.table import RawTable, in_si, one_column
+from softnlp.laboratory.units import UNITS
+from softnlp.studies.plausibility import SHEAR_MODULUS, Check, area_check
+
+Array = NDArray[np.float64]
+
+_DISPLACEMENT = r"extension|displac|crosshead|position|stroke|traverse|standardweg|^weg|elongation|verfahrweg"
+_FORCE = r"load|force|kraft|standardkraft|^f[yz]?$"
+_STRAIN, _STRESS, _STRETCH = r"strain|dehnung", r"stress|spannung|^sigma", r"stretch|lambda"
+_TRUE, _RATE = r"true|cauchy|wahre", r"rate|limit|pacing"
+_SAME = 0.02  # relative, of two columns that say the same
+_STRESS_UNITS = ("Pa", "kPa", "bar", "psi", "MPa")
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """stretch, stress : (rows,) [1] and engineering [Pa]. area : of the specimen [m^2], where known. checks : of it."""
+
+    stretch: Array
+    stress: Array
+    area: float | None
+    checks: tuple[Check, ...]
+
+    def kept(self, rows: slice) -> Curve:
+        """Return the curve with some of its rows."""
+        return replace(self, stretch=self.stretch[rows], stress=self.stress[rows])
+
+
+def specimens(table: RawTable, choices: Choices) -> list[RawTable]:
+    """Return the specimens of a file, whose columns stand side by side or whose rows follow each other."""
+    parts = [table.kept(table.repeat == k) for k in np.unique(table.repeat)]
+    count = len(table.names)
+    for width in range(2, count // 2 + 1):
+        if count % width == 0 and all(table.names[k] == table.names[k % width] for k in range(count)):
+            parts = [part.only(range(k, k + width)) for part in parts for k in range(0, count, width)]
+            break
+    if len(parts) == 1:
+        return parts
+    asked = choices.take("specimen", "all", f"{len(parts)} specimens; they count as repeats of one test")
+    if asked == "all":
+        return parts
+    if isinstance(asked, bool) or not isinstance(asked, int) or not 1 <= asked <= len(parts):
+        raise InputError(f"expected 'all' or 1 to {len(parts)}, got {shown(asked)}", key="specimen")
+    return [parts[asked - 1]]
+
+
+def curve_of(table: RawTable, choices: Choices) -> Curve:
+    """Return the whole curve of one specimen.
+
+    Raises
+    ------
+    AskError
+        Naming everything that is missing at once.
+    """
+    missing: list[str] = []
+    area, sized = _area(table, choices)
+    stretch, told = _stretch(table, choices, missing)
+    stress, more = _stress(table, choices, stretch, area, missing)
+    if missing or stretch is None or stress is None:
+        raise AskError(f"{table.file}: {'; and '.join(missing)}")
+    known = np.isfinite(stretch) & np.isfinite(stress)
+    choices.drop(int(np.sum(~known)), "rows with a missing cell")
+    if area is not None and sized:
+        more = [area_check(area / MILLIMETRE**2), *more]
+    return Curve(stretch[known], stress[known], area, (*told, *more))
+
+
+def _size(table: RawTable, key: str, patterns: Sequence[str], choices: Choices) -> float | None:
+    """Return a size of the specimen [mm], from its setting or the preamble."""
+    given = choices.number(f"{key}_mm", 0.01, 3000.0)
+    if given is not None:
+        return given
+    found = table.value(*patterns)
+    if found is None or found[2] is None or found[2].kind != "length":
+        return None
+    size = found[1] * found[2].scale / MILLIMETRE
+    return float(choices.take(f"{key}_mm", round(size, 9), f"{shown(found[0])} of the preamble")) if size > 0 else None
+
+
+def _area(table: RawTable, choices: Choices) -> tuple[float | None, bool]:
+    """Return the specimen's cross-section [m^2], None where nothing says it, and whether it is to be checked."""
+    given = choices.number("area_mm2")
+    if given is not None:
+        return given * MILLIMETRE**2, True
+    diameter = _size(table, "diameter", (r"^(specimen |sample )?diameter",), choices)
+    if diameter is not None:
+        return float(np.pi / 4) * (diameter * MILLIMETRE) ** 2, True
+    width = _size(table, "width", (r"^(specimen |sample )?width",), choices)
+    thickness = _size(table, "thickness", (r"^(specimen |sample )?thickness",), choices)
+    if width is None or thickness is None:
+        return None, False
+    return width * thickness * MILLIMETRE**2, True
+
+
+def _stretch(table: RawTable, choices: Choices, missing: list[str]) -> tuple[Array | None, list[Check]]:
+    """Return the stretch, and the check of the crosshead against a strain where the file has both."""
+    columns = {
+        "stretch": one_column(table, "stretch", table.named(_STRETCH), choices),
+        "strain": one_column(table, "strain", table.named(_STRAIN, f"{_TRUE}|{_RATE}"), choices),
+        "displacement": one_column(table, "displacement", table.named(_DISPLACEMENT, f"{_STRAIN}|{_RATE}"), choices),
+        "true strain": one_column(table, "true strain", table.named(rf"({_TRUE}).*({_STRAIN})"), choices),
+    }
+    known = [name for name, k in columns.items() if k is not None]
+    if not known:
+        raise InputError(
+            f"{table.file}: expected a column of stretch, strain or extension; it has {', '.join(table.names)}"
+        )
+    chosen = choices.one_of("extension", list(columns), known[0])
+    if columns[chosen] is None:
+        raise InputError(f"{table.file} has no column of this; it has {', '.join(known)}", key="extension")
+    if len(known) > 1 and "extension" not in choices.used and chosen in ("stretch", "strain"):
+        others = " and ".join(known[1:])
+        choices.take("extension", chosen, f"measured at the specimen, or made from it; the file has {others} too")
+    k = columns[chosen]
+    assert k is not None
+    gauge = _size(table, "gauge_length", (r"gauge", r"^(specimen |sample )?length", r"l0|messl"), choices)
+    crosshead = None
+    if columns["displacement"] is not None and (gauge is not None or chosen == "displacement"):
+        moved = in_si(table, columns["displacement"], "length", choices, "displacement")
+        if moved is None and chosen == "displacement":
+            missing.append(f"column {shown(table.names[k])} has no unit: --set unit.displacement=mm, or another length")
+        elif gauge is None:
+            missing.append(
+                f"column {shown(table.names[k])} needs the length that was stretched: --set gauge_length_mm=…"
+            )
+        elif moved is not None:
+            crosshead = 1 + moved / (gauge * MILLIMETRE)
+    if chosen == "displacement":
+        return crosshead, []
+    if chosen == "stretch":
+        return table.columns[k], []
+    strain = _strain(table, k, chosen, columns, choices, crosshead, missing)
+    if strain is None:
+        return None, []
+    stretch = np.exp(strain) if chosen == "true strain" else 1 + strain
+    return stretch, [] if crosshead is None else _crosshead_check(crosshead, stretch)
+
+
+def _crosshead_check(crosshead: Array, stretch: Array) -> list[Check]:
+    known = np.isfinite(crosshead) & np.isfinite(stretch) & (stretch > 1.05)
+    if not np.any(known):
+        return []
+    ratio = float(np.median((crosshead[known] - 1) / (stretch[known] - 1)))
+    likely = (
+        "the crosshead moves more or less than the specimen: grips slip, or gauge_length_mm is not that of the strain"
+    )
+    return [Check("crosshead strain over the strain taken", ratio, (0.95, 1.05), (0.1, 10.0), likely)]
+
+
+def _strain(
+    table: RawTable,
+    k: int,
+    chosen: str,
+    columns: dict[str, int | None],
+    choices: Choices,
+    crosshead: Array | None,
+    missing: list[str],
+) -> Array | None:
+    """Return a strain [1]; without a unit another column has to tell whether it is in percent."""
+    strain = in_si(table, k, "ratio", choices, "strain")
+    if strain is not None:
+        return strain
+    plain: Array = table.columns[k]
+    largest = float(np.nanmax(np.abs(plain)))
+    true = columns["true strain"]
+    if chosen == "strain" and true is not None and table.units[true] is None:
+        for unit in ("1", "%"):
+            scale = UNITS[unit].scale
+            difference = np.log1p(np.maximum(plain * scale, -0.9)) - table.columns[true] * scale
+            if np.nanmax(np.abs(difference)) < _SAME * largest * scale:
+                choices.take("unit.strain", unit, "ln(1 + strain) is then the column of true strain")
+                return plain * scale
+    if crosshead is not None:
+        for unit in ("1", "%"):
+            ratio = float(np.nanmedian((crosshead - 1)[1:] / np.where(plain[1:] == 0, np.nan, plain[1:])))
+            if 0.5 < ratio / UNITS[unit].scale < 2:
+                choices.take("unit.strain", unit, "it then agrees with the displacement over the gauge length")
+                return plain * UNITS[unit].scale
+    if largest > 12:
+        choices.take("unit.strain", "%", f"it goes to {largest:.4g}, and no silicone to that stretch")
+        return plain * UNITS["%"].scale
+    missing.append(
+        f"column {shown(table.names[k])} has no unit and goes to {largest:.4g}: a stretch of {1 + largest:.4g} "
+        f"(--set unit.strain=1) or of {1 + largest / 100:.4g} (--set unit.strain=%)"
+    )
+    return None
+
+
+def _stress(
+    table: RawTable, choices: Choices, stretch: Array | None, area: float | None, missing: list[str]
+) -> tuple[Array | None, list[Check]]:
+    """Return the engineering stress [Pa], and the checks of what the machine divided by."""
+    columns = {
+        "engineering stress": one_column(table, "stress", table.named(_STRESS, f"{_TRUE}|{_RATE}"), choices),
+        "force": one_column(table, "force", table.named(_FORCE, f"{_RATE}|cell"), choices),
+        "true stress": one_column(table, "true stress", table.named(rf"({_TRUE}).*({_STRESS})"), choices),
+    }
+    known = [name for name, k in columns.items() if k is not None]
+    if not known:
+        raise InputError(f"{table.file}: expected a column of stress or force; it has {', '.join(table.names)}")
+    words = {"engineering": "engineering stress", "true": "true stress"}
+    asked = choices.get("stress")
+    chosen = words.get(str(asked), str(asked)) if asked is not None else known[0]
+    if columns.get("engineering stress") is not None and chosen == "true stress" and columns["true stress"] is None:
+        columns["true stress"] = columns["engineering stress"]  # a person says so of a column that does not
+    k = columns.get(chosen)
+    if k is None:
+        raise InputError(f"expected {' or '.join(map(repr, known))}, got {shown(asked)}", key="stress")
+    force = columns["force"] if columns["force"] is not None and columns["force"] != k else None
+    pull = None if force is None else in_si(table, force, "force", choices, "force")
+    if chosen == "force":
+        pull = in_si(table, k, "force", choices, "force")
+        if pull is None:
+            missing.append(f"column {shown(table.names[k])} has no unit: --set unit.force=N, or kN, mN, lbf")
+        if area is None:
+            missing.append("a force needs the specimen's size: --set area_mm2=…, or width_mm and thickness_mm")
+        return (None if pull is None or area is None else pull / area), []
+    if len(known) > 1 and asked is None:
+        choices.take("stress", chosen, f"the file has {' and '.join(known[1:])} too")
+    stress = in_si(table, k, "pressure", choices, "stress")
+    if stress is None:
+        missing.append(_without_unit(table.names[k], table.columns[k], stretch))
+        return None, []
+    if chosen == "true stress":
+        return (None if stretch is None else stress / stretch), []
+    return stress, [] if pull is None else _divisor_check(pull, stress, area)
+
+
+def _divisor_check(pull: Array, stress: Array, area: float | None) -> list[Check]:
+    """Return the check of the area that the machine divided the force by [mm^2]."""
+    where = np.abs(stress) > 0.1 * np.nanmax(np.abs(stress))
+    divisor = float(np.nanmedian(pull[where] / stress[where])) / MILLIMETRE**2
+    likely = "the machine's stress equals the force, over an area left at 1; --set stress=force and the specimen's size"
+    if abs(divisor - 1) <= _SAME:
+        return [Check("area of the machine's stress", divisor, (1.5, 2000.0), (1.5, 2000.0), likely, "mm^2")]
+    if area is not None:
+        wanted = area / MILLIMETRE**2
+        likely = "the machine divided by another area than the specimen's; --set stress=force takes the force"
+        usual = wanted * (1 - _SAME), wanted * (1 + _SAME)
+        return [Check("area of the machine's stress", divisor, usual, ANY, likely, "mm^2")]
+    return [Check("area of the machine's stress", divisor, (1.5, 2000.0), ANY, likely, "mm^2")]
+
+
+def _without_unit(name: str, stress: Array, stretch: Array | None) -> str:
+    """Say what a stress without a unit would come to in each."""
+    head = f"column {shown(name)} has no unit"
+    if stretch is None:
+        return f"{head}: --set unit.stress=kPa, or MPa, Pa, psi"
+    reduced = stretch - stretch**-2.0
+    known = np.isfinite(reduced) & np.isfinite(stress)
+    modulus = float(reduced[known] @ stress[known] / (reduced[known] @ reduced[known]))
+    (low, high), told = SHEAR_MODULUS[1], []
+    for unit in _STRESS_UNITS:
+        size = modulus * UNITS[unit].scale / MEGAPASCAL
+        possible = "" if low <= size <= high else ", which no silicone has"
+        told.append(f"in {unit} the shear modulus is {size:.3g} MPa{possible} (--set unit.stress={unit})")
+    return f"{head}: {'; '.join(told)}"

@@ -1,0 +1,120 @@
+"""Excel workbooks (.xlsx) by openpyxl; only values are read, and a zip that would grow too large is refused first."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Iterator
+from datetime import datetime, time
+from typing import Any
+
+import numpy as np
+
+from softnlp.base.csv_columns import MOST_COLUMNS
+from softnlp.base.errors import InputError, listed
+from softnlp.base.reading import one_line, shown
+from softnlp.laboratory.cells import is_number, numbers
+from softnlp.laboratory.choices import Choices
+from softnlp.laboratory.table import RawTable, assembled, header_rows
+
+_LARGEST, _GROWTH = 150_000_000, 300  # bytes of all parts together, and that over the size of the archive
+_MOST_ROWS = 300_000
+
+
+def workbook_tables(label: str, content: bytes, choices: Choices) -> list[RawTable]:
+    """Return the table of the sheet that is asked for, or of the one with the most numbers.
+
+    Raises
+    ------
+    InputError
+        For an archive that is no workbook, one that is too large unpacked, and one without rows of numbers.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            parts = archive.infolist()
+            size = sum(part.file_size for part in parts)
+            names = {part.filename for part in parts}
+            if "xl/workbook.xml" not in names:
+                raise InputError("this is a zip archive and no workbook; unpack it first")
+            if size > _LARGEST or size > max(1_000_000, _GROWTH * len(content)):
+                raise InputError(
+                    f"the workbook would take {size / 1e6:.4g} MB unpacked, from {len(content) / 1e6:.4g} MB"
+                )
+            for part in parts:
+                if part.filename.endswith((".xml", ".rels")):
+                    with archive.open(part) as opened:
+                        if b"<!DOCTYPE" in opened.read(2000).upper():
+                            raise InputError("the workbook declares entities, which none that Excel writes does")
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError) as error:
+        raise InputError(f"not a valid workbook: {one_line(str(error), 80)}") from None
+    sheets = _sheets(content)
+    asked = choices.get("sheet")
+    if asked is not None and asked not in sheets:
+        raise InputError(f"expected {listed(sheets)}, got {shown(asked)}", key="sheet")
+    counts = {name: sum(is_number(c, ".") for row in rows for c in row) for name, rows in sheets.items()}
+    chosen = asked if asked is not None else max(counts, key=lambda name: counts[name])
+    if asked is None and sum(count > 0 for count in counts.values()) > 1:
+        choices.take("sheet", chosen, f"it holds the most numbers of {listed(sheets)}")
+    return [_table(label, sheets[chosen], choices)]
+
+
+def _sheets(content: bytes) -> dict[str, list[list[str]]]:
+    """Return the cells of every sheet as text."""
+    try:
+        from openpyxl import load_workbook
+    except ImportError:
+        raise InputError("a workbook needs openpyxl: pip install 'softnlp[lab]'") from None
+    try:
+        book = load_workbook(io.BytesIO(content), read_only=True, data_only=True, keep_links=False)
+        return {sheet.title: list(_rows(sheet)) for sheet in book.worksheets}
+    except InputError:
+        raise
+    except Exception as error:  # openpyxl raises what its XML parser does, and KeyError, ValueError or TypeError
+        raise InputError(f"not a valid workbook: {one_line(f'{type(error).__name__}: {error}', 80)}") from None
+
+
+def _rows(sheet: Any) -> Iterator[list[str]]:
+    # A sheet may claim a million columns; what it says of its size is not believed.
+    sheet.reset_dimensions()
+    for count, row in enumerate(sheet.iter_rows(values_only=True)):
+        if count >= _MOST_ROWS:
+            raise InputError(f"sheet {shown(sheet.title)}: expected at most {_MOST_ROWS} rows; write it as .csv")
+        if len(row) > MOST_COLUMNS:
+            raise InputError(f"sheet {shown(sheet.title)}: expected at most {MOST_COLUMNS} columns, got {len(row)}")
+        yield [_cell(value) for value in row]
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return str(int(value))
+    if isinstance(value, datetime | time):
+        return value.isoformat()
+    return repr(float(value)) if isinstance(value, int | float) else one_line(str(value), 200)
+
+
+def _table(label: str, rows: list[list[str]], choices: Choices) -> RawTable:
+    """Return the table of a sheet: its largest run of rows of numbers, and what stands above."""
+    best: tuple[int, int] = (0, 0)
+    first = 0
+    for k, row in enumerate([*rows, ["end"]]):
+        filled = [c for c in row if c]
+        if filled and 2 * sum(is_number(c, ".") for c in filled) >= len(filled):
+            continue
+        if k - first > best[1] - best[0]:
+            best = first, k
+        first = k + 1
+    if best[1] == best[0]:
+        raise InputError("expected rows of numbers, got none")
+    block = rows[best[0] : best[1]]
+    width = max(max((k + 1 for k, c in enumerate(row) if c), default=0) for row in block)
+    before = rows[: best[0]]
+    header = header_rows(before, width, block)
+    columns: list[list[Any]] = []
+    for k in range(width):
+        cells = [row[k] if k < len(row) else "" for row in block]
+        filled = [c for c in cells if c]
+        numeric = 2 * sum(is_number(c, ".") for c in filled) > len(filled)
+        columns.append([numbers(cells, ".")[0] if numeric else cells])
+    return assembled(label, header, before, [*columns, [np.zeros(len(block))]], choices, ".")
