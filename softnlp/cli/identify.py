@@ -94,6 +94,8 @@ def _say_tensile(task: TensileTask, fit: TensileFit) -> None:
     say_rows(["law", "status", "R^2", "rmse_kPa", "mape_percent", "constants"], rows)
     if fit.best is not None:
         say(f"best: {fit.best.law.name}")
+    for note in task.notes:
+        say(f"note: {note}")
     for warning in fit.warnings:
         say(f"warning: {warning}")
 
@@ -124,7 +126,9 @@ def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
         write_results(to, asked, texts, figures if solved else {})
 
     show(folder, json, write, lambda: document, lambda: _say_robots(asked, found))
-    return SOLVED if solved else SOME_UNSOLVED
+    for problem in found.problems:
+        complain(f"{asked.path.name}: [measurements] {problem}")
+    return SOLVED if solved and not found.problems else SOME_UNSOLVED
 
 
 def _identified(asked: Scenario) -> Identified:
@@ -144,7 +148,9 @@ def _identified(asked: Scenario) -> Identified:
 def _say_robots(asked: Scenario, found: Identified) -> None:
     """Print constants and misfits."""
     from softnlp.base.columns import OUTPUTS
+    from softnlp.results.identify_document import registration_lines
     from softnlp.studies.identified import file_name
+    from softnlp.studies.plausibility import messages
 
     say(f"{asked.title}: {', '.join(d.label for d in found.data)}; {asked.material.name} ({asked.material.law.name})")
     for line in gravity_lines(asked.loads.gravity):
@@ -173,7 +179,9 @@ def _say_robots(asked: Scenario, found: Identified) -> None:
             for key in after
         ],
     )
-    for warning in found.warnings:
+    for line in registration_lines(found.registration):
+        say(line)
+    for warning in (*found.warnings, *messages(found.checks, "warned")):
         say(f"warning: {warning}")
 
 

@@ -17,6 +17,10 @@ class AskError(InputError):
     """A file can be read in more than one way, or lacks a number; the text shows the readings and what settles them."""
 
 
+class NamedError(InputError):
+    """A file is of a kind that is no table of measurements, which the text names."""
+
+
 @dataclass(frozen=True)
 class Guess:
     """A setting that nobody gave. key, value : as `--set` takes them. reason : why it is likely."""

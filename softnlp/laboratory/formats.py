@@ -7,7 +7,7 @@ from pathlib import Path
 
 from softnlp.base.errors import InputError, located
 from softnlp.base.reading import LONGEST_NAME, one_line, read_bytes
-from softnlp.laboratory.choices import Choices
+from softnlp.laboratory.choices import Choices, NamedError
 from softnlp.laboratory.table import RawTable
 from softnlp.laboratory.text import text_table
 
@@ -50,12 +50,12 @@ def _tables(label: str, content: bytes, choices: Choices) -> list[RawTable]:
     if head.startswith(b"version https://git-lfs"):
         size = re.search(rb"size (\d+)", head)
         bytes_of = f" of {int(size[1])} bytes" if size else ""
-        raise InputError(f"a Git LFS pointer to a file{bytes_of}, not the file; git lfs pull fetches it")
+        raise NamedError(f"a Git LFS pointer to a file{bytes_of}, not the file; git lfs pull fetches it")
     for mark, what in _KNOWN:
         if head.startswith(mark):
-            raise InputError(f"this is {what}")
+            raise NamedError(f"this is {what}")
     if head[:1] == b"\x80" and head[1:2] in b"\x02\x03\x04\x05":
-        raise InputError("this is a Python pickle, which could run code; it is never read, write it as .csv")
+        raise NamedError("this is a Python pickle, which could run code; it is never read, write it as .csv")
     if head.startswith(b"PK\x03\x04"):
         from softnlp.laboratory.workbook import workbook_tables
 

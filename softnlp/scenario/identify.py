@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from softnlp.base.columns import OUTPUTS
-from softnlp.base.csv_columns import Columns, read_columns
+from softnlp.base.csv_columns import Columns
 from softnlp.base.errors import InputError, located, of_table
 from softnlp.base.ranges import noise_note
 from softnlp.model.contact_settings import ContactSettings
@@ -20,11 +20,24 @@ from softnlp.model.materials import Material
 from softnlp.model.robot import Robot
 from softnlp.scenario.blocked_force import SEVERAL
 from softnlp.scenario.data import Read, Scenario
-from softnlp.scenario.measured_rows import RobotRows, rows_by_robot
-from softnlp.scenario.schema import ContactTable, MaterialTable, Positive, RobotTable, ScenarioFile, optional_keys
+from softnlp.scenario.laboratory import import_notes, laboratory_columns
+from softnlp.scenario.measured_rows import SCALARS, TIP_COLUMNS, RobotRows, rows_by_robot
+from softnlp.scenario.registration import import_settings, registration_of
+from softnlp.scenario.schema import (
+    ContactTable,
+    MaterialTable,
+    Positive,
+    RegistrationTable,
+    RobotTable,
+    ScenarioFile,
+    optional_keys,
+)
 from softnlp.scenario.tensile import DataTable, TensileTable, run_tensile, tensile_task
 from softnlp.studies.identified import free_constants
 from softnlp.studies.measurements import OBSERVABLES, Measurements, RobotTask, TensileTask, checked_measurements
+from softnlp.studies.registration import Registration
+
+_OWN = ("p1_bar", *TIP_COLUMNS, *(output.measured for output in SCALARS.values()))
 
 if TYPE_CHECKING:  # imported where needed: to read a scenario takes none of them
     from softnlp.studies.identified import Identified
@@ -33,7 +46,7 @@ if TYPE_CHECKING:  # imported where needed: to read a scenario takes none of the
 Array = NDArray[np.float64]
 Progress = Callable[[int, float], None]
 
-UNUSED_BY_TENSILE = ("robots", "sigma", "contact", "gravity", "tip_load", "stiffening", "corrections")
+UNUSED_BY_TENSILE = ("robots", "sigma", "contact", "gravity", "tip_load", "stiffening", "corrections", "registration")
 
 
 class MeasurementsTable(DataTable):
@@ -66,6 +79,7 @@ class IdentifyFile(ScenarioFile):
     measurements: MeasurementsTable | None = None
     sigma: SigmaTable = SigmaTable()
     contact: ContactTable = ContactTable()
+    registration: RegistrationTable = RegistrationTable()
 
 
 def identify_task(given: Read) -> TensileTask | RobotTask:
@@ -100,7 +114,15 @@ def identify_task(given: Read) -> TensileTask | RobotTask:
 
 
 def _robots(given: Read, table: MeasurementsTable) -> RobotTask:
-    tables = [read_columns(given.folder, file) for file in table.named()]
+    registration = given.file.registration
+    settings, by_base = getattr(table, "import"), import_settings(registration)
+    if by_base is not None:
+        settings = {**by_base, **(settings or {})}
+    files = table.named()
+    groups = [files] if settings is not None else [(file,) for file in files]
+    every = [laboratory_columns(given.folder, group, "tips", _OWN, settings) for group in groups]
+    tables = [columns for columns, _ in every]
+    told = tuple(note for _, imported in every if imported is not None for note in import_notes(imported))
     own = {}
     for name, described in given.file.robots.items():
         with located(table=f"robots.{name}"):
@@ -118,19 +140,24 @@ def _robots(given: Read, table: MeasurementsTable) -> RobotTask:
     made, cells, readings = [], [], []
     for rows in rows_by_robot(tables, own, unnamed):
         readings.append(rows.readings().ravel())
-        made.append(_measurements(rows, given.file.sigma))
+        placed = registration_of(registration, rows.robot.chamber_sets)
+        made.append(_measurements(rows, given.file.sigma, placed))
         cells.append(tuple(tuple(_cell(c, k, column) for column in header) for c, k in rows.places))
     free, bounds = _free(table, given.material)
-    return RobotTask(tuple(made), free, bounds, header, tuple(cells), noise_note(np.concatenate(readings)))
+    notes = (*told, *noise_note(np.concatenate(readings)))
+    sets = made[0].robot.chamber_sets
+    return RobotTask(tuple(made), free, bounds, header, tuple(cells), notes, registration_of(registration, sets))
 
 
 def _cell(columns: Columns, row: int, name: str) -> str:
     return columns.rows[row][columns.header.index(name)].strip() if name in columns else ""
 
 
-def _measurements(rows: RobotRows, sigmas: SigmaTable) -> Measurements:
+def _measurements(rows: RobotRows, sigmas: SigmaTable, registration: Registration | None) -> Measurements:
     """Return the measurements of one robot."""
     pressure, seen = rows.pressure(), rows.scalars()
+    if registration is not None:
+        pressure = registration.ordered(pressure)
     sigma: dict[str, Array] = {}
     for key in OBSERVABLES:
         name, unit = OUTPUTS[key].key, OUTPUTS[key].scale
@@ -198,6 +225,7 @@ def run_robots(scenario: Scenario, progress: Progress | None = None) -> Identifi
             bounds=task.bounds,
             contact=scenario.contact or ContactSettings(),
             progress=progress,
+            registration=task.registration,
             **scenario.settings,
         )
     return replace(found, warnings=(*task.notes, *found.warnings))

@@ -16,7 +16,8 @@ from softnlp.base.errors import InputError, located
 from softnlp.base.ranges import READING, TIME, noise_note, without_noise
 from softnlp.base.reading import LONGEST_NAME, did_you_mean, one_line, read_text, shown
 from softnlp.base.units import BAR
-from softnlp.scenario.schema import PressureTable, RampTable
+from softnlp.scenario.laboratory import import_notes, or_imported
+from softnlp.scenario.schema import PRESSURE_SOURCES, PressureTable, RampTable
 
 Array = NDArray[np.float64]
 
@@ -43,19 +44,31 @@ def pressure_path(table: PressureTable, sets: int, folder: Path) -> PressurePath
     InputError
         With the key (no table, no source), when not exactly one source is given or it does not fit the robot.
     """
-    given = table.written(PressureTable.model_fields)
+    given = table.written(PRESSURE_SOURCES)
     if len(given) != 1:
         raise InputError(
-            f"expected exactly one of {', '.join(PressureTable.model_fields)}, got {' and '.join(given) or 'none'}",
+            f"expected exactly one of {', '.join(PRESSURE_SOURCES)}, got {' and '.join(given) or 'none'}",
             key=given[1] if given else None,
         )
     if table.sequence_bar is not None:
         return _path(_sequence(table.sequence_bar, sets))
     if table.ramp is not None:
         return PressurePath(_ramp(table.ramp, sets), None)
-    assert table.file is not None
-    with located(source=one_line(table.file, LONGEST_NAME)):
-        return _csv(read_text(folder / table.file), sets)
+    file = table.file
+    assert file is not None
+
+    def own() -> PressurePath:
+        with located(source=one_line(file, LONGEST_NAME)):
+            return _csv(read_text(folder / file), sets)
+
+    settings = getattr(table, "import")
+    found = or_imported(own, folder, file, "pressure", [f"p{k}_bar" for k in range(1, sets + 1)], settings)
+    if isinstance(found, PressurePath):
+        return found
+    columns, imported = found
+    with located(source=columns.file):
+        path = _csv(imported.csv(), sets)
+    return path._replace(notes=(*import_notes(imported), *path.notes))
 
 
 def _path(readings: Array, times: Array | None = None) -> PressurePath:

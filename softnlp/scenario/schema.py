@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
-from math import hypot
+from math import hypot, isfinite
 from typing import Annotated, Any, Literal
 from unicodedata import category
 
@@ -72,6 +72,24 @@ def _intervals(value: Any) -> int | None:
     if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MOST_INTERVALS:
         raise wrong(f"expected 'auto' or a whole number from 1 to {MOST_INTERVALS}, got {shown(value)}")
     return value
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+
+
+def _number_or_fit(value: Any) -> float | None:
+    """Return a number, None for "fit"."""
+    if value != "fit" and not _is_number(value):
+        raise wrong(f"expected a number or 'fit', got {shown(value)}")
+    return None if value == "fit" else float(value)
+
+
+def _vector_or_fit(value: Any) -> list[float] | None:
+    """Return three numbers, None for "fit"."""
+    if value != "fit" and not (isinstance(value, list) and len(value) == 3 and all(map(_is_number, value))):
+        raise wrong(f"expected a list of 3 numbers or 'fit', got {shown(value)}")
+    return None if value == "fit" else [float(v) for v in value]
 
 
 def _file_name(value: str) -> str:
@@ -222,8 +240,12 @@ class RampTable(Table):
     from_bar: NotNegative = 0.0
 
 
-class PressureTable(Table):
-    """[pressure]: exactly one of its keys."""
+PRESSURE_SOURCES = ("sequence_bar", "ramp", "file")
+ImportSettings = dict[str, Any]
+
+
+class PressureTable(optional_keys({"import": ImportSettings})):  # type: ignore[misc]
+    """[pressure]: exactly one of `PRESSURE_SOURCES`; with file the settings of its import."""
 
     sequence_bar: Annotated[list[list[float]], Field(min_length=1)] | None = None
     ramp: RampTable | None = None
@@ -296,9 +318,22 @@ class ScenarioFile(Table):
     solver: SolverTable = SolverTable()
 
 
+class RegistrationTable(Table):
+    """[registration] of measured tips: their frame, the sensor's place on the tip, and how the sets are turned."""
+
+    frame: Literal["given", "base sensor", "fit"] = "given"
+    tip_offset_mm: Annotated[list[float] | None, PlainValidator(_vector_or_fit)] = [0.0, 0.0, 0.0]
+    clock_deg: Annotated[float | None, PlainValidator(_number_or_fit)] = 0.0
+    set_order: Annotated[list[int], Field(min_length=1)] | None = None
+    rotation_world_from_base_quat_xyzw: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
+    translation_mm: Vector | None = None
+    base_sensor_mm: Vector | None = None
+
+
 class ForwardFile(ScenarioFile):
     """A whole scenario of `forward`."""
 
+    registration: RegistrationTable = RegistrationTable()
     pressure: PressureTable = Field(description="a table with one of sequence_bar, ramp, file")
 
 

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, PlainValidator
 
-from softnlp.base.csv_columns import Columns, read_columns
+from softnlp.base.csv_columns import Columns
 from softnlp.base.errors import InputError, listed, located, nearest
-from softnlp.base.reading import shown
+from softnlp.base.reading import choices, shown
 from softnlp.base.statistics import NOTHING
 from softnlp.base.units import KILOPASCAL, MEGAPASCAL, MILLIMETRE
 from softnlp.model.laws import LAWS, Law
 from softnlp.model.materials import Material
 from softnlp.scenario.data import Read, Scenario
-from softnlp.scenario.schema import FileName, Label, Positive, Table
+from softnlp.scenario.laboratory import import_notes, laboratory_columns
+from softnlp.scenario.schema import FileName, ImportSettings, Label, Positive, optional_keys, wrong
 from softnlp.studies.measurements import TensileTask
 from softnlp.studies.plausibility import Check, area_check
 
@@ -33,10 +34,20 @@ _SIZES: Mapping[str, tuple[float, float]] = {
     "gauge_length_mm": (0.5, 2000.0),
     **{"width_mm": (0.1, 500.0), "thickness_mm": (0.02, 500.0), "diameter_mm": (0.1, 500.0)},
 }
+_OWN = (*_STRETCHES, *_STRESSES, "displacement_mm", "force_N")
+_OF_IMPORT = (*_SIZES, "area_mm2", "cycle", "stretch")
+CYCLES = ("first loading", "unloading", "all")
 _ROUNDED = 1e-9  # of a stretch; a point on an end of the range stays
 
 
-class DataTable(Table):
+def _cycle(value: Any) -> int | str:
+    """Return a loading by its number, or one of the words of an import."""
+    if value in CYCLES or (isinstance(value, int) and not isinstance(value, bool) and value > 0):
+        return int(value) if isinstance(value, int) else str(value)
+    raise wrong(f"expected {choices(CYCLES)} or a number from 1 on, got {shown(value)}")
+
+
+class DataTable(optional_keys({"import": ImportSettings})):  # type: ignore[misc]
     """What every table with data may hold: one file or several."""
 
     file: FileName | None = None
@@ -59,6 +70,8 @@ class TensileTable(DataTable):
     width_mm: Positive | None = None
     thickness_mm: Positive | None = None
     diameter_mm: Positive | None = None
+    area_mm2: Positive | None = None
+    cycle: Annotated[int | str | None, PlainValidator(_cycle)] = None
     stretch: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None
     density_kg_m3: Positive | None = None
 
@@ -66,7 +79,13 @@ class TensileTable(DataTable):
 def tensile_task(given: Read, table: TensileTable) -> TensileTask:
     """Return the laws and the points that they are fitted to."""
     files = table.named()
-    parts = [_curve(read_columns(given.folder, file), table) for file in files]
+    settings = getattr(table, "import")
+    if settings is None and table.cycle is not None:
+        settings = {}
+    asked = {key: getattr(table, key) for key in _OF_IMPORT if getattr(table, key) is not None}
+    every = [laboratory_columns(given.folder, [file], "tensile", _OWN, settings, asked) for file in files]
+    parts = [_curve(columns, table, imported is not None) for columns, imported in every]
+    imports = tuple(imported for _, imported in every if imported is not None)
     before = given.material if "material" in given.data else None
     laws = _laws(table, before)
     stretch, stress = (np.concatenate(column) for column in zip(*(part[:2] for part in parts), strict=True))
@@ -84,6 +103,7 @@ def tensile_task(given: Read, table: TensileTable) -> TensileTask:
         stretch_range=None if table.stretch is None else (table.stretch[0], table.stretch[1]),
         dropped=int(np.sum(~kept)),
         checks=tuple(dict.fromkeys(check for part in parts for check in part[2])),
+        notes=tuple(note for imported in imports for note in import_notes(imported)),
     )
 
 
@@ -119,7 +139,7 @@ def _laws(table: TensileTable, before: Material | None) -> tuple[Law, ...]:
     return tuple(known[name] for name in dict.fromkeys(table.laws or known))
 
 
-def _curve(columns: Columns, table: TensileTable) -> tuple[Array, Array, tuple[Check, ...]]:
+def _curve(columns: Columns, table: TensileTable, imported: bool) -> tuple[Array, Array, tuple[Check, ...]]:
     """Return stretch and engineering stress [Pa] of one file, with the checks of its specimen."""
     checks: tuple[Check, ...] = ()
     named = "stretch" in columns or "stress_MPa" in columns
@@ -143,7 +163,7 @@ def _curve(columns: Columns, table: TensileTable) -> tuple[Array, Array, tuple[C
     for row in np.flatnonzero(~(stretch > 0))[:1]:
         strain = "; strain goes in a column strain or strain_percent" if name == "stretch" else ""
         raise columns.wrong(int(row), name, f"expected a stretch above 0, got {stretch[row]:g}{strain}")
-    return stretch, stress / stretch if table.stress == "true" else stress, checks
+    return stretch, stress / stretch if table.stress == "true" and not imported else stress, checks
 
 
 def _first(columns: Columns, known: Mapping[str, object]) -> str:
@@ -157,6 +177,9 @@ def _first(columns: Columns, known: Mapping[str, object]) -> str:
 
 def _area(table: TensileTable) -> float:
     """Return the specimen's cross-section before the test [mm^2]."""
+    if table.area_mm2 is not None:
+        table.refuse(("diameter_mm", "width_mm", "thickness_mm"), "not used beside area_mm2; remove it")
+        return table.area_mm2
     if (table.diameter_mm is None) == (table.width_mm is None and table.thickness_mm is None):
         raise InputError("expected either diameter_mm, or width_mm and thickness_mm", key="diameter_mm")
     if table.diameter_mm is not None:

@@ -26,7 +26,7 @@ from softnlp.model.robot import Robot
 from softnlp.scenario.blocked_force import SEVERAL, contact_settings
 from softnlp.scenario.data import Read, Scenario, scenario_of
 from softnlp.scenario.pressures import require_sets
-from softnlp.scenario.schema import ContactTable, NotNegative, PressureTable, ScenarioFile, Table
+from softnlp.scenario.schema import ContactTable, NotNegative, PressureTable, RegistrationTable, ScenarioFile, Table
 from softnlp.sweep.manufacture import check_many
 from softnlp.sweep.task import Axis, WorkspaceTask, combinations, pressure_table, varied_quantities, varied_table
 
@@ -62,6 +62,7 @@ class WorkspaceFile(ScenarioFile):
     workspace: WorkspaceTable = WorkspaceTable()
     pressure: PressureTable | None = None
     contact: ContactTable | None = None
+    registration: RegistrationTable = RegistrationTable()
 
 
 def workspace_task(given: Read) -> WorkspaceTask:

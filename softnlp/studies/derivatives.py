@@ -130,6 +130,11 @@ class LinearPoint:
             return spin(self._slopes["tip_rotation"], _rotation(self._here))
         return self._slopes[output]
 
+    @property
+    def rotation(self) -> tuple[Array, Array]:
+        """The tip's rotation matrix by columns (9,), and d / d theta (9, k)."""
+        return self._here["tip_rotation"], self._slopes["tip_rotation"]
+
     def solved_at(self, theta: Array) -> Solution:
         """Solve again with other values of the quantities, from the first-order prediction."""
         p = self.solution.p.copy()

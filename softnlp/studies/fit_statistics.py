@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 CLOSE = 0.99  # two constants whose estimates are correlated more than this are hardly told apart
 POORLY_CONDITIONED = 1e4  # of the Jacobian with columns of length one
 _LEAST_UNUSED = 0.1
+_FEWEST, _MOST_ALIKE = 8, 0.98  # residuals that tell a correlation; the largest that is told
 SINGULAR = 1e10  # beyond it a combination of constants is open altogether
 
 
@@ -64,14 +65,32 @@ def open_constants(names: Sequence[str], values: Array, errors: Array, at_bound:
     return notes
 
 
-def uncertainty(names: Sequence[str], J: Array, residuals: Array, held: Sequence[bool] | None = None) -> Uncertainty:
+def repeats(*columns: Array) -> NDArray[np.intp]:
+    """Return a number for each row of some columns (m,) or (m, k), the same for equal rows; nan equals nan."""
+    table = np.nan_to_num(np.column_stack(columns), nan=-1.7e308)
+    return np.asarray(np.unique(table, axis=0, return_inverse=True)[1]).ravel()
+
+
+def uncertainty(
+    names: Sequence[str],
+    J: Array,
+    residuals: Array,
+    held: Sequence[bool] | None = None,
+    groups: NDArray[np.intp] | None = None,
+    serial: bool = False,
+) -> Uncertainty:
     """Return the uncertainty of constants at a least-squares solution.
 
     J : (m, n) derivative of the weighted residuals (m,) by the constants. held : constants that are not estimated, such
     as those at a bound. The covariance is s^2 (J^T J)^-1, which takes the weighted errors as independent and of one
     size; a standard error is that of the HC3 estimate (MacKinnon and White 1985) where this is larger, so that it holds
-    also where errors grow with the value.
+    also where errors grow with the value. groups : (m,) numbers of `repeats`; a value that is there again tells nothing
+    more. serial : whether neighbours may err alike, as of one curve; errors then grow by the correlation of neighbours
+    (as of an autoregressive process of first order, Bartlett 1946).
     """
+    if groups is not None:
+        J, residuals = (_once(groups, values) for values in (J, residuals))
+    alike = _serial_correlation(residuals) if serial else 0.0
     m, n = J.shape
     free = np.flatnonzero(~np.asarray(held, bool)) if held is not None else np.arange(n)
     errors, correlation = np.full(n, np.nan), np.full((n, n), np.nan)
@@ -96,10 +115,27 @@ def uncertainty(names: Sequence[str], J: Array, residuals: Array, held: Sequence
         spread = np.sqrt(float(residuals @ residuals) / (m - free.size))
         unused = np.maximum(1 - np.sum(U**2, axis=1), _LEAST_UNUSED)  # of a value, by the fit: 1 - leverage
         each = np.sqrt(np.sum(((Vt.T / s) @ (U.T * residuals / unused)) ** 2, axis=1))
-        errors[free] = np.maximum(spread * sizes, each) / lengths
+        errors[free] = np.maximum(spread * sizes, each) / lengths * np.sqrt((1 + alike) / (1 - alike))
     else:
         warnings.append(f"{m} values determine {free.size} constants without any to spare: no standard errors")
     return Uncertainty(errors, correlation, condition, tuple(warnings))
+
+
+def _once(groups: NDArray[np.intp], values: Array) -> Array:
+    """Return each value that is there n times once, times sqrt(n), in the order in which they come first."""
+    _, first, times = np.unique(groups, return_index=True, return_counts=True)
+    order = np.argsort(first)
+    scale = np.sqrt(times[order])
+    return np.asarray(values[first[order]] * (scale if values.ndim == 1 else scale[:, None]))
+
+
+def _serial_correlation(residuals: Array) -> float:
+    """Return the correlation of neighbouring residuals, 0 where it is within what chance makes of independent ones."""
+    size = float(residuals @ residuals)
+    if len(residuals) < _FEWEST or not size > 0:
+        return 0.0
+    found = float(residuals[1:] @ residuals[:-1]) / size
+    return min(found, _MOST_ALIKE) if found > 2 / np.sqrt(len(residuals)) else 0.0
 
 
 def _weak_directions(Vt: Array, s: Array) -> Array:

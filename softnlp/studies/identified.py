@@ -12,11 +12,15 @@ from numpy.typing import NDArray
 from softnlp.base.errors import InputError, nearest
 from softnlp.base.statistics import Statistics, statistics
 from softnlp.base.status import Status
+from softnlp.base.units import MEGAPASCAL
 from softnlp.model.conventions import Coefficients
 from softnlp.model.materials import Material
 from softnlp.nlp.solver import Ipopt
 from softnlp.studies.fit_statistics import Uncertainty, constant_note, determined
 from softnlp.studies.measurements import OBSERVABLES, Data, column_slice
+from softnlp.studies.plausibility import SHEAR_MODULUS, Check, messages
+from softnlp.studies.registration import NAMES as REGISTRATION_NAMES
+from softnlp.studies.registration import Registration, unit_of
 
 Array = NDArray[np.float64]
 
@@ -120,7 +124,9 @@ def free_constants(
 
 
 def file_name(name: str, material: Material) -> tuple[str, float]:
-    """Return the key that files have for a constant, and its unit there in SI."""
+    """Return the key that files have for a constant, or for a number of a registration, and its unit there in SI."""
+    if name in REGISTRATION_NAMES:
+        return unit_of(name)
     plain = name.removeprefix("material.")
     for c in material.law.constants:
         if c.name == plain and name not in COEFFICIENTS:
@@ -165,6 +171,10 @@ class Identified:
         Which engine found them, of `Numerics`; None without a solution.
     ipopt
         What IPOPT said of them, where it took part.
+    registration
+        With the numbers found, None where the tips are those of the model.
+    checks
+        Of the constants, and of the tips that were measured.
     """
 
     status: Status
@@ -182,12 +192,19 @@ class Identified:
     warnings: tuple[str, ...]
     engine: str | None = None
     ipopt: Ipopt | None = None
+    registration: Registration | None = None
+    checks: tuple[Check, ...] = ()
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """What cannot be true of the constants found."""
+        return messages(self.checks, "failed")
 
     @property
     def determined(self) -> dict[str, bool | None]:
         """By name: whether a constant's standard error is within its value, None where it has none."""
-        pairs = zip(self.constants, self.uncertainty.standard_errors, strict=True)
-        return dict(zip(self.free.names, (determined(*pair) for pair in pairs), strict=True))
+        triples = zip(self.free.names, self.constants, self.uncertainty.standard_errors, strict=True)
+        return {n: determined(np.inf if n in REGISTRATION_NAMES else c, error) for n, c, error in triples}
 
     @property
     def notes(self) -> dict[str, str]:
@@ -247,6 +264,20 @@ def without_constants(found: Identified, status: Status, message: str) -> Identi
         after=tuple(np.full_like(values, np.nan) for values in found.before),
         warnings=(),
     )
+
+
+def constant_checks(found: Identified) -> tuple[Check, ...]:
+    """Return the checks of the constants: how many ended at a bound, and the stiffness of a fitted material."""
+    names = ", ".join(file_name(name, found.material)[0] for name in found.at_bound)
+    likely = (
+        f"{names}: the model leaves its range to follow these data; check their frame, units and sets, or the bounds"
+    )
+    checks = [Check("number of constants at a bound", len(found.at_bound), (0, 0), (0, 0), likely)]
+    if any(name.startswith("material.") for name in found.free.quantities):
+        size = float(found.material.shear_modulus(1.0)) / MEGAPASCAL
+        likely = "no silicone is so soft or so stiff: check the unit of the pressures and of what was measured"
+        checks.append(Check("shear modulus of the constants found", size, *SHEAR_MODULUS, likely, "MPa"))
+    return tuple(checks)
 
 
 def grown_errors(found: Identified) -> list[str]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ from softnlp.studies.forward import checked_loads
 from softnlp.studies.identified import (
     FreeConstants,
     Identified,
+    constant_checks,
     constants_text,
     file_name,
     free_constants,
@@ -45,8 +47,14 @@ from softnlp.studies.measurements import (
     Data,
     Measurements,
     checked_measurements,
+    repeated_numbers,
 )
+from softnlp.studies.plausibility import Check
 from softnlp.studies.predicted import Predicted, Prediction
+from softnlp.studies.registered import Registered, begun, with_registration
+from softnlp.studies.registration import NAMES as REGISTRATION_NAMES
+from softnlp.studies.registration import Registration
+from softnlp.studies.tip_checks import tip_checks
 
 Array = NDArray[np.float64]
 
@@ -71,6 +79,7 @@ def identify(
     conventions: Conventions = REPRODUCTION,
     numerics: Numerics = Numerics(),
     progress: Callable[[int, float], None] | None = None,
+    registration: Registration | None = None,
 ) -> Identified:
     """Find the constants that bring the model nearest to the measurements.
 
@@ -90,6 +99,8 @@ def identify(
         As `softnlp.blocked_force`; the same in every measurement.
     progress
         Called with the number of evaluations and the root mean square of the residuals.
+    registration
+        Where the sensor of the tips is and in which frame; what it fits is found together with the constants.
 
     Returns
     -------
@@ -106,10 +117,12 @@ def identify(
     if not given:
         raise InputError("expected measurements of at least one robot", key="measurements")
     data = tuple(checked_measurements(m) for m in given)
-    chosen = free_constants(free, material, coefficients, bounds)
+    chosen = constants = free_constants(free, material, coefficients, bounds)
     count = sum(int(np.sum(d.fitted)) for d in data)
-    if count < len(free):
-        raise InputError(f"{count} numbers measured cannot determine {len(free)} constants", key="free")
+    registration = registration if registration is not None and registration.acts else None
+    total = len(free) + (0 if registration is None else len(registration.names))
+    if count < total:
+        raise InputError(f"{count} numbers measured cannot determine {total} constants", key="free")
     loads = checked_loads(loads)
     contact = checked_contact(contact, [d.robot for d in data if np.any(d.measured[:, -1])])
     if contact.closure == "weighted" and any(np.any(d.measured[:, -1]) for d in data):
@@ -121,14 +134,28 @@ def identify(
         model = Model(d.robot, material, coefficients, conventions)
         poses = pose_solver(model, searching, unloaded_accuracy=searching.accuracy)
         blocked = blocked_solver(model, searching, contact) if np.any(d.measured[:, -1]) else None
-        models.append(Predicted(d, poses, blocked, chosen, loads))
-    found = _Fit(data, models, chosen, material, coefficients, progress).solve()
+        models.append(Predicted(d, poses, blocked, constants, loads))
+    registered: Sequence[Predicted | Registered] = models
+    if registration is not None:
+        tips = [model.evaluate(constants.values(constants.start), True).values[:, :3] for model in models]
+        registration = begun(registration, data, tips)
+        chosen = with_registration(constants, registration)
+        registered = [Registered(model, registration) for model in models]
+    found = _Fit(data, registered, chosen, material, coefficients, progress).solve()
+    if found.status is Status.SOLVED:
+        placed = None if registration is None else registration.found(found.constants[len(constants.names) :])
+        framed = registration is None or "frame" not in registration.fit
+        checks: list[Check] = []
+        for d, after, predicted, m in zip(data, found.after, models, given, strict=True):
+            tips_at = None if loads.act else partial(predicted.tips, constants.values(constants.start))
+            checks += tip_checks(d, after[:, :3], placed, tips_at, framed, "tip_position" in m.sigma)
+        found = replace(found, registration=placed, checks=(*constant_checks(found), *checks))
     if found.status is not Status.SOLVED:
         return found
     if numerics.engine == "newton":
         return replace(found, engine=numerics.engine)
     try:
-        return closed_fit(found, contact, loads, conventions, numerics)
+        return closed_fit(found, contact, loads, conventions, numerics, registration)
     except DisputedError as error:
         lost = without_constants(found, Status.DISPUTED, str(error))
         return replace(lost, material=material, coefficients=coefficients)
@@ -140,7 +167,7 @@ class _Fit:
     def __init__(
         self,
         data: tuple[Data, ...],
-        models: Sequence[Predicted],
+        models: Sequence[Predicted | Registered],
         free: FreeConstants,
         material: Material,
         coefficients: Coefficients,
@@ -278,11 +305,17 @@ class _Fit:
         low, high = x - self.free.lower < near, self.free.upper - x < near
         held = [bool(h) for h in low | high]
         J, r = self.jacobian(last), self.residuals(last)
-        known = uncertainty(self.free.names, J, r, held)
+        known = uncertainty(self.free.names, J, r, held, repeated_numbers(self.data))
         units = np.array([unit for _, unit in self.keys])
+        own = sum(name not in REGISTRATION_NAMES for name in self.free.names)  # a place of 0 is as good as any
         warnings = [
             *known.warnings,
-            *open_constants([key for key, _ in self.keys], x / units, known.standard_errors / units, held),
+            *open_constants(
+                [key for key, _ in self.keys][:own],
+                (x / units)[:own],
+                (known.standard_errors / units)[:own],
+                held[:own],
+            ),
             *self._stretched(last),
             *self._impossible(x, last),
         ]

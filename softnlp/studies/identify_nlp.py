@@ -6,8 +6,9 @@ constants together. It closes what that search proposes: nothing but the rod is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import casadi as ca
 import numpy as np
@@ -34,6 +35,7 @@ from softnlp.statics.wall import standing_wall
 from softnlp.studies.identified import FreeConstants, Identified, constants_text, file_name
 from softnlp.studies.measurements import COLUMNS, POSE_COLUMNS, RELATIVE_NOISE, Data
 from softnlp.studies.predicted import STRAIGHT
+from softnlp.studies.registration import Registration
 
 Array = NDArray[np.float64]
 
@@ -49,10 +51,16 @@ _MISFITS = "misfits"  # residuals times the noise that is assumed, so that they 
 class AtOnce:
     """Load cases, values and first guesses, gathered measurement by measurement."""
 
-    def __init__(self, free: FreeConstants, numerics: Numerics) -> None:
+    def __init__(self, free: FreeConstants, numerics: Numerics, registration: Registration | None = None) -> None:
         self.free = free
         self.numerics = numerics.without_ipopt()
         self.declared: dict[str, Quantity] = {}
+        self.sensor: Callable[[LoadCase], list[ca.MX]] | None = None
+        if registration is not None:
+            self.declared = {q.name: q for q in registration.quantities()}
+            self.sensor = partial(
+                _sensor, registration.function(), ca.vertcat(*(q.symbol for q in self.declared.values()))
+            )
         self.cases: list[LoadCase] = []
         self.values: dict[str, Array] = {}
         self.guesses: list[Array] = []
@@ -100,6 +108,8 @@ class AtOnce:
             assert step.pose is not None
             columns = [k for k in range(len(POSE_COLUMNS)) if k != _ANGLE or step.pose.bending_angle >= STRAIGHT]
             observed = _pose_observables(free)
+            if self.sensor is not None:
+                observed[:3] = self.sensor(free)
             self._add_squares([observed[k] for k in columns], data, row, columns)
             if not mask[-1]:
                 continue
@@ -167,8 +177,19 @@ def _pose_observables(case: LoadCase) -> list[ca.MX]:
     return [tip[0], tip[1], tip[2], out["bending_angle"], out["backbone_length"] - case.length_unit]
 
 
+def _sensor(function: ca.Function, g: ca.MX, case: LoadCase) -> list[ca.MX]:
+    """Return the position of the sensor of a load case; g : numbers of the registration."""
+    place = function(case.outputs["tip_position"], ca.vec(case.outputs["tip_rotation"]), g)[0]
+    return [place[0], place[1], place[2]]
+
+
 def closed_fit(
-    found: Identified, contact: ContactSettings, loads: Loads, conventions: Conventions, numerics: Numerics
+    found: Identified,
+    contact: ContactSettings,
+    loads: Loads,
+    conventions: Conventions,
+    numerics: Numerics,
+    registration: Registration | None = None,
 ) -> Identified:
     """Return constants with IPOPT's word on them, or with a warning where there are too many rods for it.
 
@@ -185,7 +206,7 @@ def closed_fit(
     if rods > MOST_RODS:
         note = f"IPOPT did not close the constants: {rods} rods would be its unknowns, and it takes at most {MOST_RODS}"
         return replace(found, engine=numerics.engine, warnings=(*found.warnings, note))
-    nlp = AtOnce(found.free, numerics)
+    nlp = AtOnce(found.free, numerics, registration)
     for k, data in enumerate(every):
         model = Model(data.robot, found.material, found.coefficients, conventions)
         try:

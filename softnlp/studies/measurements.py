@@ -13,8 +13,10 @@ from softnlp.base.errors import InputError, nearest
 from softnlp.model.laws import Law
 from softnlp.model.materials import Material
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
+from softnlp.studies.fit_statistics import repeats
 from softnlp.studies.forward import pressure_table
 from softnlp.studies.plausibility import Check
+from softnlp.studies.registration import Registration
 
 Array = NDArray[np.float64]
 
@@ -201,6 +203,17 @@ def _sigmas(data: Data, given: Mapping[str, Any]) -> Array:
     return sigma
 
 
+def repeated_numbers(data: Sequence[Data]) -> NDArray[np.intp]:
+    """Return a number for each number that is fitted, in order, the same for one that was measured again exactly."""
+    found = []
+    for k, d in enumerate(data):
+        rows = repeats(d.pressure, d.values, d.sigma, d.root_weight)
+        each = np.column_stack([np.full(d.values.size, k), np.repeat(rows, d.values.shape[1])])
+        columns = np.tile(np.arange(d.values.shape[1]), len(rows))
+        found.append(np.column_stack([each, columns])[d.fitted.ravel()])
+    return repeats(np.concatenate(found).astype(float))
+
+
 def number_array(value: Any, shape: tuple[int, ...], key: str) -> Array:
     """Return an array of a shape whose entries are finite or nan."""
     try:
@@ -221,6 +234,7 @@ class TensileTask:
     stretch, stress : (points,), [-] and engineering [Pa], of every file. file_of_point : (points,) from 0. files : as
     they were named. name, density : of the silicone. start : of a person's law, SI. before : to compare with, or None.
     stretch_range : (2,) as asked for, or None. dropped : how many points lay outside of it. checks : of the specimen.
+    notes : on files of a laboratory: what was guessed and left out.
     """
 
     stretch: Array
@@ -235,6 +249,7 @@ class TensileTask:
     stretch_range: tuple[float, float] | None = None
     dropped: int = 0
     checks: tuple[Check, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def left_out(self) -> str:
@@ -252,7 +267,8 @@ class RobotTask:
     """Constants to identify from measurements of robots.
 
     measurements : of each robot. free : names of constants. bounds : by name, SI. columns : the header of the file.
-    cells : for each robot and row, the cells of the file as they were read. notes : on readings that count as 0.
+    cells : for each robot and row, the cells of the file as they were read. notes : on readings that count as 0,
+    and on files of a laboratory. registration : of the tips, None where they are those of the model.
     """
 
     measurements: tuple[Measurements, ...]
@@ -261,6 +277,7 @@ class RobotTask:
     columns: tuple[str, ...]
     cells: tuple[tuple[tuple[str, ...], ...], ...]
     notes: tuple[str, ...] = ()
+    registration: Registration | None = None
 
     def step_count(self, pressures: int) -> int:
         """Return one: it is solved as a whole."""

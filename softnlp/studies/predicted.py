@@ -57,15 +57,20 @@ class Failure:
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """values : (rows, m), nan where a pose was not found. slopes : (rows, m, constants)."""
+    """values : (rows, m), nan where a pose was not found. slopes : (rows, m, constants).
+
+    turns : (rows, 9) rotations of the tip by columns, and turn_slopes : (rows, 9, constants), of `Predicted`.
+    """
 
     values: Array
     slopes: Array
     failures: tuple[Failure, ...]
+    turns: Array | None = None
+    turn_slopes: Array | None = None
 
 
 class FreePoses(Protocol):
-    """The observables of a sequence of free poses: `POSE_COLUMNS`, then the chamber lengths [m]."""
+    """The observables of free poses: `POSE_COLUMNS`, then the chamber lengths [m]; and the tip's rotation."""
 
     def evaluate(self, constants: Mapping[str, float], anew: bool = False) -> Prediction:
         """Return them at values of quantities; `anew` follows every pose from zero pressure again."""
@@ -102,7 +107,7 @@ class ArcPoses:
             self._stretch = stretch
         values, slopes = (np.asarray(part) for part in self._function(columns, stretch[None, :]))
         split = slopes.reshape(slopes.shape[0], len(stretch), -1).transpose(1, 0, 2)
-        return Prediction(values.T, split, tuple(failures))
+        return _split(values.T, split, tuple(failures))
 
     def _near(self, columns: Array, stretch: Array) -> Array | None:
         """Return the roots of the balance next to known stretches, None where one is not near."""
@@ -111,6 +116,11 @@ class ArcPoses:
         # On the branch from zero pressure the resistance grows faster with the stretch than the pressure's force.
         near = (slope > 0) & (np.abs(found - stretch) < _LARGEST_CHANGE) & (np.abs(balance) < 1e-9)
         return found if np.all(near) else None
+
+
+def _split(values: Array, slopes: Array, failures: tuple[Failure, ...]) -> Prediction:
+    """Return a prediction of observables behind which the rotation of the tip stands."""
+    return Prediction(values[:, :-9], slopes[:, :-9], failures, values[:, -9:], slopes[:, -9:])
 
 
 def _arc_function(solver: PoseSolver, names: Sequence[str]) -> ca.Function:
@@ -123,7 +133,7 @@ def _arc_function(solver: PoseSolver, names: Sequence[str]) -> ca.Function:
     _, u = rod.strains(state, unpack_section(c))
     angle = stretch * ca.sqrt(u[0] ** 2 + u[1] ** 2 + _NO_CURVATURE)
     lengths = functions.lengths(state, c)[:N] * L_0
-    seen = ca.vertcat(state[:3] * L_0, angle, (stretch - 1) * L_0, lengths)
+    seen = ca.vertcat(state[:3] * L_0, angle, (stretch - 1) * L_0, lengths, state[3:12])
     chosen = ca.DM(column.numel(), len(names))
     at = np.cumsum([0, *(q.size for q in solver.quantities.values())])
     for row, name in zip(at, solver.quantities, strict=False):
@@ -152,12 +162,12 @@ class LoadedPoses:
         if anew or not self._moved(solver):
             pressed = enumerate(self._pressure)
             self._known, failures = _followed(pressed, lambda P, near: solver.solve(P, self._loads, near))
-        shape = (5 + solver.model.robot.chambers, len(self._names))
+        shape = (5 + solver.model.robot.chambers + 9, len(self._names))
         values = np.full((len(self._pressure), shape[0]), np.nan)
         slopes = np.full((len(self._pressure), *shape), np.nan)
         for row, found in self._known.items():
             values[row], slopes[row] = self._observed(found)
-        return Prediction(values, slopes, failures)
+        return _split(values, slopes, failures)
 
     def _moved(self, solver: PoseSolver) -> bool:
         """Solve every known pose at other constants; whether all are still there, and near."""
@@ -178,8 +188,10 @@ class LoadedPoses:
         """Return the observables of a pose and their derivatives."""
         own = [name for name in self._names if name in self._solver.quantities]
         point = self._derivatives.at(found, own)
-        values = np.concatenate([point.value(name) for name in _SEEN])
-        slopes = _by_name(np.vstack([point.derivative(name) for name in _SEEN]), own, self._names)
+        turn, turn_slopes = point.rotation
+        values = np.concatenate([*(point.value(name) for name in _SEEN), turn])
+        moved = np.vstack([*(point.derivative(name) for name in _SEEN), turn_slopes])
+        slopes = _by_name(moved, own, self._names)
         if values[3] < STRAIGHT:
             slopes[3] = 0.0
         return values, slopes
@@ -314,6 +326,10 @@ class Predicted:
         pose = self._solver.with_values(constants).solve(self._data.pressure[row], self._loads)[0].pose
         return None if pose is None else pose.fit
 
+    def tips(self, constants: Mapping[str, float], pressure: Array) -> Array:
+        """Return the tips (rows, 3) [m] without loads at other pressures (rows, sets) [Pa]."""
+        return ArcPoses(self._solver, pressure, ()).evaluate(constants).values[:, :3]
+
     def evaluate(self, constants: Mapping[str, float], anew: bool) -> Prediction:
         """Return the values in the order of `COLUMNS`, and their derivatives."""
         poses = self._poses.evaluate(constants, anew)
@@ -327,4 +343,4 @@ class Predicted:
             forces = self._forces.evaluate(constants, poses.values[r, k:], poses.slopes[r, k:], anew)
             values[r, k:], slopes[r, k:] = forces.values, forces.slopes
             failures = tuple(Failure(int(r[f.row]), f.status, f.message) for f in forces.failures)
-        return Prediction(values, slopes, failures)
+        return Prediction(values, slopes, failures, poses.turns, poses.turn_slopes)

@@ -19,7 +19,7 @@ from softnlp.model.laws import LAWS, Law
 from softnlp.model.materials import DENSITY, Material
 from softnlp.model.numerics import Numerics
 from softnlp.nlp.solver import Ipopt
-from softnlp.studies.fit_statistics import constant_note, determined, open_constants, uncertainty
+from softnlp.studies.fit_statistics import constant_note, determined, open_constants, repeats, uncertainty
 from softnlp.studies.law_curve import LawCurve, confirmed_constants, first_guesses, nearest_constants
 from softnlp.studies.plausibility import Check, curve_checks, law_checks, messages
 
@@ -269,7 +269,7 @@ def _fit(
     constants = dict(zip(names, (float(v) for v in c * curve.units), strict=True))
     held = curve.at_bound(c)
     keys = [k.file_key for k in law.constants]
-    known = uncertainty(keys, slopes, residuals, held)
+    known = uncertainty(keys, slopes, residuals, held, repeats(x, y), serial=True)
     errors = dict(zip(names, (float(v) for v in known.standard_errors * curve.units), strict=True))
     total = float(np.sum((y - np.mean(y)) ** 2))
     fitted = (float(min(1.0, np.min(x))), float(np.max(x)))

@@ -1,0 +1,158 @@
+"""Registration: from the tip of the model to the sensor that was measured, in one problem with the constants.
+
+measured = t + R Rz(clock) (p + R_tip o), with the frame (t, R) of the robot's base in that of the tracker, the clock by
+which the chamber sets are turned about the base's axis, and the place o of the sensor in the tip's frame. Rotations are
+a reference times the Cayley transform of half the rotation vector (Gibbs-Rodrigues), which is smooth where it is 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.base.quantity import Quantity, quantity
+from softnlp.base.units import DEGREE, MILLIMETRE
+
+Array = NDArray[np.float64]
+
+PREFIX = "registration."
+_TURN, _MOVE = 0.1, 0.01  # typical sizes [rad], [m]
+_AXES = "xyz"
+_GROUPS = {
+    "frame": tuple(f"frame_{kind}{axis}" for kind in ("rotation_", "") for axis in _AXES),
+    "tip_offset": tuple(f"tip_offset_{axis}" for axis in _AXES),
+    "clock": ("clock",),
+}
+NAMES = tuple(name for names in _GROUPS.values() for name in names)
+"""Of the numbers that may be fitted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Registration:
+    """How the frame of measured tips lies to that of the robot's base.
+
+    Attributes
+    ----------
+    rotation
+        (3, 3) R: from the base's frame to that of the measurements [1].
+    translation
+        (3,) t: the base's origin in that of the measurements [m].
+    tip_offset
+        (3,) o: the sensor in the frame of the tip [m].
+    clock
+        By which the sets are turned about the base's z axis [rad].
+    fit
+        What is fitted: of "frame", "tip_offset" and "clock"; the values given are then where the search begins.
+    set_order
+        Which set of the robot each column of pressures is of, from 1; none where they stand in order.
+    """
+
+    rotation: Any = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    translation: Any = (0.0, 0.0, 0.0)
+    tip_offset: Any = (0.0, 0.0, 0.0)
+    clock: float = 0.0
+    fit: tuple[str, ...] = ()
+    set_order: tuple[int, ...] = ()
+
+    def ordered(self, pressure: Array) -> Array:
+        """Return measured pressures (rows, sets) in the order of the robot's sets."""
+        return pressure[:, np.argsort(self.set_order)] if self.set_order else pressure
+
+    def in_base(self, place: Array) -> Array:
+        """Return places of the sensor (rows, 3) in the frame of the model, before the sets are turned by the clock."""
+        c, s = np.cos(self.clock), np.sin(self.clock)
+        turn = np.asarray(self.rotation) @ [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
+        return np.asarray((place - np.asarray(self.translation)) @ turn)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the numbers that are fitted, in order."""
+        return tuple(name for group, names in _GROUPS.items() if group in self.fit for name in names)
+
+    @property
+    def acts(self) -> bool:
+        """Whether it is more than none at all."""
+        still = np.array_equal(self.rotation, np.eye(3)) and not np.any(self.translation)
+        return bool(self.fit) or not still or bool(np.any(self.tip_offset)) or self.clock != 0
+
+    def found(self, values: Iterable[float]) -> Registration:
+        """Return the registration at values of `names` [rad, m], with nothing left to fit."""
+        given = dict(zip(self.names, (float(v) for v in values), strict=True))
+        made = replace(self, fit=())
+        if "frame" in self.fit:
+            turn = np.array([given[f"frame_rotation_{a}"] for a in _AXES])
+            rotation = np.asarray(self.rotation) @ np.asarray(_cayley(ca.DM(turn)))
+            made = replace(made, rotation=rotation, translation=np.array([given[f"frame_{a}"] for a in _AXES]))
+        if "tip_offset" in self.fit:
+            made = replace(made, tip_offset=np.array([given[f"tip_offset_{a}"] for a in _AXES]))
+        return replace(made, clock=given["clock"]) if "clock" in self.fit else made
+
+    def function(self) -> ca.Function:
+        """Return (tip (3), rotation of the tip (9, by columns), fitted numbers) -> (sensor, and its derivatives)."""
+        p, turned = ca.SX.sym("tip", 3), ca.SX.sym("rotation", 9)
+        g = ca.SX.sym("registration", len(self.names))
+        at = dict(zip(self.names, ca.vertsplit(g), strict=True)) if self.names else {}
+        o = (
+            ca.vertcat(*(at[f"tip_offset_{a}"] for a in _AXES))
+            if "tip_offset" in self.fit
+            else ca.DM(np.asarray(self.tip_offset, float))
+        )
+        phi = at.get("clock", self.clock)
+        R: Any = ca.DM(np.asarray(self.rotation, float))
+        t: Any = ca.DM(np.asarray(self.translation, float))
+        if "frame" in self.fit:
+            R = R @ _cayley(ca.vertcat(*(at[f"frame_rotation_{a}"] for a in _AXES)))
+            t = ca.vertcat(*(at[f"frame_{a}"] for a in _AXES))
+        c, s = ca.cos(phi), ca.sin(phi)
+        body = p + ca.reshape(turned, 3, 3) @ o
+        sensor = t + R @ ca.vertcat(c * body[0] - s * body[1], s * body[0] + c * body[1], body[2])
+        slopes = [ca.densify(ca.jacobian(sensor, by)) for by in (p, turned, g)]
+        return ca.Function("sensor", [p, turned, g], [sensor, *slopes])
+
+    def quantities(self) -> list[Quantity]:
+        """Return the fitted numbers as quantities of a problem."""
+        start, scale = self.start(), self.scales()
+        pairs = zip(self.names, start, scale, strict=True)
+        return [quantity(PREFIX + n, "rad" if s == _TURN else "m", v, scale=float(s)) for n, v, s in pairs]
+
+    def start(self) -> Array:
+        """Return where the search begins (numbers,) [rad, m]."""
+        known = {f"frame_{a}": v for a, v in zip(_AXES, self.translation, strict=True)} | {"clock": self.clock}
+        known |= {f"tip_offset_{a}": v for a, v in zip(_AXES, self.tip_offset, strict=True)}
+        return np.array([float(known.get(name, 0.0)) for name in self.names])
+
+    def scales(self) -> Array:
+        """Return typical sizes (numbers,) [rad, m]."""
+        return np.array([_TURN if unit_of(name)[1] == DEGREE else _MOVE for name in self.names])
+
+
+def rotation_of_quaternion(q: Sequence[float]) -> Array:
+    """Return the rotation (3, 3) of a quaternion x, y, z, w of any length but 0."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_quat(np.asarray(q, float)).as_matrix())
+
+
+def quaternion_of(rotation: Array) -> list[float]:
+    """Return the quaternion x, y, z, w of a rotation (3, 3), w not negative."""
+    from scipy.spatial.transform import Rotation
+
+    return [float(v) for v in Rotation.from_matrix(np.asarray(rotation, float)).as_quat(canonical=True)]
+
+
+def unit_of(name: str) -> tuple[str, float]:
+    """Return the key that files have for a fitted number, and its unit there in SI."""
+    turns = name == "clock" or name.startswith("frame_rotation")
+    return (f"{name}_deg", DEGREE) if turns else (f"{name}_mm", MILLIMETRE)
+
+
+def _cayley(turn: Any) -> Any:
+    """Return the rotation (3, 3) of twice the Gibbs-Rodrigues vector, the rotation vector where it is small."""
+    a = turn / 2
+    K = ca.skew(a)
+    return ca.DM.eye(3) + 2 / (1 + ca.dot(a, a)) * (K + K @ K)
