@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -35,6 +36,7 @@ def tdms_tables(label: str, content: bytes, choices: Choices) -> list[RawTable]:
         from nptdms import TdmsFile
     except ImportError:
         raise InputError("a TDMS file needs npTDMS: pip install 'softnlp[lab]'") from None
+    logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # a file that is wrong is one line
     try:
         file = TdmsFile.read(io.BytesIO(content))
         groups = {group.name: list(group.channels()) for group in file.groups() if len(group.channels())}

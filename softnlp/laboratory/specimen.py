@@ -12,10 +12,9 @@ from softnlp.base.errors import InputError
 from softnlp.base.reading import shown
 from softnlp.base.units import MEGAPASCAL, MILLIMETRE
 from softnlp.laboratory.choices import AskError, Choices
-from softnlp.laboratory.imported import ANY
 from softnlp.laboratory.table import RawTable, in_si, one_column
 from softnlp.laboratory.units import UNITS
-from softnlp.studies.plausibility import SHEAR_MODULUS, Check, area_check
+from softnlp.studies.plausibility import SHEAR_MODULUS, Check, area_check, divisor_checks
 
 Array = NDArray[np.float64]
 
@@ -238,22 +237,7 @@ def _stress(
         return None, []
     if chosen == "true stress":
         return (None if stretch is None else stress / stretch), []
-    return stress, [] if pull is None else _divisor_check(pull, stress, area)
-
-
-def _divisor_check(pull: Array, stress: Array, area: float | None) -> list[Check]:
-    """Return the check of the area that the machine divided the force by [mm^2]."""
-    where = np.abs(stress) > 0.1 * np.nanmax(np.abs(stress))
-    divisor = float(np.nanmedian(pull[where] / stress[where])) / MILLIMETRE**2
-    likely = "the machine's stress equals the force, over an area left at 1; --set stress=force and the specimen's size"
-    if abs(divisor - 1) <= _SAME:
-        return [Check("area of the machine's stress", divisor, (1.5, 2000.0), (1.5, 2000.0), likely, "mm^2")]
-    if area is not None:
-        wanted = area / MILLIMETRE**2
-        likely = "the machine divided by another area than the specimen's; --set stress=force takes the force"
-        usual = wanted * (1 - _SAME), wanted * (1 + _SAME)
-        return [Check("area of the machine's stress", divisor, usual, ANY, likely, "mm^2")]
-    return [Check("area of the machine's stress", divisor, (1.5, 2000.0), ANY, likely, "mm^2")]
+    return stress, [] if pull is None else list(divisor_checks(pull, stress, area))
 
 
 def _without_unit(name: str, stress: Array, stretch: Array | None) -> str:

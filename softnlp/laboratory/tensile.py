@@ -20,7 +20,8 @@ from softnlp.studies.plausibility import Check, curve_checks
 
 Array = NDArray[np.float64]
 
-_LONG, _USUAL = 3.0, (1.0, 2.0)  # a test beyond the first is cut to the second, where robots are
+_LONG, _POSSIBLE = 3.0, 12.0  # a test between these is cut to the range where robots are; beyond, it is no stretch
+_USUAL = (1.0, 2.0)
 _CYCLES = ("first loading", "unloading", "all")
 
 
@@ -116,7 +117,7 @@ def _cycle_checks(cycles: int, choices: Choices) -> list[Check]:
 def _cut(stretch: Array, stress: Array, choices: Choices) -> tuple[Array, Array]:
     """Return the points within the range of stretch that is asked for."""
     limits = choices.numbers("stretch", 2)
-    if limits is None and np.max(stretch) > _LONG:
+    if limits is None and _LONG < np.max(stretch) <= _POSSIBLE:
         reason = f"the test goes to {np.max(stretch):.3g}; robots stretch less, and a law fits the range it is used in"
         limits = choices.take("stretch", list(_USUAL), f"{reason}; stretch=[1, {np.max(stretch):.3g}] takes it all")
     if limits is None:

@@ -21,7 +21,7 @@ from softnlp.scenario.data import Read, Scenario
 from softnlp.scenario.laboratory import import_notes, laboratory_columns
 from softnlp.scenario.schema import FileName, ImportSettings, Label, Positive, optional_keys, wrong
 from softnlp.studies.measurements import TensileTask
-from softnlp.studies.plausibility import Check, area_check
+from softnlp.studies.plausibility import Check, area_check, divisor_checks
 
 if TYPE_CHECKING:  # imported where needed: to read a scenario takes none of them
     from softnlp.studies.tensile import LawFit, TensileFit
@@ -154,6 +154,8 @@ def _curve(columns: Columns, table: TensileTable, imported: bool) -> tuple[Array
         name, of_stress = _first(columns, _STRETCHES), _first(columns, _STRESSES)
         factor, zero = _STRETCHES[name]
         stretch, stress = zero + factor * columns.numbers(name), columns.numbers(of_stress) * _STRESSES[of_stress]
+        if "force_N" in columns:
+            checks = divisor_checks(columns.numbers("force_N", blank=True), stress)
     else:
         raise InputError(
             f"{columns.file}: expected columns stretch, stress_MPa or displacement_mm, force_N; it has "

@@ -31,6 +31,7 @@ _ERRORS = 3.0  # standard errors of a number by which its range is widened
 _FEWEST = 5  # points that a line is laid through
 _NEAR, _NEARER = 0.08, 0.1  # of extension, and of the largest: a test that begins within both tells of stretch 1
 _NOTHING = 1e-30  # [Pa], in place of a stress of 0
+_SAME = 0.02  # relative, of areas
 _TURN, _RESTART = 0.2, 0.1  # of the range of the stretch: the least fall; how near to its end another test starts
 _READINGS = (
     (1e6, "stress in Pa (name its column stress_Pa), or a specimen's width and thickness in m"),
@@ -39,6 +40,7 @@ _READINGS = (
     (1e-3, "stress in GPa, or force in kN"),
 )  # the modulus is this many times the true one
 
+_BROKEN = "the specimen broke; leave out what follows the largest stress, or cut the range with stretch = [1, 2]"
 _BEGINS_LATER = (
     "the stress begins at a larger stretch than 1: looks like a slack specimen, like the distance between the grips in "
     "displacement_mm, or like stretch in a column strain; take off what it begins at"
@@ -113,6 +115,9 @@ def curve_checks(stretch: Array, stress: Array) -> tuple[Check, ...]:
             "looks like several load cycles, whose loading and unloading differ; keep one loading of each specimen",
         ),
     ]
+    top = int(np.argmax(stress))
+    lost = (stretch > stretch[top]) & (stress < 0.5 * stress[top])
+    checks.append(Check("points after the break", float(np.sum(lost)), *UNLOADINGS, _BROKEN))
     for more in (_beginning, _shear_modulus, _growth):
         if messages(tuple(checks), "failed"):
             break
@@ -146,6 +151,24 @@ def modulus_notes(name: str, modulus: float) -> tuple[str, ...]:
         f"the shear modulus of {name} at stretch 1 is {size:.4g} MPa, expected {low:g} to {high:g} MPa: check the unit "
         "of its constants; a stress is in MPa",
     )
+
+
+def divisor_checks(force: Array, stress: Array, area: float | None = None) -> tuple[Check, ...]:
+    """Return the check of the area that a machine divided a force [N] by for its stress [Pa], in mm^2.
+
+    area : of the specimen [m^2], None where it is not known.
+    """
+    with np.errstate(all="ignore"):
+        large = np.abs(stress) > 0.1 * np.nanmax(np.abs(stress))
+        divisor = float(np.nanmedian(np.where(large, force / stress, np.nan))) * MEGAPASCAL
+    usual, possible = AREA
+    likely = "the machine divided by another area than the specimen's; take the force and the specimen's size"
+    if abs(divisor - 1) < _SAME:
+        possible = usual
+        likely = "the machine's stress equals the force, over an area left at 1; take the force and the specimen's size"
+    elif area is not None:
+        usual = area * MEGAPASCAL * (1 - _SAME), area * MEGAPASCAL * (1 + _SAME)
+    return (Check("area of the machine's stress", divisor, usual, possible, likely, "mm^2"),)
 
 
 def area_check(area: float) -> Check:
