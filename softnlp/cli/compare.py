@@ -88,7 +88,9 @@ def _compared(task: CompareTask) -> Comparison:
 
 def _say(task: CompareTask, found: Comparison) -> None:
     """Print the statistics of each variant, and the mean error by robot where there are several."""
+    from softnlp.scenario.compare import comparison_checks
     from softnlp.studies.comparison import OBSERVABLES
+    from softnlp.studies.plausibility import messages
 
     robots = ", ".join(o.label for o in found.observed)
     say(f"{task.scenario.title}: {robots}; {task.scenario.material.name}; {len(task.columns.rows)} rows measured")
@@ -111,7 +113,7 @@ def _say(task: CompareTask, found: Comparison) -> None:
         say(f"\nleast error: {found.labels[found.best]}")
     for note in task.notes:
         say(f"note: {note}")
-    for warning in task.warnings:
+    for warning in (*task.warnings, *messages(comparison_checks(found), "warned")):
         say(f"warning: {warning}")
     _complain_of_lost(found)
 

@@ -148,7 +148,6 @@ def _identified(asked: Scenario) -> Identified:
 def _say_robots(asked: Scenario, found: Identified) -> None:
     """Print constants and misfits."""
     from softnlp.base.columns import OUTPUTS
-    from softnlp.results.identify_document import registration_lines
     from softnlp.studies.identified import file_name
     from softnlp.studies.plausibility import messages
 
@@ -179,7 +178,7 @@ def _say_robots(asked: Scenario, found: Identified) -> None:
             for key in after
         ],
     )
-    for line in registration_lines(found.registration):
+    for line in found.registration.lines() if found.registration is not None else ():
         say(line)
     for warning in (*found.warnings, *messages(found.checks, "warned")):
         say(f"warning: {warning}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from math import inf, isfinite
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,16 +68,7 @@ class Imported:
             "numbers": dict(self.numbers),
             "settings": dict(self.choices.used),
             "guesses": [vars(guess) for guess in self.choices.guesses],
-            "checks": [
-                {
-                    "name": c.name,
-                    "value": c.value if isfinite(c.value) else None,
-                    "unit": c.unit,
-                    "verdict": c.verdict,
-                    "message": c.message,
-                }
-                for c in self.checks
-            ],
+            "checks": [check.document() for check in self.checks],
         }
 
 

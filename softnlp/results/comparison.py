@@ -12,8 +12,9 @@ from softnlp.base.reading import shown
 from softnlp.base.statistics import Statistics
 from softnlp.model.inputs import coefficients_table, contact_table, loads_table, package_version, pressure_bar, tidy
 from softnlp.results.document import csv_text, number
-from softnlp.scenario.compare import CompareTask
+from softnlp.scenario.compare import CompareTask, comparison_checks
 from softnlp.studies.comparison import NUMBERS, OBSERVABLES, Comparison, differences
+from softnlp.studies.plausibility import messages
 
 STATISTICS = ("count", "rmse", "mape_percent", "mean", "median", "max", "bias", "left_out_of_mape", "unit")
 _VARIANT = ("law", "coefficients", "conventions", "closure")
@@ -40,7 +41,11 @@ def comparison_document(task: CompareTask, found: Comparison) -> dict[str, Any]:
         "best": _best(found),
         "variants": [_variant(task, found, v) for v in range(len(found.variants))],
         "notes": list(task.notes),
-        "warnings": list(task.warnings),
+        "registration": [
+            [None if s.registration is None else s.registration.table() for s in solved] for solved in found.simulated
+        ],
+        "checks": [check.document() for check in comparison_checks(found)],
+        "warnings": [*task.warnings, *messages(comparison_checks(found), "warned")],
     }
 
 

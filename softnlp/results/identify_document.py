@@ -10,21 +10,18 @@ import numpy as np
 
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.statistics import Statistics
-from softnlp.base.units import DEGREE, MEGAPASCAL, MILLIMETRE
+from softnlp.base.units import MEGAPASCAL
 from softnlp.model.inputs import loads_table, pressure_bar, tidy
 from softnlp.model.materials import Material
 from softnlp.results.document import csv_text, document_head, engine_table, number, plain
 from softnlp.studies.identified import COEFFICIENTS, file_name
 from softnlp.studies.measurements import OBSERVABLES, column_slice
 from softnlp.studies.plausibility import messages
-from softnlp.studies.registration import quaternion_of
 
 if TYPE_CHECKING:
     from softnlp.scenario.read import Scenario
     from softnlp.studies.identified import Identified
     from softnlp.studies.measurements import RobotTask, TensileTask
-    from softnlp.studies.plausibility import Check
-    from softnlp.studies.registration import Registration
     from softnlp.studies.tensile import LawFit, TensileFit
 
 _TABLE_OF = {"stiffening": ("k_e", "k_b"), "corrections": ("k_a", "k_i", "phi"), "contact": ("k_c",)}
@@ -55,22 +52,9 @@ def tensile_document(asked: Scenario, task: TensileTask, fit: TensileFit) -> dic
         if before is None
         else {"rmse_MPa": number(before.rmse, MEGAPASCAL), "mape_percent": number(before.mape)},
         "best": None if best is None else best.law.name,
-        "checks": [_check(check) for check in fit.checks],
+        "checks": [check.document() for check in fit.checks],
         "laws": [_law(f) for f in fit.fits.values()],
         "notes": list(task.notes),
-    }
-
-
-def _check(check: Check) -> dict[str, Any]:
-    """Return a check of plausibility; an open end of a range is null."""
-    return {
-        "name": check.name,
-        "value": number(check.value),
-        "unit": check.unit or None,
-        "usual": [number(v) for v in check.usual],
-        "possible": [number(v) for v in check.possible],
-        "verdict": check.verdict,
-        "message": check.message,
     }
 
 
@@ -90,7 +74,7 @@ def _law(fit: LawFit) -> dict[str, Any]:
         "rmse_MPa": number(fit.misfit.rmse, MEGAPASCAL),
         "mape_percent": number(fit.misfit.mape),
         "unstable_from_stretch": fit.unstable_from,
-        "checks": [_check(check) for check in fit.checks],
+        "checks": [check.document() for check in fit.checks],
         **engine_table(fit.engine, fit.ipopt),
         "warnings": list(fit.warnings),
     }
@@ -182,30 +166,10 @@ def robot_document(asked: Scenario, task: RobotTask, found: Identified) -> dict[
         "measurements": [row for k in range(len(found.data)) for row in _rows(found, k)],
         "evaluations": found.evaluations,
         **engine_table(found.engine, found.ipopt),
-        "registration": registration_table(found.registration),
-        "checks": [_check(check) for check in found.checks],
+        "registration": None if found.registration is None else found.registration.table(),
+        "checks": [check.document() for check in found.checks],
         "warnings": [*found.warnings, *messages(found.checks, "warned")],
     }
-
-
-def registration_table(found: Registration | None) -> dict[str, Any] | None:
-    """Return [registration] of a scenario with what was found, None where there is none."""
-    if found is None:
-        return None
-    table = {
-        "frame": "given",
-        "rotation_world_from_base_quat_xyzw": [round(v, 12) for v in quaternion_of(found.rotation)],
-        "translation_mm": [float(v) / MILLIMETRE for v in found.translation],
-        "tip_offset_mm": [float(v) / MILLIMETRE for v in found.tip_offset],
-        "clock_deg": float(found.clock) / DEGREE,
-    }
-    return table | ({"set_order": list(found.set_order)} if found.set_order else {})
-
-
-def registration_lines(found: Registration | None) -> list[str]:
-    """Return the table of `registration_table` as lines of TOML."""
-    table = registration_table(found)
-    return [] if table is None else ["[registration]", *(f"{key} = {json.dumps(v)}" for key, v in table.items())]
 
 
 def _sigma(data: Any) -> dict[str, float]:
@@ -287,7 +251,7 @@ def identified_text(asked: Scenario, found: Identified) -> str:
                 text = _quoted(value, always=True) if isinstance(value, str) else repr(value)
                 lines.append(f"{key} = {text}{errors.get(key, '')}")
     if found.registration is not None:
-        lines += ["", *registration_lines(found.registration)]
+        lines += ["", *found.registration.lines()]
     return "\n".join(lines) + "\n"
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.columns import OUTPUTS
-from softnlp.base.csv_columns import TIME_COLUMN, Columns, read_columns
+from softnlp.base.csv_columns import TIME_COLUMN, Columns
 from softnlp.base.errors import InputError, listed, nearest
 from softnlp.base.ranges import noise_note
 from softnlp.base.reading import choices, read_text, shown
@@ -22,10 +22,15 @@ from softnlp.model.conventions import CONVENTIONS, Coefficients, Conventions
 from softnlp.model.materials import Material, load_materials
 from softnlp.model.robot import Robot
 from softnlp.scenario.data import Scenario
+from softnlp.scenario.laboratory import import_notes, laboratory_columns
 from softnlp.scenario.measured_rows import SCALARS, RobotRows, rows_by_robot
+from softnlp.scenario.registration import import_settings, registration_of
 from softnlp.studies.compare import SHAPES, compare
 from softnlp.studies.comparison import Comparison
 from softnlp.studies.measurements import Measurements
+from softnlp.studies.plausibility import Check
+from softnlp.studies.registration import Registration
+from softnlp.studies.tip_checks import frame_checks
 from softnlp.studies.variants import NAMED, OWN, Variant, every_variant, named_coefficients
 from softnlp.sweep.task import WorkspaceTask
 
@@ -35,6 +40,7 @@ STUDIES = ("forward", "blocked-force", "workspace")
 _TILT, _BACKBONE, _ELONGATION = (OUTPUTS[name] for name in ("tilt", "backbone_length", "elongation"))
 _FORCE_COLUMN = SCALARS["blocked_force"].measured
 _COMPARED = (*(OUTPUTS[f"tip_{x}"] for x in "xyz"), *SCALARS.values(), _TILT, _BACKBONE)
+_OWN = ("p1_bar", *(output.measured for output in _COMPARED))
 MEASURED_COLUMNS = tuple(output.measured for output in _COMPARED)
 ALIASES: Mapping[str, str] = {other: output.measured for output in _COMPARED for other in output.others_measured}
 """Other names of columns, as results and people spell them."""
@@ -74,6 +80,7 @@ class CompareTask:
     time: Array
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
+    registration: Registration | None = None
 
 
 def compare_task(scenario: Scenario, path: str | PathLike[str], asked: Asked = Asked()) -> CompareTask:
@@ -87,10 +94,11 @@ def compare_task(scenario: Scenario, path: str | PathLike[str], asked: Asked = A
     _require_study(scenario)
     if asked.shape not in SHAPES:
         raise InputError(f"expected {choices(SHAPES)}, got {shown(asked.shape)}", key="--shape")
-    file = read_columns(Path(), str(path))
-    text = read_text(Path(path))
+    settings = None if scenario.registration is None else import_settings(scenario.registration)
+    file, imported = laboratory_columns(Path(), [str(path)], "tips", (*_OWN, *ALIASES), settings)
+    text = read_text(Path(path)) if imported is None else imported.csv()
     columns = named_columns(file)
-    notes = list(_notes(columns, scenario))
+    notes = [*_notes(columns, scenario), *(() if imported is None else import_notes(imported))]
     compared = [name for name in MEASURED_COLUMNS if name in columns]
     if scenario.contact is None and _FORCE_COLUMN in compared:
         compared.remove(_FORCE_COLUMN)
@@ -102,7 +110,11 @@ def compare_task(scenario: Scenario, path: str | PathLike[str], asked: Asked = A
             f"{listed(columns.header)}{why}",
             source=columns.file,
         )
+    table, sets = scenario.registration, scenario.robot.chamber_sets
+    registration = None if table is None else registration_of(table, sets)
     rows, measurements = _measured(scenario, columns)
+    if registration is not None:
+        measurements = tuple(replace(m, pressure=registration.ordered(np.asarray(m.pressure))) for m in measurements)
     against_wall = scenario.contact is not None and (
         asked.shape == "blocked" or any(np.isfinite(m.blocked_force).any() for m in measurements)
     )
@@ -129,6 +141,7 @@ def compare_task(scenario: Scenario, path: str | PathLike[str], asked: Asked = A
         time=columns.numbers(TIME_COLUMN, blank=True),
         notes=tuple(notes),
         warnings=noise_note(np.concatenate([of_robot.readings().ravel() for of_robot in rows])),
+        registration=registration,
     )
 
 
@@ -144,7 +157,17 @@ def run_compare(task: CompareTask, progress: Callable[[int, int], None] | None =
         shape="blocked" if task.shape == "blocked" else "free",
         together=asked.study == "workspace",
         progress=progress,
+        registration=task.registration,
     )
+
+
+def comparison_checks(found: Comparison) -> tuple[Check, ...]:
+    """Return the checks of the tips that were measured, by the first variant."""
+    checks: list[Check] = []
+    for o, solved in zip(found.observed, found.simulated[0], strict=True):
+        placed, rows = solved.registration, o.measured[:, :3].all(axis=1)
+        checks += frame_checks(o.pressure[rows], o.values[rows, :3], solved.values[rows, :3], o.robot, placed, None)
+    return tuple(checks)
 
 
 def named_columns(columns: Columns) -> Columns:

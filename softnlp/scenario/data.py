@@ -20,6 +20,7 @@ from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.scenario.pressures import PressurePath
+from softnlp.scenario.schema import RegistrationTable
 from softnlp.statics.step import Run, Step
 
 Array = NDArray[np.float64]
@@ -60,6 +61,8 @@ class Scenario:
     warnings
         Rules of manufacture that the robot breaks with leave, a silicone of an unlikely stiffness, and readings that
         count as 0.
+    registration
+        Of measured tips that the scenario is compared with, where it says so.
     """
 
     path: Path
@@ -77,6 +80,7 @@ class Scenario:
     contact: ContactSettings | None
     task: Task | None
     warnings: tuple[str, ...]
+    registration: RegistrationTable | None = None
 
     @property
     def model(self) -> Model:

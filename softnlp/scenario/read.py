@@ -127,6 +127,7 @@ def _scenario(text: str, path: Path) -> Scenario:
         contact=contact,
         task=task,
         warnings=(*warnings, *unlikely, *steps.notes),
+        registration=getattr(file, "registration", None) if "registration" in data else None,
     )
 
 

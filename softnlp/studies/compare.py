@@ -25,6 +25,8 @@ from softnlp.statics.wall import checked_contact, standing_wall
 from softnlp.studies.comparison import NUMBERS, Comparison, Solved
 from softnlp.studies.forward import checked_loads, followed
 from softnlp.studies.measurements import Measurements, Observed, observed
+from softnlp.studies.registered import fitted, sensor_places
+from softnlp.studies.registration import Registration
 from softnlp.studies.variants import Variant
 
 Array = NDArray[np.float64]
@@ -45,6 +47,7 @@ def compare(
     shape: Literal["free", "blocked"] = "free",
     together: bool = False,
     progress: Callable[[int, int], None] | None = None,
+    registration: Registration | None = None,
 ) -> Comparison:
     """Simulate what was measured with each variant of the model and return how far they are apart.
 
@@ -64,6 +67,8 @@ def compare(
         Solve all rows of a robot at once, as a workspace sweep does, instead of one after the other: for many rows.
     progress
         Called with how many solves are done, and how many there are.
+    registration
+        Where the sensor of the tips is and in which frame; what it fits is found for each robot and variant by itself.
 
     Returns
     -------
@@ -98,7 +103,7 @@ def compare(
             progress(done, total)
 
     solve = _solved_together if together else _solved_in_order
-    work = _Work(partial(solve, numerics, loads, tell), contact, shape == "blocked")
+    work = _Work(partial(solve, numerics, loads, tell), contact, shape == "blocked", registration)
     simulated = tuple(tuple(work.solved(variant, o) for o in robots) for variant in asked)
     return Comparison(robots, asked, simulated, contact, shape)
 
@@ -107,11 +112,16 @@ class _Work:
     """Solves the rows of one robot after the other; free poses once for all closures."""
 
     def __init__(
-        self, solve: Callable[[Model, Array, ContactSettings | None], Solved], contact: ContactSettings, blocked: bool
+        self,
+        solve: Callable[[Model, Array, ContactSettings | None], Solved],
+        contact: ContactSettings,
+        blocked: bool,
+        registration: Registration | None = None,
     ) -> None:
         self._solve = solve
         self._contact = contact
         self._blocked = blocked
+        self._registration = registration
         self._free: dict[tuple[int, ...], Solved] = {}
 
     def solved(self, variant: Variant, o: Observed) -> Solved:
@@ -123,8 +133,12 @@ class _Work:
         message = [""] * len(values)
         through: set[int] = set()
 
+        turns = np.full((len(values), 9), np.nan)
+
         def put(rows: NDArray[np.intp], found: Solved, columns: slice | int) -> None:
             values[rows, columns] = found.values[:, columns]
+            if columns != _FORCE and found.turns is not None:
+                turns[rows] = found.turns
             through.update(rows[list(found.self_intersecting)].tolist())
             for row, ended, words in zip(rows.tolist(), found.status, found.message, strict=True):
                 known = status[row]
@@ -137,8 +151,12 @@ class _Work:
         if at_wall.size:
             found = self._solve(model, o.pressure[at_wall], replace(self._contact, closure=closure))
             put(at_wall, found, slice(0, len(NUMBERS)) if self._blocked else _FORCE)
+        placed = self._registration
+        if placed is not None:
+            placed = fitted(placed, values[:, :3], turns, o.values[:, :3])
+            values[:, :3] = sensor_places(placed, values[:, :3], turns)
         values[~np.isfinite(o.values)] = np.nan
-        return Solved(values, tuple(status), tuple(message), frozenset(through))
+        return Solved(values, tuple(status), tuple(message), frozenset(through), registration=placed)
 
     def _free_poses(self, variant: Variant, model: Model, o: Observed, rows: NDArray[np.intp]) -> Solved:
         key = _free_key(variant, o)
@@ -175,7 +193,14 @@ def _solved_in_order(
     length = float(model.robot.length)
     values = np.array([_numbers(step, length) for step in steps]).reshape(-1, len(NUMBERS))
     through = frozenset(k for k, step in enumerate(steps) if step.pose and step.pose.fit.self_intersecting)
-    return Solved(values, tuple(step.status for step in steps), tuple(step.message for step in steps), through)
+    turns = np.array([_turn(step) for step in steps]).reshape(-1, 9)
+    return Solved(values, tuple(step.status for step in steps), tuple(step.message for step in steps), through, turns)
+
+
+def _turn(step: Step) -> Array:
+    """Return the rotation of a step's tip by columns (9,), nan where it has none."""
+    pose = step.pose
+    return np.full(9, np.nan) if pose is None else np.asarray(pose.tip_rotation).ravel(order="F")
 
 
 def _numbers(step: Step, length: float) -> list[float]:
@@ -194,7 +219,7 @@ def _solved_together(
     order = np.arange(len(pressure), dtype=np.int64)
     plan = Plan(model, loads, numerics, contact, ("pressure",), np.ascontiguousarray(pressure), order)
     solver = ChunkSolver(plan)
-    values = np.full((len(pressure), len(NUMBERS)), np.nan)
+    values, turns = np.full((len(pressure), len(NUMBERS)), np.nan), np.full((len(pressure), 9), np.nan)
     status = [Status.DIVERGED] * len(pressure)
     message = [""] * len(pressure)
     through: set[int] = set()
@@ -203,6 +228,7 @@ def _solved_together(
         members, rows = plan.members(chunk), block.rows
         through.update(members[rows["self_intersecting"] == 1].tolist())
         axis = rows["tip_rotation"][:, :, 2]
+        turns[members] = rows["tip_rotation"].transpose(0, 2, 1).reshape(-1, 9)
         tilt = np.arctan2(np.hypot(axis[:, 0], axis[:, 1]), axis[:, 2])
         values[members, :3] = rows["tip_position"]
         pose = (rows["bending_angle"], rows["backbone_length"] - float(model.robot.length), tilt)
@@ -217,4 +243,4 @@ def _solved_together(
         tell(len(members))
     lost = np.array([not s.has_solution for s in status])
     values[lost] = np.nan
-    return Solved(values, tuple(status), tuple(message), frozenset(through))
+    return Solved(values, tuple(status), tuple(message), frozenset(through), turns)

@@ -14,6 +14,7 @@ from softnlp.base.statistics import Statistics, statistics
 from softnlp.base.status import Status
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.studies.measurements import Observed
+from softnlp.studies.registration import Registration
 from softnlp.studies.variants import Variant, labels
 
 Array = NDArray[np.float64]
@@ -50,12 +51,18 @@ class Solved:
         Of each row; "" of one that nothing was asked of.
     self_intersecting
         The rows whose shape passes through itself.
+    turns
+        (rows, 9) rotation of the free tip by columns [1], where it was kept.
+    registration
+        Where the tips were taken, with what was fitted of it.
     """
 
     values: Array
     status: tuple[Status | None, ...]
     message: tuple[str, ...]
     self_intersecting: frozenset[int] = frozenset()
+    turns: Array | None = None
+    registration: Registration | None = None
 
 
 @dataclass(frozen=True, eq=False)

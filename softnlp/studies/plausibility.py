@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf, isfinite
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,6 +91,22 @@ class Check:
         expected = between if isfinite(low) and isfinite(high) else f"at least {low:.4g}"
         unit = self.unit and f" {self.unit}"
         return f"the {self.name} is {self.value:.4g}{unit}, expected {expected}{unit}: {self.likely}"
+
+    def document(self) -> dict[str, Any]:
+        """Return it as JSON has it; an open end of a range is null."""
+        return {
+            "name": self.name,
+            "value": _open(float(self.value)),
+            "unit": self.unit or None,
+            "usual": [_open(float(v)) for v in self.usual],
+            "possible": [_open(float(v)) for v in self.possible],
+            "verdict": self.verdict,
+            "message": self.message,
+        }
+
+
+def _open(value: float) -> float | None:
+    return value if isfinite(value) else None
 
 
 def messages(checks: tuple[Check, ...], verdict: str) -> tuple[str, ...]:

@@ -70,14 +70,45 @@ def begun(registration: Registration, data: Sequence[Data], tips: Sequence[Array
 
     tips : of the model with the tip's offset and clock that are given, for each robot (rows, 3) [m].
     """
-    if "frame" not in registration.fit:
-        return registration
     pairs = [np.column_stack([p, d.values[:, :3]]) for d, p in zip(data, tips, strict=True)]
     both = np.concatenate(pairs)
     both = both[np.isfinite(both).all(axis=1)]
-    if len(both) < 3:
+    return _laid(registration, both[:, :3], both[:, 3:])
+
+
+def _laid(registration: Registration, p: Array, q: Array) -> Registration:
+    """Return a registration whose frame, if it is fitted, lays places p on q (rows, 3) [m]."""
+    if "frame" not in registration.fit or len(p) < 3:
         return registration
-    p, q = both[:, :3], both[:, 3:]
     U, _, Vt = np.linalg.svd((p - p.mean(axis=0)).T @ (q - q.mean(axis=0)))
     R = Vt.T @ np.diag([1.0, 1.0, np.sign(np.linalg.det(Vt.T @ U.T))]) @ U.T
     return replace(registration, rotation=R, translation=q.mean(axis=0) - R @ p.mean(axis=0))
+
+
+def sensor_places(registration: Registration, tips: Array, turns: Array) -> Array:
+    """Return where the sensor is (rows, 3) [m], of tips (rows, 3) [m] and their rotations by columns (rows, 9)."""
+    g = registration.start()
+    function = registration.function()
+    found = [np.asarray(function(p, R, g)[0]).ravel() for p, R in zip(tips, turns, strict=True)]
+    return np.array(found).reshape(-1, 3)
+
+
+def fitted(registration: Registration, tips: Array, turns: Array, measured: Array) -> Registration:
+    """Return a registration with what it fits at the least squares of places of the sensor (rows, 3) [m]."""
+    from scipy.optimize import least_squares
+
+    known = np.isfinite(np.column_stack([tips, turns, measured])).all(axis=1)
+    count = len(registration.names)
+    if not count or 3 * np.sum(known) < count:
+        return registration.found(registration.start())
+    p, R, q = tips[known], turns[known], measured[known]
+    begin = _laid(registration, p, q)
+    function = begin.function()
+
+    def at(g: Array) -> tuple[Array, Array]:
+        parts = [function(a, b, g) for a, b in zip(p, R, strict=True)]
+        places = np.array([np.asarray(part[0]).ravel() for part in parts])
+        return (places - q).ravel(), np.concatenate([np.asarray(part[3]) for part in parts])
+
+    done = least_squares(lambda g: at(g)[0], begin.start(), jac=lambda g: at(g)[1], x_scale=begin.scales())
+    return begin.found(done.x)

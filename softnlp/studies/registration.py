@@ -7,6 +7,7 @@ a reference times the Cayley transform of half the rotation vector (Gibbs-Rodrig
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -62,6 +63,21 @@ class Registration:
     def ordered(self, pressure: Array) -> Array:
         """Return measured pressures (rows, sets) in the order of the robot's sets."""
         return pressure[:, np.argsort(self.set_order)] if self.set_order else pressure
+
+    def table(self) -> dict[str, Any]:
+        """Return [registration] of a scenario with these numbers."""
+        found: dict[str, Any] = {
+            "frame": "given",
+            "rotation_world_from_base_quat_xyzw": [round(v, 12) for v in quaternion_of(self.rotation)],
+            "translation_mm": [float(v) / MILLIMETRE for v in self.translation],
+            "tip_offset_mm": [float(v) / MILLIMETRE for v in self.tip_offset],
+            "clock_deg": float(self.clock) / DEGREE,
+        }
+        return found | ({"set_order": list(self.set_order)} if self.set_order else {})
+
+    def lines(self) -> list[str]:
+        """Return `table` as lines of TOML."""
+        return ["[registration]", *(f"{key} = {json.dumps(value)}" for key, value in self.table().items())]
 
     def in_base(self, place: Array) -> Array:
         """Return places of the sensor (rows, 3) in the frame of the model, before the sets are turned by the clock."""

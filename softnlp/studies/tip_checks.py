@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.units import DEGREE, MILLIMETRE
+from softnlp.model.robot import Robot
 from softnlp.studies.measurements import Data
 from softnlp.studies.plausibility import Check
 from softnlp.studies.registration import Registration
@@ -39,15 +40,29 @@ def tip_checks(
     P, seen, model = data.pressure[known], data.values[known, :3], after[known]
     found = [_residual(seen, model, data.sigma[known, :3], sigma_given)]
     if framed:
-        placed = registration or Registration()
-        seen, model = placed.in_base(seen), placed.in_base(model)
-        rest = np.array([0.0, 0.0, float(data.robot.length)]) + np.asarray(placed.tip_offset)
-        found += [*_rest(P, seen, rest), *_orders(P, seen, model, tips)]
+        found += frame_checks(P, seen, model, data.robot, registration, tips)
+    return tuple(found)
+
+
+def frame_checks(
+    P: Array, seen: Array, model: Array, robot: Robot, registration: Registration | None, tips: Tips | None
+) -> list[Check]:
+    """Return the checks of a frame that was not fitted.
+
+    P : (rows, sets) [Pa]. seen, model : (rows, 3) where the sensor is [m], measured and by the model. tips : as in
+    `tip_checks`.
+    """
+    if len(P) < _FEWEST or not np.isfinite(model).all():
+        return []
+    placed = registration or Registration()
+    seen, model = placed.in_base(seen), placed.in_base(model)
+    rest = np.array([0.0, 0.0, float(robot.length)]) + np.asarray(placed.tip_offset)
+    found = [*_rest(P, seen, rest), *_orders(P, seen, model, tips)]
     moved = float(np.linalg.norm(np.ptp(seen, axis=0))) / MILLIMETRE
     if np.ptp(P) > 1e4:
         likely = "the tip does not move while the pressure does: a wrong sensor, unit or valve"
         found.append(Check("motion of the tip", moved, (1.0, 1e4), _ANY, likely, "mm"))
-    return tuple(found)
+    return found
 
 
 def _rest(P: Array, seen: Array, expected: Array) -> Iterator[Check]:
