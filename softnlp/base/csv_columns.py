@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from math import isfinite
@@ -64,7 +65,7 @@ class Columns:
         if name not in self.header:
             return values
         for k, cell in enumerate(self.text(name)):
-            if cell == "" and blank:
+            if blank and cell.lower() in ("", "nan"):
                 continue
             try:
                 values[k] = float(cell)
@@ -98,6 +99,8 @@ def _columns(label: str, rows: list[tuple[int, list[str]]], needed: Collection[s
         got = "the header alone" if rows else "an empty file"
         raise InputError(f"expected a header and rows of numbers, at least one row, got {got}")
     header = tuple(one_line(name.strip(), LONGEST_NAME) for name in rows[0][1])
+    if len(header) == 1 and re.search(r"[;\t]", rows[0][1][0].strip()):
+        raise InputError(f"expected columns separated by commas, got {shown(rows[0][1][0])}")
     for name in header:
         if name and header.count(name) > 1:
             raise InputError(f"expected each column once, got {shown(name)} {header.count(name)} times")

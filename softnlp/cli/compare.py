@@ -113,7 +113,7 @@ def _say(task: CompareTask, found: Comparison) -> None:
         say(f"\nleast error: {found.labels[found.best]}")
     for note in task.notes:
         say(f"note: {note}")
-    for warning in (*task.warnings, *messages(comparison_checks(found), "warned")):
+    for warning in (*task.warnings, *messages(comparison_checks(task, found), "warned")):
         say(f"warning: {warning}")
     _complain_of_lost(found)
 

@@ -34,9 +34,10 @@ def tdms_tables(label: str, content: bytes, choices: Choices) -> list[RawTable]:
     """
     try:
         from nptdms import TdmsFile
+        from nptdms.log import log_manager
     except ImportError:
         raise InputError("a TDMS file needs npTDMS: pip install 'softnlp[lab]'") from None
-    logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # a file that is wrong is one line
+    log_manager.set_level(logging.CRITICAL)  # a file that is wrong is one line
     try:
         file = TdmsFile.read(io.BytesIO(content))
         groups = {group.name: list(group.channels()) for group in file.groups() if len(group.channels())}

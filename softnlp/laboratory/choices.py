@@ -17,6 +17,10 @@ class AskError(InputError):
     """A file can be read in more than one way, or lacks a number; the text shows the readings and what settles them."""
 
 
+class NoHeaderError(AskError):
+    """Nothing names the columns of a file."""
+
+
 class NamedError(InputError):
     """A file is of a kind that is no table of measurements, which the text names."""
 

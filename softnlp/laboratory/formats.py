@@ -53,9 +53,9 @@ def _tables(label: str, content: bytes, choices: Choices) -> list[RawTable]:
         raise NamedError(f"a Git LFS pointer to a file{bytes_of}, not the file; git lfs pull fetches it")
     for mark, what in _KNOWN:
         if head.startswith(mark):
-            raise NamedError(f"this is {what}")
+            raise NamedError(f"expected text, got binary data: {what}")
     if head[:1] == b"\x80" and head[1:2] in b"\x02\x03\x04\x05":
-        raise NamedError("this is a Python pickle, which could run code; it is never read, write it as .csv")
+        raise NamedError("expected text, got binary data: a Python pickle, which could run code; it is never read")
     if head.startswith(b"PK\x03\x04"):
         from softnlp.laboratory.workbook import workbook_tables
 

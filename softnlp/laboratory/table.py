@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from softnlp.base.errors import InputError, listed
 from softnlp.base.reading import LONGEST_NAME, one_line, shown
 from softnlp.laboratory.cells import is_number, number
-from softnlp.laboratory.choices import AskError, Choices
+from softnlp.laboratory.choices import AskError, Choices, NoHeaderError
 from softnlp.laboratory.units import Unit, split_unit, unit_named
 
 Array = NDArray[np.float64]
@@ -146,7 +146,7 @@ def assembled(
             raise InputError(f"expected a list of at most {count} names, '-' for one to leave out", key="columns")
         names = [*given, *names[len(given) :]]
     elif not header.names:
-        raise AskError(_without_header(columns))
+        raise NoHeaderError(_without_header(columns))
     spelt = dict(enumerate(header.units)) | dict(enumerate(_labview_units(before)))
     split = [split_unit(one_line(name, LONGEST_NAME)) for name in names]
     units = [unit_named(spelt.get(k, "")) or unit for k, (_, unit) in enumerate(split)]

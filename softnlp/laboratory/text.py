@@ -21,7 +21,7 @@ import numpy as np
 from softnlp.base.csv_columns import MOST_COLUMNS
 from softnlp.base.errors import InputError
 from softnlp.base.reading import one_line, shown
-from softnlp.laboratory.cells import is_grouped, is_number, number, numbers
+from softnlp.laboratory.cells import MISSING, is_grouped, is_number, number, numbers
 from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.table import RawTable, assembled, header_rows
 
@@ -203,7 +203,7 @@ def _blocks(lines: Sequence[str], dialect: Dialect) -> Iterator[Block]:
         if len(row) > MOST_COLUMNS:
             raise InputError(f"line {k + 1}: expected at most {MOST_COLUMNS} columns, got {len(row)}")
         count = sum(is_number(cell, dialect.decimal) for cell in row)
-        if count and 2 * count >= sum(map(bool, row)):
+        if count and 2 * count >= sum(cell.lower() not in MISSING for cell in row if cell):
             run.append((k, row))
             continue
         best = max(best, run, key=len)
@@ -218,7 +218,7 @@ def _scored(lines: Sequence[str], dialect: Dialect, run: Sequence[tuple[int, tup
     width, usual = widths.most_common(1)[0]
     score = 0.0
     for row in rows:
-        filled = [cell for cell in row if cell]
+        filled = [cell for cell in row if cell and cell.lower() not in MISSING]
         count = sum(is_number(cell, dialect.decimal) for cell in filled)
         score += count - (len(filled) - count)
     score *= usual / len(rows)
@@ -280,6 +280,7 @@ _BEGINS = frozenset("0123456789+-.,nN")
 def _is_numeric(block: Block, column: int) -> bool:
     """Whether most cells of a column in the sample are numbers."""
     cells = [row[column] for row in block.rows if column < len(row) and row[column]]
+    cells = [cell for cell in cells if cell.lower() not in MISSING]
     return 2 * sum(is_number(cell, block.dialect.decimal) for cell in cells) > len(cells)
 
 

@@ -44,8 +44,8 @@ def comparison_document(task: CompareTask, found: Comparison) -> dict[str, Any]:
         "registration": [
             [None if s.registration is None else s.registration.table() for s in solved] for solved in found.simulated
         ],
-        "checks": [check.document() for check in comparison_checks(found)],
-        "warnings": [*task.warnings, *messages(comparison_checks(found), "warned")],
+        "checks": [check.document() for check in comparison_checks(task, found)],
+        "warnings": [*task.warnings, *messages(comparison_checks(task, found), "warned")],
     }
 
 

@@ -6,6 +6,7 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from functools import partial
 from os import PathLike
 from pathlib import Path
 
@@ -20,15 +21,18 @@ from softnlp.base.reading import choices, read_text, shown
 from softnlp.model.contact_settings import CLOSURES, ContactSettings, ContactTask
 from softnlp.model.conventions import CONVENTIONS, Coefficients, Conventions
 from softnlp.model.materials import Material, load_materials
+from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.scenario.data import Scenario
 from softnlp.scenario.laboratory import import_notes, laboratory_columns
 from softnlp.scenario.measured_rows import SCALARS, RobotRows, rows_by_robot
 from softnlp.scenario.registration import import_settings, registration_of
+from softnlp.statics.kept import pose_solver
 from softnlp.studies.compare import SHAPES, compare
 from softnlp.studies.comparison import Comparison
 from softnlp.studies.measurements import Measurements
 from softnlp.studies.plausibility import Check
+from softnlp.studies.predicted import unloaded_tips
 from softnlp.studies.registration import Registration
 from softnlp.studies.tip_checks import frame_checks
 from softnlp.studies.variants import NAMED, OWN, Variant, every_variant, named_coefficients
@@ -161,12 +165,17 @@ def run_compare(task: CompareTask, progress: Callable[[int, int], None] | None =
     )
 
 
-def comparison_checks(found: Comparison) -> tuple[Check, ...]:
+def comparison_checks(task: CompareTask, found: Comparison) -> tuple[Check, ...]:
     """Return the checks of the tips that were measured, by the first variant."""
     checks: list[Check] = []
+    if task.registration is not None and "frame" in task.registration.fit:
+        return ()
+    variant, asked = found.variants[0], task.scenario
     for o, solved in zip(found.observed, found.simulated[0], strict=True):
         placed, rows = solved.registration, o.measured[:, :3].all(axis=1)
-        checks += frame_checks(o.pressure[rows], o.values[rows, :3], solved.values[rows, :3], o.robot, placed, None)
+        model = Model(o.robot, variant.material, variant.coefficients, variant.conventions)
+        tips = None if asked.loads.act else partial(unloaded_tips, pose_solver(model, asked.numerics))
+        checks += frame_checks(o.pressure[rows], o.values[rows, :3], solved.values[rows, :3], o.robot, placed, tips)
     return tuple(checks)
 
 

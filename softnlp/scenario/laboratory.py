@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -67,10 +67,12 @@ def _or_imported(
     """Return the project's own reading of a file, and that of a laboratory's for one without a column of its own."""
     if _has_column(folder / file, own):
         return read()
-    from softnlp.laboratory.choices import AskError, NamedError
+    from softnlp.laboratory.choices import AskError, NamedError, NoHeaderError
 
     try:
         return imported()
+    except NoHeaderError:
+        return read()
     except (AskError, NamedError):
         raise
     except InputError:
@@ -80,12 +82,19 @@ def _or_imported(
 def _has_column(path: Path, own: Collection[str]) -> bool:
     """Whether the first row of a file has a column of the project's own, or the file is not there at all."""
     try:
-        with open(path, "rb") if path.is_file() else open(os.devnull, "rb") as file:
+        if not path.is_file():  # nor is a pipe opened
+            return True
+        with open(path, "rb") as file:
             head = file.read(20_000).decode("utf-8-sig", errors="replace")
+    except (OSError, ValueError):
+        return True
+    try:
         _, first = next(csv_rows(head), (0, []))
-    except (InputError, OSError, ValueError):
-        return not path.is_file()
-    return not path.is_file() or bool({cell.strip() for cell in first} & set(own))
+    except InputError:
+        return False
+    # with another separator too: its message says what is wrong
+    cells = {part.strip() for cell in first for part in re.split(r"[;\t]", cell)}
+    return bool(cells & set(own))
 
 
 def _imported(folder: Path, files: Sequence[str], kind: str, settings: Mapping[str, Any]) -> tuple[Columns, Imported]:
@@ -106,7 +115,7 @@ def _imported(folder: Path, files: Sequence[str], kind: str, settings: Mapping[s
             imported = import_files(list(files), kind, flat(settings), folder)
     except AskError as error:
         source = None if error.message.startswith(label) else error.source or label
-        raise AskError(f"{error.message}{_INLINE}", source=source, key=error.key) from None
+        raise type(error)(f"{error.message}{_INLINE}", source=source, key=error.key) from None
     header, *rows = (tuple(line.split(",")) for line in imported.csv().splitlines())
     return Columns(label, header, tuple(rows), tuple(range(2, len(rows) + 2))), imported
 

@@ -93,7 +93,13 @@ class Check:
         return f"the {self.name} is {self.value:.4g}{unit}, expected {expected}{unit}: {self.likely}"
 
     def document(self) -> dict[str, Any]:
-        """Return it as JSON has it; an open end of a range is null."""
+        """Return it as JSON has it.
+
+        Returns
+        -------
+        dict
+            Name, value, unit, ranges, verdict and message; an open end of a range is None.
+        """
         return {
             "name": self.name,
             "value": _open(float(self.value)),

@@ -118,6 +118,11 @@ class ArcPoses:
         return found if np.all(near) else None
 
 
+def unloaded_tips(solver: PoseSolver, pressure: Array, constants: Mapping[str, float] | None = None) -> Array:
+    """Return the tips (rows, 3) [m] without loads at pressures (rows, sets) [Pa], nan where there is none."""
+    return ArcPoses(solver, pressure, ()).evaluate(constants or {}).values[:, :3]
+
+
 def _split(values: Array, slopes: Array, failures: tuple[Failure, ...]) -> Prediction:
     """Return a prediction of observables behind which the rotation of the tip stands."""
     return Prediction(values[:, :-9], slopes[:, :-9], failures, values[:, -9:], slopes[:, -9:])
@@ -328,7 +333,7 @@ class Predicted:
 
     def tips(self, constants: Mapping[str, float], pressure: Array) -> Array:
         """Return the tips (rows, 3) [m] without loads at other pressures (rows, sets) [Pa]."""
-        return ArcPoses(self._solver, pressure, ()).evaluate(constants).values[:, :3]
+        return unloaded_tips(self._solver, pressure, constants)
 
     def evaluate(self, constants: Mapping[str, float], anew: bool) -> Prediction:
         """Return the values in the order of `COLUMNS`, and their derivatives."""

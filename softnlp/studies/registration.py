@@ -61,11 +61,28 @@ class Registration:
     set_order: tuple[int, ...] = ()
 
     def ordered(self, pressure: Array) -> Array:
-        """Return measured pressures (rows, sets) in the order of the robot's sets."""
+        """Return measured pressures (rows, sets) in the order of the robot's sets.
+
+        Parameters
+        ----------
+        pressure
+            (rows, sets) as measured [Pa].
+
+        Returns
+        -------
+        array
+            (rows, sets) [Pa].
+        """
         return pressure[:, np.argsort(self.set_order)] if self.set_order else pressure
 
     def table(self) -> dict[str, Any]:
-        """Return [registration] of a scenario with these numbers."""
+        """Return [registration] of a scenario with these numbers.
+
+        Returns
+        -------
+        dict
+            By the keys of the table [mm, deg].
+        """
         found: dict[str, Any] = {
             "frame": "given",
             "rotation_world_from_base_quat_xyzw": [round(v, 12) for v in quaternion_of(self.rotation)],
@@ -76,11 +93,28 @@ class Registration:
         return found | ({"set_order": list(self.set_order)} if self.set_order else {})
 
     def lines(self) -> list[str]:
-        """Return `table` as lines of TOML."""
+        """Return `table` as lines of TOML.
+
+        Returns
+        -------
+        list
+            The name of the table, then a line a key.
+        """
         return ["[registration]", *(f"{key} = {json.dumps(value)}" for key, value in self.table().items())]
 
     def in_base(self, place: Array) -> Array:
-        """Return places of the sensor (rows, 3) in the frame of the model, before the sets are turned by the clock."""
+        """Return places of the sensor (rows, 3) in the frame of the model, before the sets are turned by the clock.
+
+        Parameters
+        ----------
+        place
+            (rows, 3) of the sensor [m].
+
+        Returns
+        -------
+        array
+            (rows, 3) with the clock taken off too [m].
+        """
         c, s = np.cos(self.clock), np.sin(self.clock)
         turn = np.asarray(self.rotation) @ [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
         return np.asarray((place - np.asarray(self.translation)) @ turn)
@@ -97,7 +131,18 @@ class Registration:
         return bool(self.fit) or not still or bool(np.any(self.tip_offset)) or self.clock != 0
 
     def found(self, values: Iterable[float]) -> Registration:
-        """Return the registration at values of `names` [rad, m], with nothing left to fit."""
+        """Return the registration at values of `names` [rad, m], with nothing left to fit.
+
+        Parameters
+        ----------
+        values
+            (numbers,) of `names` [rad, m].
+
+        Returns
+        -------
+        Registration
+            The same, with these numbers.
+        """
         given = dict(zip(self.names, (float(v) for v in values), strict=True))
         made = replace(self, fit=())
         if "frame" in self.fit:
@@ -109,7 +154,13 @@ class Registration:
         return replace(made, clock=given["clock"]) if "clock" in self.fit else made
 
     def function(self) -> ca.Function:
-        """Return (tip (3), rotation of the tip (9, by columns), fitted numbers) -> (sensor, and its derivatives)."""
+        """Return (tip (3), rotation of the tip (9, by columns), fitted numbers) -> (sensor, and its derivatives).
+
+        Returns
+        -------
+        casadi.Function
+            Of tip (3) [m], rotation (9) and fitted numbers: the sensor (3) [m], and its derivatives by the three.
+        """
         p, turned = ca.SX.sym("tip", 3), ca.SX.sym("rotation", 9)
         g = ca.SX.sym("registration", len(self.names))
         at = dict(zip(self.names, ca.vertsplit(g), strict=True)) if self.names else {}
@@ -131,19 +182,37 @@ class Registration:
         return ca.Function("sensor", [p, turned, g], [sensor, *slopes])
 
     def quantities(self) -> list[Quantity]:
-        """Return the fitted numbers as quantities of a problem."""
+        """Return the fitted numbers as quantities of a problem.
+
+        Returns
+        -------
+        list
+            `Quantity` for each of `names`.
+        """
         start, scale = self.start(), self.scales()
         pairs = zip(self.names, start, scale, strict=True)
         return [quantity(PREFIX + n, "rad" if s == _TURN else "m", v, scale=float(s)) for n, v, s in pairs]
 
     def start(self) -> Array:
-        """Return where the search begins (numbers,) [rad, m]."""
+        """Return where the search begins (numbers,) [rad, m].
+
+        Returns
+        -------
+        array
+            (numbers,) of `names` [rad, m].
+        """
         known = {f"frame_{a}": v for a, v in zip(_AXES, self.translation, strict=True)} | {"clock": self.clock}
         known |= {f"tip_offset_{a}": v for a, v in zip(_AXES, self.tip_offset, strict=True)}
         return np.array([float(known.get(name, 0.0)) for name in self.names])
 
     def scales(self) -> Array:
-        """Return typical sizes (numbers,) [rad, m]."""
+        """Return typical sizes (numbers,) [rad, m].
+
+        Returns
+        -------
+        array
+            (numbers,) of `names` [rad, m].
+        """
         return np.array([_TURN if unit_of(name)[1] == DEGREE else _MOVE for name in self.names])
 
 

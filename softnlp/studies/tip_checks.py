@@ -57,7 +57,7 @@ def frame_checks(
     placed = registration or Registration()
     seen, model = placed.in_base(seen), placed.in_base(model)
     rest = np.array([0.0, 0.0, float(robot.length)]) + np.asarray(placed.tip_offset)
-    found = [*_rest(P, seen, rest), *_orders(P, seen, model, tips)]
+    found = [*_rest(P, seen, rest), *_orders(P, seen, model, tips, placed)]
     moved = float(np.linalg.norm(np.ptp(seen, axis=0))) / MILLIMETRE
     if np.ptp(P) > 1e4:
         likely = "the tip does not move while the pressure does: a wrong sensor, unit or valve"
@@ -92,7 +92,7 @@ def _residual(seen: Array, model: Array, sigma: Array, sigma_given: bool) -> Che
     )
 
 
-def _orders(P: Array, seen: Array, model: Array, tips: Tips | None) -> Iterator[Check]:
+def _orders(P: Array, seen: Array, model: Array, tips: Tips | None, placed: Registration) -> Iterator[Check]:
     """Yield the check of the clock, and of the order of the sets where another one does far better."""
     if tips is not None:  # constants that were fitted to another order are not to be trusted
         model = tips(P)
@@ -101,32 +101,38 @@ def _orders(P: Array, seen: Array, model: Array, tips: Tips | None) -> Iterator[
     clock, error, left = _turn(seen, model)
     plain = float(np.sum((seen - model) ** 2))
     sets = P.shape[1]
-    best: tuple[float, float, tuple[int, ...]] = (left, clock, tuple(range(sets)))
-    if tips is not None and 2 <= sets <= _MOST_SETS:
-        for order in permutations(range(sets)):
-            other = tips(P[:, list(order)])
-            if not np.isfinite(other).all():
-                continue
-            without = float(np.sum((seen - other) ** 2))
-            turned, _, remains = _turn(seen, other)
-            # a turn has to earn its place beside an order alone
-            angle, sum_left = (0.0, without) if without < 2 * remains else (turned, remains)
-            if sum_left < _BETTER * best[0]:
-                best = sum_left, angle, order
-    if best[2] != tuple(range(sets)):
-        order_of = [int(k) + 1 for k in np.argsort(best[2])]
-        likely = f"looks like set_order = {order_of} in [registration]" + (
-            f" with clock_deg = {best[1] / DEGREE:.1f}" if best[1] else ""
-        )
-        if _is_mirror(best[2]):
-            likely += ", the mirror image of the sets"
+    best = _best_order(P, seen, tips) if tips is not None and 2 <= sets <= _MOST_SETS else None
+    if best is not None and best[0] < _BETTER * left:
+        order = [placed.set_order[k] if placed.set_order else int(k) + 1 for k in np.argsort(best[2])]
+        turned = f" with clock_deg = {best[1] / DEGREE:.1f}" if best[1] else ""
+        mirror = ", the mirror image of the sets" if _is_mirror(best[2]) else ""
+        likely = f"looks like set_order = {order} in [registration]{turned}{mirror}"
         yield Check("order of the sets: what another one leaves", best[0] / plain, (_BETTER, inf), _ANY, likely)
     else:
         limit = max(2.0, 4 * error / DEGREE)
+        if left > _BETTER * plain:  # a turn explains too little to be what is wrong
+            return
         likely = (
             f'the sets are turned about the base\'s axis; [registration] clock_deg = {clock / DEGREE:.1f}, or "fit"'
         )
         yield Check("clock of the sets", clock / DEGREE, (-limit, limit), _ANY, likely, "deg")
+
+
+def _best_order(P: Array, seen: Array, tips: Tips) -> tuple[float, float, tuple[int, ...]] | None:
+    """Return the squares left by the best order of the sets, with the turn about z that it needs, and the order.
+
+    Several orders with turns of their own are the same robot; one that needs no turn comes first.
+    """
+    found: list[tuple[float, float, tuple[int, ...]]] = []
+    for order in permutations(range(P.shape[1])):
+        other = tips(P[:, list(order)])
+        if np.isfinite(other).all():
+            turned, _, remains = _turn(seen, other)
+            found += [(remains, turned, order), (float(np.sum((seen - other) ** 2)), 0.0, order)]
+    if not found:
+        return None
+    least = min(squares for squares, _, _ in found)
+    return min((one for one in found if one[0] <= 2 * least), key=lambda one: (one[1] != 0, one[0]))
 
 
 def _is_mirror(order: Sequence[int]) -> bool:

@@ -1,0 +1,175 @@
+"""Tensile tests as machines write them: the right modulus or a question, and each wrong reading by its name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from laboratory_files import FOLDER, SPECIMEN, check_of, imported
+
+from softnlp.cli import main
+from softnlp.laboratory.choices import AskError
+from softnlp.laboratory.signals import break_row, legs
+
+
+def modulus(**settings: object) -> float:
+    """Return the neo-Hookean modulus [MPa] of what an import gives."""
+    file = str(settings.pop("file"))
+    found = imported(file, **settings).columns
+    reduced = found["stretch"] - found["stretch"] ** -2
+    return float(reduced @ found["stress_MPa"] / (reduced @ reduced))
+
+
+@pytest.mark.parametrize(
+    ("file", "settings", "truth"),
+    [
+        ("utm_units_row_quoted.csv", SPECIMEN, 0.03),
+        ("utm_preamble_kN_percent.csv", {}, 0.03),
+        ("utm_cyclic.csv", SPECIMEN, 0.03),
+        ("utm_cyclic.csv", {**SPECIMEN, "cycle": 2}, 0.026),
+        ("utm_cyclic.csv", {**SPECIMEN, "cycle": "unloading"}, 0.0243),
+        ("utm_to_failure_four_columns.csv", {}, 0.03),
+        ("stretch_stress_no_unit.csv", {"unit__stress": "kPa"}, 0.03),
+        ("utm.xlsx", {"gauge_length_mm": 25}, 0.03),
+    ],
+)
+def test_the_modulus_is_the_true_one(file: str, settings: dict[str, object], truth: float) -> None:
+    assert modulus(file=file, **settings) == pytest.approx(truth, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("file", "asked"),
+    [
+        ("utm_units_row_quoted.csv", ("gauge_length_mm", "area_mm2")),
+        ("utm_cyclic.csv", ("gauge_length_mm", "area_mm2")),
+        (
+            "stretch_stress_no_unit.csv",
+            ("in kPa the shear modulus is 0.03", "unit.stress=kPa", "which no silicone has"),
+        ),
+        ("utm.xlsx", ("gauge_length_mm",)),
+    ],
+)
+def test_what_is_missing_is_asked_all_at_once(file: str, asked: tuple[str, ...]) -> None:
+    with pytest.raises(AskError) as error:
+        imported(file)
+    assert all(word in str(error.value) for word in asked)
+
+
+def test_guesses_have_reasons() -> None:
+    found = imported("utm_to_failure_four_columns.csv")
+    guesses = {guess.key: (guess.value, guess.reason) for guess in found.choices.guesses}
+    assert guesses["unit.strain"] == ("1", "ln(1 + strain) is then the column of true strain")
+    assert guesses["stretch"][0] == [1.0, 2.0]
+    assert found.numbers["break_at_stretch"] == pytest.approx(8.840367892976587)
+    assert found.choices.dropped["points after the break"] == 6
+
+
+def test_cycles_are_told_apart() -> None:
+    found = imported("utm_cyclic.csv", **SPECIMEN)
+    assert found.numbers["loadings"] == 4
+    assert found.numbers["hysteresis"] == pytest.approx(0.2, abs=0.005)
+    assert found.numbers["first_cycle_loss"] == pytest.approx(1 - 0.026 / 0.03, abs=0.005)
+    assert check_of(imported("utm_cyclic.csv", **SPECIMEN, cycle="all"), "load cycles taken as one test").value == 4
+
+
+def test_crosshead_and_strain_are_compared() -> None:
+    found = imported("utm_preamble_kN_percent.csv", gauge_length_mm=25)
+    check = check_of(found, "crosshead strain over the strain taken")
+    assert check.verdict == "warned"
+    assert check.value == pytest.approx(0.82, abs=0.001)
+
+
+def machine(tmp_path: Path, header: str, rows: object) -> str:
+    """Write a file of a machine and return its name."""
+    path = tmp_path / "machine.csv"
+    np.savetxt(path, np.asarray(rows), delimiter=",", header=header, comments="", fmt="%.8g")
+    return str(path)
+
+
+STRETCH = np.linspace(1, 2.2, 61)
+STRESS = 0.03 * (STRETCH - STRETCH**-2)  # [MPa]
+
+
+def test_side_by_side_specimens(tmp_path: Path) -> None:
+    one = np.column_stack([25 * (STRETCH - 1), 8 * STRESS])
+    file = machine(tmp_path, "Extension (mm),Load (N),Extension (mm),Load (N)", np.hstack([one, one * [1, 1.1]]))
+    assert imported(file, **SPECIMEN).rows == 122
+    assert modulus(file=file, **SPECIMEN, specimen=2) == pytest.approx(0.033, rel=1e-3)
+
+
+def test_toe_tare_and_preload(tmp_path: Path) -> None:
+    moved = 25 * (STRETCH - 1)
+    slack = machine(tmp_path, "Extension (mm),Load (N)", np.column_stack([moved + 3, 8 * STRESS]))
+    with pytest.raises(AskError, match="slack specimen"):
+        imported(slack, **SPECIMEN)
+    taut = imported(slack, gauge_length_mm=25, area_mm2=8, toe=1.12)
+    assert taut.columns["stretch"][0] == pytest.approx(1.0)
+    tared = machine(tmp_path, "Extension (mm),Load (N)", np.column_stack([moved, 8 * STRESS + 0.05]))
+    assert modulus(file=tared, **SPECIMEN, tare=0.05) == pytest.approx(0.03, rel=1e-3)
+    assert modulus(file=tared, **SPECIMEN, tare="start") == pytest.approx(0.03, rel=1e-3)
+    assert imported(tared, **SPECIMEN, tare=0.05, preload_N=0.005).columns["stretch"][0] == 1.0
+
+
+WRONG = {
+    "kN as N": ("Extension (mm),Load (N)", {**SPECIMEN}, "shear modulus of the data is 3e-05"),
+    "kPa as MPa": ("Stretch,Stress (MPa)", {}, "stress in kPa"),
+    "percent as stretch": ("Stretch,Stress (MPa)", {}, "largest stretch is 120"),
+    "area of 1": (
+        "Extension (mm),Load (N),Stress (MPa)",
+        {"gauge_length_mm": 25},
+        "area of the machine's stress is 1 ",
+    ),
+    "preload": ("Extension (mm),Load (N)", {**SPECIMEN}, "preload that was not tared"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_reading_is_stopped_by_name(name: str, tmp_path: Path) -> None:
+    header, settings, message = WRONG[name]
+    moved, force = 25 * (STRETCH - 1), 8 * STRESS
+    rows = {
+        "kN as N": lambda: np.column_stack([moved, force * 1e-3]),
+        "kPa as MPa": lambda: np.column_stack([STRETCH, STRESS * 1e3]),
+        "percent as stretch": lambda: np.column_stack([100 * (STRETCH[1:] - 1), STRESS[1:]]),
+        "area of 1": lambda: np.column_stack([moved, force, force]),
+        "preload": lambda: np.column_stack([moved, force + 0.05]),
+    }[name]()
+    with pytest.raises(AskError, match=message):
+        imported(machine(tmp_path, header, rows), **settings)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("true", "true stress"),
+        ("cycles", "several load cycles"),
+        ("failure", "the points after the break is 5"),
+        ("area", "area left at 1"),
+    ],
+)
+def test_a_wrong_reading_of_a_renamed_file_is_warned_by_name(
+    name: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    four = np.loadtxt(FOLDER / "utm_to_failure_four_columns.csv", delimiter=";", skiprows=7)
+    cyclic = np.loadtxt(FOLDER / "utm_cyclic.csv", delimiter=",", skiprows=1)
+    header, rows = {
+        "true": ("strain,stress_MPa", four[four[:, 3] < 1.2][:, [3, 2]]),
+        "cycles": ("displacement_mm,force_N", cyclic[:, 1:3]),
+        "failure": ("strain,stress_MPa", four[:, 3:5]),
+        "area": ("stretch,stress_MPa,force_N", np.column_stack([STRETCH, 8 * STRESS, 8 * STRESS])),
+    }[name]
+    machine(tmp_path, header, rows)
+    sizes = "gauge_length_mm = 25\nwidth_mm = 4\nthickness_mm = 2\n" if name == "cycles" else ""
+    text = f'study = "identify"\n[tensile]\nfile = "machine.csv"\nlaws = ["neo-hookean"]\n{sizes}'
+    (tmp_path / "test.toml").write_text(text)
+    main(["identify", str(tmp_path / "test.toml"), "--out", str(tmp_path / "out")])
+    said = capsys.readouterr()
+    assert message in said.out + said.err
+
+
+def test_legs_and_breaks() -> None:
+    rise, fall = np.linspace(0, 1, 30), np.linspace(1, 0, 30)
+    assert [leg.rising for leg in legs(np.concatenate([rise, fall, rise, fall]))] == [True, False, True, False]
+    assert break_row(np.concatenate([rise, [0.01, 0.0]])) == 29
+    assert break_row(rise) == 30

@@ -1,0 +1,125 @@
+"""Trackers and loggers: frames, quaternions, missing rows, gauge pressures, the lag between clocks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from laboratory_files import FOLDER, TRUTH, check_of, imported
+from scipy.spatial.transform import Rotation
+
+from softnlp.laboratory.choices import AskError
+from softnlp.laboratory.signals import lag_between, plateaus
+
+EM = TRUTH["tracker_em_two_sensors.csv"]
+BASE = {"frame": "base sensor", "base_sensor_mm": [-30, 0, 0], "tip_offset_mm": EM["tip_offset_mm"]}
+GIVEN = {
+    "rotation_world_from_base_quat_xyzw": EM["rotation_world_from_base_quat_xyzw"],
+    "translation_mm": EM["translation_mm"],
+    "tip_offset_mm": EM["tip_offset_mm"],
+}
+AXES = ("x_mm", "y_mm", "z_mm")
+
+
+def tips(found: object) -> np.ndarray:
+    """Return the tips of an import."""
+    return np.column_stack([found.columns[name] for name in AXES])  # type: ignore[attr-defined]
+
+
+def test_both_trackers_give_the_same_tips_with_the_rest_tip_on_the_axis() -> None:
+    em = imported("tracker_em_two_sensors.csv", **BASE)
+    optical = imported("tracker_optical_states.csv", **GIVEN)
+    np.testing.assert_allclose(tips(em), tips(optical), atol=0.02)
+    for found in (
+        em,
+        optical,
+        imported("tracker_optical_states.csv", frame="rest", length_mm=60, tip_offset_mm=[3, -1, 8]),
+    ):
+        np.testing.assert_allclose(np.median(tips(found)[:19], axis=0), [0, 0, 60], atol=0.2)
+        assert found.choices.dropped == {"rows in which the sensor was not seen": EM["missing_rows"]}
+        assert check_of(found, "lost share").value == pytest.approx(0.05)
+
+
+def test_the_frame_of_a_file_with_a_base_sensor_is_asked() -> None:
+    with pytest.raises(AskError, match=r"frame='base sensor'.*frame=given"):
+        imported("tracker_em_two_sensors.csv")
+
+
+def test_a_wrong_order_of_a_quaternion_is_noticed() -> None:
+    found = imported("tracker_em_two_sensors.csv", **BASE, quaternion="xyzw", length_mm=60)
+    assert "quaternion=wxyz" in check_of(found, "quaternion order").message
+    assert check_of(found, "rest tip, away from (0, 0, length)").verdict == "warned"
+    assert check_of(imported("tracker_em_two_sensors.csv", **BASE), "quaternion order").verdict == "passed"
+
+
+def test_metres_and_an_upward_y(tmp_path: Path) -> None:
+    found = imported("tracker_optical_states.csv", **GIVEN)
+    turn = Rotation.from_rotvec([-np.pi / 2, 0, 0])  # z up to y up
+    q = np.column_stack([found.columns[name] for name in ("qx", "qy", "qz", "qw")])
+    rows = np.column_stack([turn.apply(tips(found)) / 1e3, (turn * Rotation.from_quat(q)).as_quat()])
+    np.savetxt(tmp_path / "m.csv", rows, delimiter=",", header="x,y,z,qx,qy,qz,qw", comments="", fmt="%.9f")
+    again = imported(str(tmp_path / "m.csv"), up="y")
+    assert again.choices.used["unit.position"] == "m"
+    np.testing.assert_allclose(tips(again), tips(found), atol=1e-4)
+
+
+def test_a_log_becomes_gauge() -> None:
+    found = imported("pressure_log_mbar_absolute.csv")
+    assert (found.choices.used["unit.pressure"], found.choices.used["zero"]) == ("mbar", "absolute")
+    P = np.column_stack([found.columns[f"p{k}_bar"] for k in (1, 2, 3)])
+    assert np.abs(P[:4]).max() < 0.01
+    np.testing.assert_allclose(P[7:11, 0], 1.0, atol=0.01)
+    assert check_of(found, "offset between two clocks of a file").value == pytest.approx(0.35, abs=0.01)
+
+
+@pytest.mark.parametrize("other", ["force_torque_counts.csv", "daq.lvm"])
+def test_the_lag_between_two_files(other: str) -> None:
+    files = (other, "pressure_log_mbar_absolute.csv")
+    found = imported(*(files if other.startswith("force") else reversed(files)))
+    assert found.numbers["lag_s"] == pytest.approx(TRUTH["pressure_log_mbar_absolute.csv"]["clock_offset_s"], abs=0.05)
+
+
+def test_forces_lose_their_bias_and_take_the_pressures_of_plateaus() -> None:
+    alone = imported("force_torque_counts.csv")
+    np.testing.assert_allclose(alone.choices.used["tare_N"], TRUTH["force_torque_counts.csv"]["bias_N"], atol=0.01)
+    both = imported("force_torque_counts.csv", "pressure_log_mbar_absolute.csv")
+    np.testing.assert_allclose(both.columns["fx_N"], -0.9 * both.columns["p1_bar"], atol=0.01)
+    assert both.rows == 11
+
+
+def test_a_log_without_header_and_one_of_labview() -> None:
+    names = ["t_ms", "p1_V", "p2_V"]
+    with pytest.raises(AskError, match="calibration"):
+        imported("pressure_log_no_header.csv", columns=names)
+    found = imported("pressure_log_no_header.csv", columns=names, calibration=[0.5, 0.8])
+    assert np.max(found.columns["p1_bar"]) == pytest.approx(2.0)
+    lvm = imported("daq.lvm")
+    assert list(lvm.columns) == ["t_s", "p1_bar", "p2_bar"]
+    assert lvm.columns["t_s"][-1] == pytest.approx(2.19)
+
+
+def test_a_mat_file_holds_pressures_and_tips() -> None:
+    found = imported("workspace_v5.mat")
+    assert list(found.columns) == ["p1_bar", "p2_bar", "p3_bar", *AXES]
+    np.testing.assert_allclose(tips(found)[0], [0, 0, 60], atol=0.1)
+
+
+def test_a_pointer_is_named() -> None:
+    with pytest.raises(Exception, match="Git LFS pointer to a file of 12345 bytes"):
+        imported("lfs_pointer.csv")
+
+
+def test_plateaus_and_lags_of_a_known_signal() -> None:
+    random = np.random.default_rng(0)
+    levels = np.repeat(random.uniform(0, 1, (10, 2)), 20, axis=0)
+    time = 0.05 * np.arange(200)
+    response = levels @ random.uniform(-1, 1, (2, 3)) + random.normal(0, 1e-3, (200, 3))
+    assert [len(rows) for rows in plateaus(response)] == [16] * 10
+    lag, error, quality = lag_between(time, response, time + 0.4, levels)
+    assert abs(lag - 0.4) <= max(error, 0.05)
+    assert quality > 0.99
+
+
+def test_files_of_the_folder_are_those_of_the_truth() -> None:
+    assert all((FOLDER / name).is_file() for name in TRUTH)

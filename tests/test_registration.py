@@ -1,0 +1,113 @@
+"""Registration: frame, sensor's place and clock, fitted together with the constants; wrong ones are named."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from laboratory_files import FOLDER, TRUTH
+from scipy.spatial.transform import Rotation
+
+from softnlp import BAR, Measurements, Numerics, compare, identify, material, robot
+from softnlp.studies.identified import Identified
+from softnlp.studies.registration import Registration
+from softnlp.studies.variants import Variant
+
+SILICONE = material("Ecoflex 00-50")
+NEWTON = Numerics(engine="newton")
+COLUMNS = ("p1_bar", "p2_bar", "p3_bar", "x_mm", "y_mm", "z_mm")
+
+
+def measured(name: str, order: tuple[int, ...] = (0, 1, 2), times: int = 1) -> Measurements:
+    """Return the rows of a file."""
+    table = np.genfromtxt(FOLDER / f"registration_{name}.csv", delimiter=",", names=True)
+    rows = np.tile(np.column_stack([table[column] for column in COLUMNS]), (times, 1))
+    tips = 1e-3 * rows[:, 3:]
+    return Measurements(robot("D25L60"), BAR * rows[:, list(order)], tip_position=tips, sigma={"tip_position": 3e-4})
+
+
+def found(
+    name: str, registration: Registration | None = None, numerics: Numerics | None = None, **how: Any
+) -> Identified:
+    """Identify k_e and k_b from the rows of a file."""
+    rows = measured(name, **how)
+    return identify(rows, SILICONE, ["k_e", "k_b"], registration=registration, numerics=numerics)
+
+
+WORLD = Registration(fit=("frame", "tip_offset"))
+
+
+def test_frame_place_and_constants_are_found_together() -> None:
+    fit, truth = found("world", WORLD, Numerics()), TRUTH["registration_world.csv"]
+    errors = fit.uncertainty.standard_errors
+    assert np.all(errors[:2] < [0.03, 0.05])
+    assert np.all(np.abs(fit.constants[:2] - [truth["k_e"], truth["k_b"]]) < 2 * errors[:2])
+    assert fit.registration is not None
+    np.testing.assert_allclose(1e3 * np.asarray(fit.registration.tip_offset), truth["tip_offset_mm"], atol=0.5)
+    np.testing.assert_allclose(1e3 * np.asarray(fit.registration.translation), truth["translation_mm"], atol=0.6)
+    R = Rotation.from_euler("ZYX", truth["euler_ZYX_deg"], degrees=True)
+    assert (R.inv() * Rotation.from_matrix(fit.registration.rotation)).magnitude() < np.deg2rad(1)
+    assert fit.ipopt is not None  # it closed the joint problem
+
+
+def test_the_same_rows_ten_times_change_nothing() -> None:
+    once, often = found("world", WORLD), found("world", WORLD, times=10)
+    np.testing.assert_allclose(often.constants, once.constants, atol=1e-6)
+    np.testing.assert_allclose(often.uncertainty.standard_errors, once.uncertainty.standard_errors, rtol=1e-4)
+
+
+def test_the_clock_is_named_and_found() -> None:
+    named = [check for check in found("clock_30deg").checks if check.verdict == "warned"]
+    clock = next(check for check in named if check.name == "clock of the sets")
+    assert clock.value == pytest.approx(30, abs=1)
+    fit = found("clock_30deg", Registration(fit=("clock",)))
+    assert np.rad2deg(fit.constants[2]) == pytest.approx(30, abs=0.3)
+    assert not [check for check in fit.checks if check.verdict != "passed"]
+
+
+def test_a_mirrored_order_is_named_and_corrected() -> None:
+    swapped = found("none", order=(1, 0, 2))
+    message = next(check.message for check in swapped.checks if check.name.startswith("order"))
+    assert "set_order = [2, 1, 3]" in message
+    assert "mirror" in message
+    assert swapped.problems  # constants at their bounds
+    ordered = Registration(set_order=(2, 1, 3)).ordered(np.array([[1.0, 2.0, 3.0]]))
+    np.testing.assert_array_equal(ordered, [[2.0, 1.0, 3.0]])
+
+
+def test_a_right_frame_passes_every_check_and_a_wrong_origin_is_named() -> None:
+    assert all(check.verdict == "passed" for check in found("none").checks)
+    given = measured("none")
+    moved = Measurements(given.robot, given.pressure, tip_position=given.tip_position + np.array([2e-3, 0, 0]))
+    rest = next(
+        c for c in identify(moved, SILICONE, ["k_e", "k_b"], numerics=NEWTON).checks if c.name.startswith("rest tip")
+    )
+    assert rest.verdict == "warned"
+
+
+def test_slopes_are_those_of_differences() -> None:
+    registration = Registration(rotation=Rotation.random(random_state=1).as_matrix(), fit=("frame", "tip_offset"))
+    function = registration.function()
+    random = np.random.default_rng(0)
+    p, turned, g = (
+        random.normal(size=3),
+        Rotation.random(random_state=2).as_matrix().ravel(order="F"),
+        random.normal(size=9),
+    )
+    parts = [np.asarray(part) for part in function(p, turned, g)]
+    for k, x in enumerate((p, turned, g)):
+        for j in range(len(x)):
+            step = np.zeros(len(x))
+            step[j] = 1e-6
+            low, high = ([p, turned, g] for _ in range(2))
+            low[k], high[k] = x - step, x + step
+            slope = (np.asarray(function(*high)[0]) - np.asarray(function(*low)[0])).ravel() / 2e-6
+            np.testing.assert_allclose(parts[k + 1][:, j], slope, atol=1e-8)
+
+
+def test_a_comparison_is_in_the_frame_that_was_measured_in() -> None:
+    fit = found("world", WORLD)
+    variant = Variant(fit.material, fit.coefficients, named="scenario")
+    apart = compare(measured("world"), variant, registration=WORLD)
+    assert apart.statistics(0, "tip_position").rmse == pytest.approx(fit.errors()["tip_position"].rmse, rel=1e-4)
