@@ -83,6 +83,7 @@ if TYPE_CHECKING:
     from softnlp.studies.identify import identify as identify
     from softnlp.studies.inverse import inverse as inverse
     from softnlp.studies.measurements import Measurements as Measurements
+    from softnlp.studies.registration import Registration as Registration
     from softnlp.studies.report import sensitivity_report as sensitivity_report
     from softnlp.studies.sensitivity import sensitivities as sensitivities
     from softnlp.studies.sensitivity import tip_compliance as tip_compliance
@@ -127,6 +128,7 @@ _HOMES = {
     "studies.identify": ("identify",),
     "studies.inverse": ("inverse",),
     "studies.measurements": ("Measurements",),
+    "studies.registration": ("Registration",),
     "studies.report": ("sensitivity_report",),
     "studies.sensitivity": ("sensitivities", "tip_compliance", "tip_jacobian"),
     "studies.tensile": ("fit_tensile",),

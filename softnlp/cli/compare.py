@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
-from softnlp.cli.study import Json, results_folder, show, write_results
+from softnlp.cli.report import Report, write_report
+from softnlp.cli.study import Json, require_file, results_folder, show, write_results
 from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ def compare(
     shape: str = "free",
     out: Path | None = None,
     json: Json = False,
+    report: Report = None,
 ) -> int:
     """Compare a model with measured tips, bending angles, elongations, tilts or blocked forces.
 
@@ -63,10 +65,16 @@ def compare(
     folder = results_folder(out, json, f"{scenario.stem}_compare")
     if folder is not None:
         require_free_names(task)
+    if report is not None:
+        require_file(report)
     found = _compared(task)
     document = document_text(comparison_document(task, found), compact=False)
     write, table = (lambda to: _write(to, task, found, document)), (lambda: _say(task, found))
     show(folder, json, write, lambda: document, table, gap="\n")
+    if report is not None:
+        from softnlp.figures.compare import figure_makers
+
+        write_report(report, asked, document, figure_makers(task, found), quiet=json)
     lost = sum(found.lost(v) for v in range(len(found.variants)))
     return SOME_UNSOLVED if lost else SOLVED
 

@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING
 
 from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, rich_text, say
-from softnlp.cli.study import Json, Out, results_folder, scenario_for, show, stepwise, stopped_after, write_results
+from softnlp.cli.report import Report, write_report
+from softnlp.cli.study import (
+    Json,
+    Out,
+    require_file,
+    results_folder,
+    scenario_for,
+    show,
+    stepwise,
+    stopped_after,
+    write_results,
+)
 
 if TYPE_CHECKING:
     from softnlp.scenario.read import Scenario
@@ -19,7 +30,9 @@ _MANY = 24  # candidates from which other processes are worth their start
 _TABLE_WIDTH = 110
 
 
-def design(scenario: Path, /, *, out: Out = None, json: Json = False, workers: int | None = None) -> int:
+def design(
+    scenario: Path, /, *, out: Out = None, json: Json = False, workers: int | None = None, report: Report = None
+) -> int:
     """Find the best design of a scenario of study "design".
 
     Prints a table and writes design.json, table.csv, best.toml (the best one as a scenario), figure.png, versions.json
@@ -36,15 +49,19 @@ def design(scenario: Path, /, *, out: Out = None, json: Json = False, workers: i
     asked = scenario_for(scenario, "design", "expected 'design', got {}; use softnlp run")
     if workers is not None and workers < 1:
         raise InputError(f"expected a number of at least 1, got {workers}", key="--workers")
-    return run_study(asked, out, json, workers)
+    return run_study(asked, out, json, report, workers)
 
 
-def run_study(asked: Scenario, out: Path | None, json: bool, workers: int | None = None) -> int:
+def run_study(
+    asked: Scenario, out: Path | None, json: bool, report: Path | None = None, workers: int | None = None
+) -> int:
     """Run a scenario of study "design"; see `design`."""
     from softnlp.results.design import design_json, design_lines
     from softnlp.scenario.design import finished_design, run_design
 
     folder = results_folder(out, json, asked.path.stem)
+    if report is not None:
+        require_file(report)
     total = asked.step_count
     if workers is None:
         workers = (os.cpu_count() or 1) if total >= _MANY else 1
@@ -55,6 +72,10 @@ def run_study(asked: Scenario, out: Path | None, json: bool, workers: int | None
         say(rich_text(done.title, design_lines(done), _TABLE_WIDTH))
 
     show(folder, json, lambda to: _write(done, to, asked), lambda: design_json(done), table)
+    if report is not None:
+        from softnlp.figures.design import design_figure
+
+        write_report(report, asked, design_json(done), {"Candidates": lambda: design_figure(done)}, quiet=json)
     if whole is None:
         return stopped_after(len(candidates), total, "candidates", folder)
     return SOLVED if done.best is not None else SOME_UNSOLVED

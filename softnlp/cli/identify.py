@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say, say_rows
-from softnlp.cli.study import Json, Out, Stopped, results_folder, scenario_for, show, write_results
+from softnlp.cli.report import Report, library_section, write_report
+from softnlp.cli.study import Json, Out, Stopped, require_file, results_folder, scenario_for, show, write_results
 from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 _GUESS = 40  # evaluations; nobody knows how many there will be
 
 
-def identify(scenario: Path, /, *, out: Out = None, json: Json = False) -> int:
+def identify(scenario: Path, /, *, out: Out = None, json: Json = False, report: Report = None) -> int:
     """Find constants from a tensile test or from measurements of robots, as a scenario of study "identify" asks.
 
     Prints the constants with their standard errors and what is left of the data; writes identified.json, table.csv,
@@ -32,19 +33,23 @@ def identify(scenario: Path, /, *, out: Out = None, json: Json = False) -> int:
     scenario
         TOML file; docs/identify.md lists what it may hold.
     """
-    return run_study(scenario_for(scenario, "identify", "expected 'identify', got {}; softnlp run runs it"), out, json)
+    return run_study(
+        scenario_for(scenario, "identify", "expected 'identify', got {}; softnlp run runs it"), out, json, report
+    )
 
 
-def run_study(asked: Scenario, out: Path | None, json: bool) -> int:
+def run_study(asked: Scenario, out: Path | None, json: bool, report: Path | None = None) -> int:
     """Identify what a scenario asks for, print it and write the results; return the exit status."""
     from softnlp.studies.measurements import TensileTask
 
     folder = results_folder(out, json, asked.path.stem)
     tensile = isinstance(asked.task, TensileTask)
-    return _tensile(asked, folder, json) if tensile else _robots(asked, folder, json)
+    if report is not None:
+        require_file(report)
+    return _tensile(asked, folder, json, report) if tensile else _robots(asked, folder, json, report)
 
 
-def _tensile(asked: Scenario, folder: Path | None, json: bool) -> int:
+def _tensile(asked: Scenario, folder: Path | None, json: bool, report: Path | None) -> int:
     from softnlp.results import identify_document as results
     from softnlp.results.document import document_text
     from softnlp.scenario.tensile import run_tensile
@@ -66,6 +71,13 @@ def _tensile(asked: Scenario, folder: Path | None, json: bool) -> int:
         write_results(to, asked, {"identified.json": document, **tables}, {"figure": figure})
 
     show(folder, json, write, lambda: document, lambda: _say_tensile(task, fit))
+    if report is not None:
+        from softnlp.figures import tensile_figure
+
+        figures = {"Laws and points": partial(tensile_figure, fit, task.name, task.before)}
+        best = fit.best.material if fit.best is not None else None
+        beside = [] if best is None else [library_section(best)]
+        write_report(report, asked, document, figures, beside, quiet=json)
     for problem in fit.problems:
         complain(f"{asked.path.name}: [tensile] {problem}")
     return SOME_UNSOLVED if fit.problems else SOLVED
@@ -100,7 +112,7 @@ def _say_tensile(task: TensileTask, fit: TensileFit) -> None:
         say(f"warning: {warning}")
 
 
-def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
+def _robots(asked: Scenario, folder: Path | None, json: bool, report: Path | None) -> int:
     from softnlp.base.status import Status
     from softnlp.results import identify_document as results
     from softnlp.results.document import document_text
@@ -126,6 +138,11 @@ def _robots(asked: Scenario, folder: Path | None, json: bool) -> int:
         write_results(to, asked, texts, figures if solved else {})
 
     show(folder, json, write, lambda: document, lambda: _say_robots(asked, found))
+    if report is not None:
+        from softnlp.figures import identified_figure
+
+        figures = {"Measured and model": partial(identified_figure, found, asked.title)} if solved else {}
+        write_report(report, asked, document, figures, [library_section(found.material)], quiet=json)
     for problem in found.problems:
         complain(f"{asked.path.name}: [measurements] {problem}")
     return SOLVED if solved and not found.problems else SOME_UNSOLVED

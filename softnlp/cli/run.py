@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, rich_text, say
 from softnlp.cli.figures import draw
-from softnlp.cli.study import Json, Out, results_folder, show, stepwise, stopped_after
+from softnlp.cli.report import Report, write_report
+from softnlp.cli.study import Json, Out, require_file, results_folder, show, stepwise, stopped_after
 from softnlp.model.contact_settings import ContactTask
 
 if TYPE_CHECKING:
@@ -29,7 +30,16 @@ _TABLE_WIDTH = 100
 _SET_WIDTH = 12  # of what each chamber set beyond the third adds to the table
 
 
-def run(scenario: Path, /, *, out: Out = None, json: Json = False, branches: int = 0, ipopt_log: bool = False) -> int:
+def run(
+    scenario: Path,
+    /,
+    *,
+    out: Out = None,
+    json: Json = False,
+    branches: int = 0,
+    ipopt_log: bool = False,
+    report: Report = None,
+) -> int:
     """Solve every step of a scenario file in order, each started from the last.
 
     Prints a table and writes results.nc, table.csv, results.json, versions.json, figure.png and a copy of the scenario.
@@ -52,19 +62,31 @@ def run(scenario: Path, /, *, out: Out = None, json: Json = False, branches: int
         asked = _with_log(asked)
     _require_branches(asked, branches)
     if asked.study in _COMMANDS:
-        return int(import_module(f"softnlp.cli.{_COMMANDS[asked.study]}").run_study(asked, out, json))
-    return run_steps(asked, out, json, branches)
+        study = import_module(f"softnlp.cli.{_COMMANDS[asked.study]}").run_study
+        if asked.study == "workspace":
+            if report is not None:
+                raise InputError("expected only for studies other than 'workspace'", key="--report")
+            return int(study(asked, out, json))
+        return int(study(asked, out, json, report))
+    return run_steps(asked, out, json, branches, report)
 
 
-def run_steps(asked: Scenario, out: Path | None, json: bool, branches: int = 0) -> int:
+def run_steps(asked: Scenario, out: Path | None, json: bool, branches: int = 0, report: Path | None = None) -> int:
     """Run a scenario whose study is a list of steps; see `run`."""
     from softnlp.results import json_text
     from softnlp.scenario.run import partial_run, solve_steps
 
     folder = results_folder(out, json, asked.path.stem)
+    if report is not None:
+        require_file(report)
     steps, whole = stepwise(asked, asked.step_count, lambda keep: solve_steps(asked, keep, branches))
     done = partial_run(asked, steps) if whole is None else whole
     show(folder, json, lambda to: _write(done, to, asked), lambda: json_text(done), lambda: say(_table(done)))
+    if report is not None:
+        from softnlp.figures import run_figure
+        from softnlp.results import view_of_run
+
+        write_report(report, asked, json_text(done), {"Shapes": lambda: run_figure(view_of_run(done))}, quiet=json)
     if whole is None:
         return stopped_after(len(steps), asked.step_count, "steps", folder)
     return SOME_UNSOLVED if done.failed else SOLVED

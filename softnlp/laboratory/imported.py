@@ -85,7 +85,7 @@ def told(check: Check) -> str:
 
 def slug(name: str) -> str:
     """Return the anchor of a check's heading."""
-    return "-".join("".join(c if c.isalnum() else " " for c in name.lower()).split())
+    return "-".join("".join(c if c.isalnum() else " " for c in name.lower().replace("'", "")).split())
 
 
 def require_possible(checks: Iterable[Check], choices: Choices) -> None:
