@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from math import inf
@@ -85,7 +86,7 @@ def told(check: Check) -> str:
 
 def slug(name: str) -> str:
     """Return the anchor of a check's heading."""
-    return "-".join("".join(c if c.isalnum() else " " for c in name.lower().replace("'", "")).split())
+    return "-".join(re.sub(r"[^\w\- ]", "", name.lower()).split())
 
 
 def require_possible(checks: Iterable[Check], choices: Choices) -> None:

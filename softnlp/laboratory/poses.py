@@ -19,7 +19,8 @@ from softnlp.laboratory.units import UNITS
 Array = NDArray[np.float64]
 
 _POSITION = re.compile(r"^(?:tip[ _.]?|pos(?:ition)?[ _.]?|t|p)?([xyz])(?:[ _.]?(\w{1,12}))?$", re.IGNORECASE)
-_QUATERNION = re.compile(r"^q(?:uat(?:ernion)?)?[ _.]?([ow0-4xyzrs])(?:[ _.]?(\w{1,12}))?$", re.IGNORECASE)
+_TURN = r"q(?:uat(?:ernion)?)?|rotation|orientation"
+_QUATERNION = re.compile(rf"^(?:{_TURN})[ _.]?([ow0-4xyzrs])(?:[ _.]?(\w{{1,12}}))?$", re.IGNORECASE)
 _PREFIXED = re.compile(r"^(.+?)[ _.:/]+(?:pos(?:ition)?[ _.:/]+)?(t?[xyz]|q[ow0-4xyz])$", re.IGNORECASE)
 _STATE = re.compile(r"state|status", re.IGNORECASE)
 _SEEN = ("ok", "valid", "visible", "tracked", "enabled", "good", "1", "true")
@@ -62,7 +63,7 @@ def pose_groups(table: RawTable) -> dict[str, tuple[list[int], list[int], str]]:
         repeat = seen[name.lower()]
         seen[name.lower()] += 1
         again = f"{repeat + 1}" if repeat else ""
-        if found := _PREFIXED.match(name):
+        if (found := _PREFIXED.match(name)) and not _POSITION.match(name) and not _QUATERNION.match(name):
             tool, plain = found[1], found[2]
         else:
             tool, plain = "", name
@@ -134,7 +135,7 @@ def _sensor(table: RawTable, name: str, group: tuple[list[int], list[int], str],
     columns = [in_si(table, k, "length", choices, "position") for k in places]
     raw = np.column_stack([table.columns[k] for k in places])
     q = np.column_stack([table.columns[k] for k in turns]) if turns else None
-    seen = np.all(np.isfinite(raw), axis=1) & _state(table)
+    seen = np.all(np.isfinite(raw), axis=1) & _state(table, min([*places, *turns]))
     if q is not None:
         norm = np.linalg.norm(np.nan_to_num(q), axis=1)
         seen &= np.isfinite(q).all(axis=1) & (norm > 0.5)
@@ -157,15 +158,18 @@ def _as_xyzw(q: Array, order: str) -> Array:
     return q[:, [order.index(letter) for letter in "xyzw"]]
 
 
-def _state(table: RawTable) -> NDArray[np.bool_]:
-    """Return in which rows the words of a state column say that the sensor was seen."""
-    seen = np.ones(table.rows, bool)
-    for k, name in enumerate(table.names):
-        if _STATE.search(name) and not table.is_number(k):
-            words = [str(cell).strip().lower() for cell in table.columns[k]]
-            if any(word in _SEEN for word in words):
-                seen &= np.array([word in _SEEN for word in words])
-    return seen
+def _state(table: RawTable, first: int) -> NDArray[np.bool_]:
+    """Return in which rows the words of the state column nearest to a sensor's first column say that it was seen."""
+    words = {
+        k: [str(cell).strip().lower() for cell in table.columns[k]]
+        for k, name in enumerate(table.names)
+        if _STATE.search(name) and not table.is_number(k)
+    }
+    telling = [k for k, cells in words.items() if any(cell in _SEEN for cell in cells)]
+    if not telling:
+        return np.ones(table.rows, bool)
+    nearest = min(telling, key=lambda k: abs(first - k))
+    return np.array([cell in _SEEN for cell in words[nearest]])
 
 
 def _scale(position: Array, table: RawTable, choices: Choices) -> float:

@@ -23,7 +23,7 @@ from softnlp.studies.plausibility import Check
 Array = NDArray[np.float64]
 
 _NAMES = r"^(p|pressure|press|druck|ch|chamber|valve|actuator|sensor)[ _#-]?\(?(\d+)\)?$"
-_COMMAND = r"set ?point|command|soll|target|desired|ref"
+_COMMAND = r"set ?point|set|command|cmd|soll|target|desired|ref"
 _ATMOSPHERE = (0.85, 1.08)  # [bar]: of the air where people live
 _HIGHEST = 6.0  # [bar]: what drives no silicone robot
 _UNITS = ("mbar", "kPa", "bar", "psi", "Pa")
@@ -31,7 +31,7 @@ _UNITS = ("mbar", "kPa", "bar", "psi", "Pa")
 
 def pressure_columns(table: RawTable) -> list[int]:
     """Return the columns of the sets, in the order of their numbers."""
-    found = table.named(_NAMES, _COMMAND)
+    found = table.named(_NAMES)
     found = [k for k in found if (unit := table.units[k]) is None or unit.kind in ("pressure", "other")]
 
     def number_of(k: int) -> int:
@@ -105,10 +105,26 @@ def pressures_of(table: RawTable, choices: Choices, timed: bool = True) -> tuple
         if names != [f"p{k + 1}" for k in range(len(names))]:
             choices.take("sets", names, "in this order they are p1_bar, p2_bar, …")
     values = _in_bar(table, chosen, choices)
+    checks += _command_checks(table, chosen, choices)
     gauge = _gauge(values, choices)
     known = np.all(np.isfinite(gauge), axis=1) & (np.isfinite(time) if time is not None else True)
     choices.drop(int(np.sum(~known)), "rows with a missing cell")
     return (None if time is None else time[known]), gauge[known], checks
+
+
+def _command_checks(table: RawTable, chosen: Sequence[int], choices: Choices) -> list[Check]:
+    """Return the check of measured pressures against their commands, where the log holds both [bar]."""
+    found = []
+    for k in chosen:
+        pattern = rf"^{re.escape(table.names[k])}[ _-]*({_COMMAND})$|^({_COMMAND})[ _-]*{re.escape(table.names[k])}$"
+        for j in table.named(pattern):
+            asked, given = (in_si(table, column, "pressure", choices, "pressure") for column in (j, k))
+            if asked is not None and given is not None:
+                found.append(float(np.nanpercentile(np.abs(asked - given), 90)) / BAR)
+    if not found:
+        return []
+    likely = "the regulator did not reach what was asked for, or another unit or order of the columns"
+    return [Check("pressure away from its command", max(found), (0, 0.05), ANY, likely, "bar")]
 
 
 def _in_bar(table: RawTable, chosen: Sequence[int], choices: Choices) -> Array:

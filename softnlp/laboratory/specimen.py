@@ -18,9 +18,10 @@ from softnlp.studies.plausibility import SHEAR_MODULUS, Check, area_check, divis
 
 Array = NDArray[np.float64]
 
-_DISPLACEMENT = r"extension|displac|crosshead|position|stroke|traverse|standardweg|^weg|elongation|verfahrweg"
-_FORCE = r"load|force|kraft|standardkraft|^f[yz]?$"
+DISPLACEMENT = r"extension|displac|crosshead|position|stroke|traverse|elongation|standardweg|^weg|verl[aä]ngerung"
+_FORCE = r"load|force|kraft|^last|^f[yz]?$"
 _STRAIN, _STRESS, _STRETCH = r"strain|dehnung", r"stress|spannung|^sigma", r"stretch|lambda"
+ALONG, ACROSS = rf"{DISPLACEMENT}|{_STRAIN}|{_STRETCH}", rf"{_STRESS}|{_FORCE}"
 _TRUE, _RATE = r"true|cauchy|wahre", r"rate|limit|pacing"
 _SAME = 0.02  # relative, of two columns that say the same
 _STRESS_UNITS = ("Pa", "kPa", "bar", "psi", "MPa")
@@ -111,7 +112,7 @@ def _stretch(table: RawTable, choices: Choices, missing: list[str]) -> tuple[Arr
     columns = {
         "stretch": one_column(table, "stretch", table.named(_STRETCH), choices),
         "strain": one_column(table, "strain", table.named(_STRAIN, f"{_TRUE}|{_RATE}"), choices),
-        "displacement": one_column(table, "displacement", table.named(_DISPLACEMENT, f"{_STRAIN}|{_RATE}"), choices),
+        "displacement": one_column(table, "displacement", table.named(DISPLACEMENT, f"{_STRAIN}|{_RATE}"), choices),
         "true strain": one_column(table, "true strain", table.named(rf"({_TRUE}).*({_STRAIN})"), choices),
     }
     known = [name for name, k in columns.items() if k is not None]

@@ -19,6 +19,7 @@ from softnlp.laboratory.units import Unit, split_unit, unit_named
 Array = NDArray[np.float64]
 
 SKIP = "-"
+_KINDS_OF_AXES = re.compile(r"^(position|rotation|orientation)$", re.IGNORECASE)
 _ONE_CELL = re.compile(r"^(.+?)\s*[:=]\s*([+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*(\S*)$")
 
 
@@ -95,6 +96,10 @@ def header_rows(before: Sequence[Sequence[str]], width: int, rows: Sequence[Sequ
     last = filled[-1]
     if len(filled) > 1 and any(last) and all(unit_named(c) is not None or not c for c in last):
         units, last = last, filled[-2]
+    above = filled[-3 if units else -2] if len(filled) > (2 if units else 1) else []
+    if len(set(last)) < len(last) and any(_KINDS_OF_AXES.search(cell) for cell in above):
+        # axes under the words rotation and position, as motion capture writes them
+        last = [f"{above[k]} {cell}".strip() if k < len(above) else cell for k, cell in enumerate(last)]
     if units == [] and len(last) > width:
         last = _joined(last, width)
     words = [c for c in last if c]
@@ -108,7 +113,7 @@ def _stripped(row: Sequence[str]) -> list[str]:
     cells = [cell.strip() for cell in row]
     while cells and not cells[-1]:
         cells.pop()
-    if cells and cells[0][:1] in "#%":
+    if cells and cells[0][:1] in ("#", "%"):
         cells[0] = cells[0].lstrip("#% ")
         if not cells[0]:
             cells.pop(0)

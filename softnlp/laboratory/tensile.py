@@ -14,7 +14,7 @@ from softnlp.base.units import MEGAPASCAL
 from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.imported import ANY, Imported, require_possible
 from softnlp.laboratory.signals import Leg, break_row, enclosed_area, legs
-from softnlp.laboratory.specimen import Curve, curve_of, specimens
+from softnlp.laboratory.specimen import ACROSS, ALONG, Curve, curve_of, specimens
 from softnlp.laboratory.table import RawTable
 from softnlp.studies.plausibility import Check, curve_checks
 
@@ -177,5 +177,4 @@ def _without_toe(stretch: Array, stress: Array, toe: object, choices: Choices) -
 
 def is_tensile(table: RawTable) -> bool:
     """Whether a table is of a testing machine: a stretch and a stress, or an extension and a force."""
-    along = bool(table.named(r"displac|extension|strain|stretch|dehnung|crosshead|traverse|standardweg"))
-    return along and bool(table.named(r"stress|force|load|kraft|spannung", r"rate|cell"))
+    return bool(table.named(ALONG)) and bool(table.named(ACROSS, r"rate|cell"))

@@ -61,6 +61,7 @@ _NO_SUFFIX = (
     "cycles",
     '"',
 )  # words that end a name
+_QUALIFIED = re.compile(r"\b(abs|absolute|gauge|rel|relative|g|a)\b\.?|\b(in)\b", re.IGNORECASE)
 _SUFFIX = re.compile(r"^(.*?)[ _]([^ _]+)$")
 
 
@@ -77,7 +78,7 @@ def split_unit(header: str) -> tuple[str, Unit | None]:
     """Return a column's name without its unit, and that; "Force (kN)", "Load [N]", "P_kPa", "ms since midnight"."""
     text = header.strip()
     if found := _BRACKETED.match(text):
-        inside = found[2].split(" since ")[0].split(",")[-1]
+        inside = _QUALIFIED.sub("", found[2].split(" since ")[0].split(",")[-1])
         if (unit := unit_named(inside)) is not None:
             return f"{found[1]} {found[3]}".strip(), unit
     found = _SUFFIX.match(text)
