@@ -41,12 +41,16 @@ def comparison_document(task: CompareTask, found: Comparison) -> dict[str, Any]:
         "best": _best(found),
         "variants": [_variant(task, found, v) for v in range(len(found.variants))],
         "notes": list(task.notes),
-        "registration": [
-            [None if s.registration is None else s.registration.table() for s in solved] for solved in found.simulated
-        ],
+        **({} if task.registration is None else {"registration": _registrations(found)}),
         "checks": [check.document() for check in comparison_checks(task, found)],
         "warnings": [*task.warnings, *messages(comparison_checks(task, found), "warned")],
     }
+
+
+def _registrations(found: Comparison) -> list[list[Any]]:
+    """Return [registration] of each variant and robot, with what was fitted."""
+    every = [[solved.registration for solved in simulated] for simulated in found.simulated]
+    return [[None if placed is None else placed.table() for placed in row] for row in every]
 
 
 def _named(found: Comparison, v: int) -> dict[str, Any]:

@@ -54,7 +54,7 @@ def tensile_document(asked: Scenario, task: TensileTask, fit: TensileFit) -> dic
         "best": None if best is None else best.law.name,
         "checks": [check.document() for check in fit.checks],
         "laws": [_law(f) for f in fit.fits.values()],
-        "notes": list(task.notes),
+        **({"notes": list(task.notes)} if task.notes else {}),
     }
 
 
@@ -166,7 +166,7 @@ def robot_document(asked: Scenario, task: RobotTask, found: Identified) -> dict[
         "measurements": [row for k in range(len(found.data)) for row in _rows(found, k)],
         "evaluations": found.evaluations,
         **engine_table(found.engine, found.ipopt),
-        "registration": None if found.registration is None else found.registration.table(),
+        **({} if found.registration is None else {"registration": found.registration.table()}),
         "checks": [check.document() for check in found.checks],
         "warnings": [*found.warnings, *messages(found.checks, "warned")],
     }

@@ -110,34 +110,39 @@ def _csv(text: str, sets: int) -> PressurePath:
     line, header = next(rows, (1, []))
     if not header:
         raise InputError(f"expected a header {_names(sets)} and rows of numbers, got an empty file")
-    columns = _columns(header, sets, line)
+    found, notes = _columns(header, sets, line)
+    used = sorted(found.values())
+    columns = {name: used.index(place) for name, place in found.items()}
+    names = [header[place] for place in used]
     values, lines = array("d"), array("l")
     for line, row in rows:
         if len(row) != len(header):
             raise InputError(f"line {line}: expected {len(header)} values as in the header, got {len(row)}")
+        cells = [row[place] for place in used] if len(used) < len(header) else row
         try:
-            values.extend(map(float, row))
+            values.extend(map(float, cells))
         except ValueError:
-            raise _not_a_number(line, header, row) from None
+            raise _not_a_number(line, names, cells) from None
         lines.append(line)
     if not lines:
         raise InputError("expected at least one row of numbers below the header, got none")
-    table = np.frombuffer(values).reshape(-1, len(header))
+    table = np.frombuffer(values).reshape(-1, len(used))
     if text.count("_") > sum(name.count("_") for name in header):  # Python reads 1_5 as 15
         for line, row in list(csv_rows(text))[1:]:
-            if any("_" in cell for cell in row):
-                raise _not_a_number(line, header, row)
+            if any("_" in row[place] for place in used):
+                raise _not_a_number(line, names, [row[place] for place in used])
     _require_possible(table, lines, columns)
     pressures = table[:, [columns[name] for name in columns if name != TIME_COLUMN]]
-    return _path(pressures, table[:, columns[TIME_COLUMN]].copy() if TIME_COLUMN in columns else None)
+    path = _path(pressures, table[:, columns[TIME_COLUMN]].copy() if TIME_COLUMN in columns else None)
+    return path._replace(notes=(*path.notes, *notes))
 
 
-def _columns(header: list[str], sets: int, line: int) -> dict[str, int]:
-    """Return the position of each column, pressures in the order of the sets."""
+def _columns(header: list[str], sets: int, line: int) -> tuple[dict[str, int], tuple[str, ...]]:
+    """Return the position of each column, pressures in the order of the sets, and a word on what looks like one."""
     names = [name.strip() for name in header]
     expected = [TIME_COLUMN, *(f"p{k}_bar" for k in range(1, sets + 1))]
     for name in names:
-        if name not in expected:
+        if name not in expected and (_is_set(name) or not set(expected[1:]) <= set(names)):
             if len(names) == 1 and (";" in name or "\t" in name):
                 raise InputError(f"line {line}: expected columns separated by commas, got {shown(name)}")
             hint = did_you_mean(name, expected)
@@ -147,7 +152,15 @@ def _columns(header: list[str], sets: int, line: int) -> dict[str, int]:
     for name in expected[1:]:
         if name not in names:
             raise InputError(f"line {line}: missing column {name!r}; expected a header {_names(sets)}")
-    return {name: names.index(name) for name in expected if name in names}
+    stems = {known.rpartition("_")[0].lower(): known for known in expected}
+    like = [(name, stems.get(name.rpartition("_")[0].lower())) for name in names if name not in expected]
+    notes = tuple(f"column {shown(name)} is not used, but {known!r}" for name, known in like if known in names)
+    return {name: names.index(name) for name in expected if name in names}, notes
+
+
+def _is_set(name: str) -> bool:
+    """Whether a column is of a chamber set, such as one that the robot does not have."""
+    return name.startswith("p") and name.endswith("_bar") and name[1:-4].isdecimal()
 
 
 def _require_possible(table: Array, lines: array[int], columns: dict[str, int]) -> None:

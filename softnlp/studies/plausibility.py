@@ -140,7 +140,8 @@ def curve_checks(stretch: Array, stress: Array) -> tuple[Check, ...]:
     ]
     top = int(np.argmax(stress))
     lost = (stretch > stretch[top]) & (stress < 0.5 * stress[top])
-    checks.append(Check("points after the break", float(np.sum(lost)), *UNLOADINGS, _BROKEN))
+    if np.any(lost):
+        checks.append(Check("points after the break", float(np.sum(lost)), *UNLOADINGS, _BROKEN))
     for more in (_beginning, _shear_modulus, _growth):
         if messages(tuple(checks), "failed"):
             break
