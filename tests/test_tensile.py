@@ -264,3 +264,33 @@ def test_a_law_that_is_no_material_ends_with_3_and_is_a_comment(tmp_path: Path) 
     document = json.loads((tmp_path / "o" / "identified.json").read_text())
     assert {law["status"] for law in document["laws"]} == {"unstable_material"}
     assert document["best"] is None
+
+
+def test_ogden_with_equal_exponents_falls_to_one_term() -> None:
+    stretch = np.linspace(1, 2, 41)
+    noise = np.random.default_rng(0).normal(0, 100, 41)
+    stress = 0.1e6 / 3 * (stretch**2 - stretch**-2.5) + noise
+    fit = fit_tensile(stretch, stress, ["ogden"]).fits["ogden"]
+    assert fit.constants["mu2"] == 0
+    assert fit.constants["mu1"] == pytest.approx(0.1e6 / 3, rel=0.01)
+    assert fit.constants["b1"] == pytest.approx(3, abs=0.05)
+    assert fit.status == "solved"
+    assert any("one term" in warning for warning in fit.warnings)
+
+
+def test_the_same_points_ten_times_do_not_shrink_the_errors() -> None:
+    stretch = np.linspace(1, 2, 41)
+    stress = 0.03e6 * (stretch - stretch**-2) + np.random.default_rng(0).normal(0, 300, 41)
+    once, often = (fit_tensile(np.tile(stretch, n), np.tile(stress, n), ["yeoh"]).fits["yeoh"] for n in (1, 10))
+    assert often.standard_errors == pytest.approx(once.standard_errors)
+
+
+def test_points_that_err_alike_count_as_fewer() -> None:
+    stretch = np.linspace(1, 2, 400)
+    alike = np.repeat(np.random.default_rng(0).normal(0, 300, 20), 20)
+    stress = 0.03e6 * (stretch - stretch**-2)
+    errors = [
+        fit_tensile(stretch, stress + noise, ["neo-hookean"]).fits["neo-hookean"].standard_errors["mu0"]
+        for noise in (alike, np.random.default_rng(1).permutation(alike))
+    ]
+    assert errors[0] > 3 * errors[1]

@@ -24,6 +24,7 @@ from softnlp.nlp.solver import FROM_SOLUTION, Engine, Ipopt
 Array = NDArray[np.float64]
 
 _EXPONENTS = (-20.0, -12.0, -8.0, -5.0, -3.0, -2.0, -1.0, -0.4, 0.4, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0)
+_EQUAL = 1e-2  # relative; exponents that differ by less are one
 _LARGEST_EXPONENT, _AT_BOUND = 40.0, 1 - 1e-6
 _FACTORS = (1.0, 0.2, 5.0, -1.0, 0.04, 25.0)  # of a start for a person's law
 _MOST_GRID, _STARTS_A_SIGN = 1296, 3
@@ -89,6 +90,27 @@ class LawCurve:
         stress, slopes = self.evaluate(stretch, found)
         others = slopes[:, ~self.linear]
         return found, stress - y, others - U @ (U.T @ others)
+
+
+def one_term(curve: LawCurve, stretch: Array, y: Array, c: Array) -> Array | None:
+    """Return constants of Ogden's law with one term, None where its two exponents differ.
+
+    Two terms of equal exponents are one: only the sum of their moduli is determined, and each grows without limit.
+    y : the stress (points,), in the unit that c gives.
+    """
+    if curve.law is not LAWS["ogden"] or any(curve.at_bound(c)) or abs(c[1] - c[3]) > _EQUAL * max(1.0, abs(c[1])):
+        return None
+    from scipy.optimize import minimize_scalar
+
+    def fitted(b: float) -> tuple[float, Array]:
+        shape = curve.evaluate(stretch, np.array([1.0, b, 0.0, b]))[0]
+        modulus = float(shape @ y / (shape @ shape))
+        return float(np.sum((modulus * shape - y) ** 2)), np.array([modulus, b, 0.0, b])
+
+    middle = float(c[1])
+    limits = middle - 2, middle + 2
+    done = minimize_scalar(lambda b: fitted(b)[0], bounds=limits, options={"xatol": 1e-10}, method="bounded")
+    return fitted(float(done.x))[1]
 
 
 def first_guesses(curve: LawCurve, start: Mapping[str, float] | None) -> list[Array]:

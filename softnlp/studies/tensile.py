@@ -20,7 +20,7 @@ from softnlp.model.materials import DENSITY, Material
 from softnlp.model.numerics import Numerics
 from softnlp.nlp.solver import Ipopt
 from softnlp.studies.fit_statistics import constant_note, determined, open_constants, repeats, uncertainty
-from softnlp.studies.law_curve import LawCurve, confirmed_constants, first_guesses, nearest_constants
+from softnlp.studies.law_curve import LawCurve, confirmed_constants, first_guesses, nearest_constants, one_term
 from softnlp.studies.plausibility import Check, curve_checks, law_checks, messages
 
 Array = NDArray[np.float64]
@@ -264,12 +264,15 @@ def _fit(
         raise InputError(f"law {law.name!r} has {len(names)} constants; got {x.size} points", key="stretch")
     size = float(np.max(np.abs(y)))
     c = nearest_constants(curve, x, y / size, size, first_guesses(curve, start))
+    single = one_term(curve, x, y, c)
+    c = c if single is None else single
     stress, slopes = curve.evaluate(x, c)
     residuals = stress - y
     constants = dict(zip(names, (float(v) for v in c * curve.units), strict=True))
     held = curve.at_bound(c)
     keys = [k.file_key for k in law.constants]
-    known = uncertainty(keys, slopes, residuals, held, repeats(x, y), serial=True)
+    fixed = held if single is None else [False, False, True, True]  # the second term is none
+    known = uncertainty(keys, slopes, residuals, fixed, repeats(x, y), serial=True)
     errors = dict(zip(names, (float(v) for v in known.standard_errors * curve.units), strict=True))
     total = float(np.sum((y - np.mean(y)) ** 2))
     fitted = (float(min(1.0, np.min(x))), float(np.max(x)))
@@ -289,9 +292,13 @@ def _fit(
         status="unstable_material",
         material=None,
         problem="",
-        warnings=(*known.warnings, *open_constants(keys, c, known.standard_errors, held)),
+        warnings=(
+            *known.warnings,
+            *open_constants(keys, c, known.standard_errors, held),
+            *(() if single is None else ("its two exponents are equal: one term describes the data, and mu2 is 0",)),
+        ),
     )
-    if numerics.engine != "newton":
+    if numerics.engine != "newton" and single is None:
         said, better = confirmed_constants(curve, x, y, size, c, dict(numerics.ipopt))
         fit = replace(fit, engine=numerics.engine, ipopt=said)
         least = float(residuals @ residuals)
