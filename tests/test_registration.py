@@ -27,9 +27,7 @@ def measured(name: str, order: tuple[int, ...] = (0, 1, 2), times: int = 1) -> M
     return Measurements(robot("D25L60"), BAR * rows[:, list(order)], tip_position=tips, sigma={"tip_position": 3e-4})
 
 
-def found(
-    name: str, registration: Registration | None = None, numerics: Numerics | None = None, **how: Any
-) -> Identified:
+def found(name: str, registration: Registration | None = None, numerics: Numerics = NEWTON, **how: Any) -> Identified:
     """Identify k_e and k_b from the rows of a file."""
     rows = measured(name, **how)
     return identify(rows, SILICONE, ["k_e", "k_b"], registration=registration, numerics=numerics)
