@@ -24,6 +24,7 @@ SIZES = ["--set", "gauge_length_mm=25", "--set", "area_mm2=8"]
         ["utm_to_failure_four_columns.csv"],
         ["force_torque_counts.csv", "pressure_log_mbar_absolute.csv"],
         ["daq.lvm"],
+        ["pressure_log_mbar_absolute.csv", "daq.lvm"],
         ["workspace_v5.mat"],
         ["tracker_em_two_sensors.csv", "--set", "registration.frame=base sensor", "--set", "base_sensor_mm=[-30,0,0]"],
     ],

@@ -19,11 +19,11 @@ _SHOWN = 5  # rows of the table that are printed
 
 
 def import_(
-    files: Annotated[tuple[Path, ...], Parameter(name="FILE")],
+    files: Annotated[tuple[Path, ...], Parameter(name="FILE")] = (),
     /,
     *,
     as_: Annotated[str | None, Parameter(name="--as")] = None,
-    set_: Annotated[tuple[str, ...], Parameter(name="--set", negative=())] = (),
+    set_: Annotated[tuple[str, ...], Parameter(name="--set", negative=(), consume_multiple=True)] = (),
     out: Path | None = None,
     force: bool = False,
     strict: bool = False,
@@ -41,7 +41,7 @@ def import_(
     as_
         tensile, pressure, tips or force; by default what the columns' names say.
     set_
-        A setting as KEY=VALUE, such as gauge_length_mm=25 or unit.stress=kPa; may be repeated.
+        Settings as KEY=VALUE, such as gauge_length_mm=25 or unit.stress=kPa; may be repeated.
         docs/import.md lists them.
     out
         Name for the results: NAME.csv, which scenarios take, and NAME.import.toml, which repeats the import.
@@ -54,7 +54,8 @@ def import_(
     from softnlp.laboratory.importing import import_files
     from softnlp.laboratory.recipe import SUFFIX, read_recipe, write_import
 
-    settings = settings_from_words(set_)
+    files += tuple(Path(word) for word in set_ if "=" not in word)  # --set takes all the words behind it
+    settings = settings_from_words(word for word in set_ if "=" in word)
     if len(files) == 1 and files[0].name.endswith(SUFFIX):
         recipe = read_recipe(files[0])
         if as_ not in (None, recipe.kind):

@@ -90,12 +90,17 @@ class Choices:
         """Return a setting, or the guess in its place, which is then kept with its reason."""
         value = self.get(key)
         if value is None:
-            if key in self.used and self.used[key] != guess:
-                self.varying.add(key)
-            value = self.used[key] = guess
+            value = guess
+            self.note(key, guess)
             if not any(known.key == key and known.value == guess for known in self.guesses):
                 self.guesses.append(Guess(key, guess, reason))
         return value
+
+    def note(self, key: str, value: Any) -> None:
+        """Keep what was decided; what differs from file to file is decided again by a repeated import."""
+        if key in self.used and self.used[key] != value:
+            self.varying.add(key)
+        self.used[key] = value
 
     def drop(self, count: int, reason: str) -> None:
         """Count rows that are left out."""

@@ -113,8 +113,8 @@ def text_table(label: str, content: bytes, choices: Choices) -> RawTable:
     encoding = encoding_of(content, choices)
     lines = _sample(content, encoding)
     block = _decided(lines, choices)
-    choices.used.setdefault("separator", SEPARATORS[block.dialect.separator])
-    choices.used.setdefault("decimal", "comma" if block.dialect.decimal == "," else "point")
+    choices.note("separator", SEPARATORS[block.dialect.separator])
+    choices.note("decimal", "comma" if block.dialect.decimal == "," else "point")
     before = [list(_split(line, block.dialect.separator)) for line in lines[: block.first]]
     header = header_rows(before, block.width, block.rows)
     width = max(block.width, len(header.names))
