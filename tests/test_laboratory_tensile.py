@@ -157,6 +157,7 @@ def test_a_wrong_reading_of_a_renamed_file_is_warned_by_name(
         "true": ("strain,stress_MPa", four[four[:, 3] < 1.2][:, [3, 2]]),
         "cycles": ("displacement_mm,force_N", cyclic[:, 1:3]),
         "failure": ("strain,stress_MPa", four[:, 3:5]),
+        "area alone": ("stretch,stress_MPa", np.column_stack([STRETCH, 8 * STRESS])),
         "area": ("stretch,stress_MPa,force_N", np.column_stack([STRETCH, 8 * STRESS, 8 * STRESS])),
     }[name]
     machine(tmp_path, header, rows)

@@ -16,7 +16,7 @@ from softnlp.laboratory.imported import ANY, Imported, require_possible
 from softnlp.laboratory.signals import Leg, break_row, enclosed_area, legs
 from softnlp.laboratory.specimen import ACROSS, ALONG, Curve, curve_of, specimens
 from softnlp.laboratory.table import RawTable
-from softnlp.studies.plausibility import Check, curve_checks
+from softnlp.studies.plausibility import Check, curve_checks, stiffness_checks
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ def import_tensile(tables: Sequence[RawTable], choices: Choices) -> Imported:
     if stretch.size < 3:
         raise InputError(f"{stretch.size} points are left, too few for a tensile test")
     checks = [*(check for curve in curves for check in curve.checks), *_cycle_checks(cycles, choices)]
-    checks += curve_checks(stretch, stress)
+    checks += [*curve_checks(stretch, stress), *stiffness_checks(stretch, stress)]
     require_possible(checks, choices)
     columns = {"stretch": stretch, "stress_MPa": stress / MEGAPASCAL}
     numbers["shear_modulus_MPa"] = next((c.value for c in checks if c.name == "shear modulus of the data"), np.nan)

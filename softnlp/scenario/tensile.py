@@ -21,7 +21,7 @@ from softnlp.scenario.data import Read, Scenario
 from softnlp.scenario.laboratory import import_notes, laboratory_columns
 from softnlp.scenario.schema import FileName, ImportSettings, Label, Positive, optional_keys, wrong
 from softnlp.studies.measurements import TensileTask
-from softnlp.studies.plausibility import Check, area_check, divisor_checks
+from softnlp.studies.plausibility import Check, area_check, divisor_checks, stiffness_checks
 
 if TYPE_CHECKING:  # imported where needed: to read a scenario takes none of them
     from softnlp.studies.tensile import LawFit, TensileFit
@@ -165,7 +165,8 @@ def _curve(columns: Columns, table: TensileTable, imported: bool) -> tuple[Array
     for row in np.flatnonzero(~(stretch > 0))[:1]:
         strain = "; strain goes in a column strain or strain_percent" if name == "stretch" else ""
         raise columns.wrong(int(row), name, f"expected a stretch above 0, got {stretch[row]:g}{strain}")
-    return stretch, stress / stretch if table.stress == "true" and not imported else stress, checks
+    stress = stress / stretch if table.stress == "true" and not imported else stress
+    return stretch, stress, (*checks, *stiffness_checks(stretch, stress))
 
 
 def _first(columns: Columns, known: Mapping[str, object]) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.units import MEGAPASCAL
+from softnlp.model.materials import load_materials
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]
@@ -32,6 +33,7 @@ _ERRORS = 3.0  # standard errors of a number by which its range is widened
 _FEWEST = 5  # points that a line is laid through
 _NEAR, _NEARER = 0.08, 0.1  # of extension, and of the largest: a test that begins within both tells of stretch 1
 _NOTHING = 1e-30  # [Pa], in place of a stress of 0
+_STIFF = 2.0  # times the stiffest silicone of the library
 _SAME = 0.02  # relative, of areas
 _TURN, _RESTART = 0.2, 0.1  # of the range of the stretch: the least fall; how near to its end another test starts
 _READINGS = (
@@ -193,6 +195,23 @@ def divisor_checks(force: Array, stress: Array, area: float | None = None) -> tu
     elif area is not None:
         usual = area * MEGAPASCAL * (1 - _SAME), area * MEGAPASCAL * (1 + _SAME)
     return (Check("area of the machine's stress", divisor, usual, possible, likely, "mm^2"),)
+
+
+def stiffness_checks(stretch: Array, stress: Array) -> tuple[Check, ...]:
+    """Return the check of a test that is far stiffer than every silicone of the library, none for another."""
+    reduced = _reduced(stretch)
+    with np.errstate(all="ignore"):
+        size = float(reduced @ stress / (reduced @ reduced))
+    models = (model for silicone in load_materials().values() for model in silicone.models.values())
+    ratio = size / max(float(model.shear_modulus(1.0)) for model in models)
+    if not (ratio > _STIFF and size < SHEAR_MODULUS[1][1] * MEGAPASCAL):
+        return ()
+    likely = (
+        "looks like a machine's stress over an area left at 1 mm^2, or another specimen; some silicones are so stiff"
+    )
+    return (
+        Check("shear modulus over that of the stiffest silicone of the library", ratio, (0, _STIFF), (0, inf), likely),
+    )
 
 
 def area_check(area: float) -> Check:
