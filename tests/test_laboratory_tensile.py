@@ -145,7 +145,8 @@ def test_a_wrong_reading_is_stopped_by_name(name: str, tmp_path: Path) -> None:
         ("true", "true stress"),
         ("cycles", "several load cycles"),
         ("failure", "the points after the break is 5"),
-        ("area", "area left at 1"),
+        ("area", "left at 1"),
+        ("area alone", "left at 1"),
     ],
 )
 def test_a_wrong_reading_of_a_renamed_file_is_warned_by_name(
