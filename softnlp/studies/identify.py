@@ -304,6 +304,7 @@ class _Fit:
         near = _AT_BOUND * np.maximum(self.free.scale, np.abs(x))
         low, high = x - self.free.lower < near, self.free.upper - x < near
         held = [bool(h) for h in low | high]
+        x = np.where(low, self.free.lower, np.where(high, self.free.upper, x))  # not a rounding beside a bound
         J, r = self.jacobian(last), self.residuals(last)
         known = uncertainty(self.free.names, J, r, held, repeated_numbers(self.data))
         units = np.array([unit for _, unit in self.keys])
