@@ -5,9 +5,10 @@ from __future__ import annotations
 import io
 import logging
 import tempfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from softnlp.laboratory.units import Unit, split_unit, unit_named
 
 Array = NDArray[np.float64]
 
+_HDF, _COMPRESSED, _HEADER = b"\x89HDF", 15, 128
 _MOST = 20_000_000  # numbers of one variable
 
 
@@ -66,7 +68,7 @@ def matlab_tables(label: str, content: bytes, choices: Choices) -> list[RawTable
     InputError
         For a file that is not valid, a variable that is an opaque object, links out of the file, and no numbers.
     """
-    hdf = not content.startswith(b"MATLAB 5")
+    hdf = _HDF in (content[:4], content[512:516])  # what the header says of the version is not always true
     try:
         found = _matlab_7(content) if hdf else _matlab_5(content)
     except InputError:
@@ -101,7 +103,11 @@ def _matlab_5(content: bytes) -> dict[str, Any]:
     """Return the variables of a MAT file of version 5; their sizes are looked at before any is read."""
     from scipy.io import loadmat, whosmat
 
-    listing = whosmat(io.BytesIO(content))
+    _refuse_growth(content)
+    try:
+        listing = whosmat(io.BytesIO(content))
+    except TypeError:  # it does not know the shape of a table
+        return _by_matio(content)
     plain = {"double", "single", "logical", "char", *(f"{s}int{n}" for s in ("", "u") for n in (8, 16, 32, 64))}
     for name, shape, _ in listing:
         if np.prod([float(n) for n in shape]) > _MOST:
@@ -110,6 +116,19 @@ def _matlab_5(content: bytes) -> dict[str, Any]:
         return _by_matio(content)
     names = [name for name, _, kind in listing if kind in plain]
     return dict(loadmat(io.BytesIO(content), variable_names=names)) if names else {}
+
+
+def _refuse_growth(content: bytes) -> None:
+    """Raise `InputError` for a file of version 5 whose compressed variables would take too much memory."""
+    order: Literal["little", "big"] = "little" if content[126:128] == b"IM" else "big"
+    at, left = _HEADER, 8 * _MOST
+    while at + 8 <= len(content):
+        kind, size = (int.from_bytes(content[at + k : at + k + 4], order) for k in (0, 4))
+        if kind == _COMPRESSED:
+            left -= len(zlib.decompressobj().decompress(content[at + 8 : at + 8 + size], max(1, left) + 1))
+        if left < 0:
+            raise InputError(f"its variables would hold more than {_MOST} numbers")
+        at += 8 + max(size, 0)
 
 
 def _matlab_7(content: bytes) -> dict[str, Any]:
