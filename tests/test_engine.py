@@ -349,13 +349,13 @@ def test_identified_constants_are_those_of_the_whole_program(loads: Loads) -> No
 
 def test_constants_that_ipopt_can_better_are_disputed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(identify_nlp, "_OF_ERROR", 0.0)
-    real = Engine.solve
+    real = Engine.closed
 
     def elsewhere(self: Engine, *given: Any, **more: Any) -> Any:
         found = real(self, *given, **more)
         return replace(found, x=found.x + (1e-3 if self.problem.free else 0.0))
 
-    monkeypatch.setattr(Engine, "solve", elsewhere)
+    monkeypatch.setattr(Engine, "closed", elsewhere)
     result = identify(measured(), ECOFLEX, ["k_b", "k_c"], contact=PRESSED, numerics=Numerics(intervals=3))
     assert result.status is Status.DISPUTED
     assert np.all(np.isnan(result.constants))

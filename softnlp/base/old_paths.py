@@ -57,6 +57,7 @@ _MERGED = {
     "studies.design": "studies.design_search",
     "studies.fields": "results.targets",
     "studies.identified": "studies.free_constants",
+    "studies.inverse_problem": "studies.inverse_nlp",
     "studies.measurements": "studies.identify_task",
     "studies.predicted": "studies.predicted_force studies.predicted_pose studies.trial",
     "studies.targets": "studies.aiming studies.inverse_task studies.tip_map",

@@ -139,12 +139,12 @@ def _definite(H: Array) -> Array:
 
 def nearest(
     measure: Map, start: Measured, limits: Limits, second: Array | None = None, *, measured_curvature: bool = True
-) -> tuple[Measured, Array | None, int]:
-    """Return the point of least sum of squares near a start, the curvature of its residuals, and the points measured.
+) -> tuple[Measured, Array | None]:
+    """Return the point of least sum of squares near a start, and the curvature of its residuals.
 
     second : curvature to begin with. measured_curvature : measure it where the residuals stay large.
     """
-    here, radius, spent = start, _FIRST_RADIUS, 0
+    here, radius = start, _FIRST_RADIUS
     slow = False
     for _ in range(_STEPS):
         size = float(np.linalg.norm(here.r))
@@ -152,7 +152,6 @@ def nearest(
             break
         if measured_curvature and slow and size > 1e-4:
             second = curvature(measure, here, here.r, limits)
-            spent += here.z.size
         g = here.J.T @ here.r
         H = _definite(here.J.T @ here.J + (0 if second is None else second))
         d = quadratic_step(H, g, *limits.rows(here.z, radius))
@@ -161,7 +160,6 @@ def nearest(
         if predicted <= 0.01 * _NOISE * size or length < 1e-12:
             break
         there = measure(limits.clip(here.z + d), here)
-        spent += 1
         gained = -np.inf if there is None else here.cost - there.cost
         # Where the target can be met, Gauss and Newton's steps soon leave little; where not, they need the curvature.
         slow = length < 0.9 * radius and gained < 0.75 * here.cost
@@ -173,23 +171,22 @@ def nearest(
             radius = length / 4
         if radius < _LEAST_RADIUS:
             break
-    return here, second, spent
+    return here, second
 
 
 def least_norm(
     measure: Map, start: Measured, limits: Limits, second: Array | None = None, *, measured_curvature: bool = True
-) -> tuple[Measured, Array | None, int]:
+) -> tuple[Measured, Array | None]:
     """Return the point of least |z| that keeps r = 0, near a start that has r = 0; otherwise as `nearest`.
 
     J must have full row rank. second : of the residuals weighed by their multipliers.
     """
-    here, radius, spent = start, _FIRST_RADIUS, 0
+    here, radius = start, _FIRST_RADIUS
     n = here.z.size
     multipliers: Array = np.zeros(here.r.size)
     for _ in range(_STEPS):
         if measured_curvature and np.any(multipliers):
             second = curvature(measure, here, multipliers, limits)
-            spent += n
         A, b = limits.rows(here.z, radius)
         back = quadratic_step(_definite(here.J.T @ here.J), here.J.T @ here.r, A, b)
         H = _definite(np.eye(n) + (0 if second is None else second))
@@ -202,7 +199,6 @@ def least_norm(
         if length < _ENOUGH:
             break
         there = measure(limits.clip(here.z + d), here)
-        spent += 1
         weight = 2 * float(np.max(np.abs(multipliers), initial=0.0)) + 1.0
 
         def merit(point: Measured, weight: float = weight) -> float:
@@ -213,4 +209,4 @@ def least_norm(
             radius = min(1.5 * radius, _LARGEST_RADIUS) if length > 0.9 * radius else radius
         else:
             radius = length / 4
-    return here, second, spent
+    return here, second

@@ -328,7 +328,7 @@ def _all_equations(cases: Sequence[Case], constraints: Sequence[Constraint]) -> 
 def _refuse_ill_posed(problem: CompiledProblem, has_objective: bool) -> None:
     """Raise `IllPosedError` where counting or the structure of the Jacobian shows that there is no isolated answer."""
     equal = problem.lower_g == problem.upper_g
-    J = problem.jacobian.sparsity_out(0)
+    J = ca.jacobian_sparsity(problem.nlp["g"], problem.nlp["x"])
     added = sum(c.expression.numel() for c in problem.constraints if c.is_equality)
     freed = problem.free_size
     free_text = ", ".join(f"{q.name} ({q.size})" for q in problem.free) or "nothing"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from softnlp.base.errors import IllPosedError, InputError, nearest
 from softnlp.base.status import Status
 from softnlp.nlp.optimality import not_optimal
-from softnlp.nlp.reduced import Reduced
+from softnlp.nlp.reduced import Reduced, held_states
 from softnlp.nlp.solver import FROM_SOLUTION, EquationResidual, Solution, certificate, outputs
 from softnlp.statics.case import pose_entries
 from softnlp.statics.chain import Chain
@@ -144,7 +144,11 @@ def solve(
         x = problem._start(values, start or {})
     square, options = compiled.is_square, dict(ipopt or {})
     if engine == "newton" and not square:
-        reduced = problem._kept("reduced", lambda: Reduced(compiled, linear_solver, problem.residuals))
+
+        def made() -> Reduced:
+            return Reduced(compiled, held_states(compiled, linear_solver), problem.residuals)
+
+        reduced = problem._kept("reduced", made)
         return _judged(problem, reduced.minimise(p, x), tolerance)
     if engine == "newton":
         return _judged(problem, problem._engine(newton_only=True).solve(p, x), tolerance)

@@ -161,7 +161,7 @@ class StretchSolver:
 
     def solve_many(self, x: Array, p: Array, G: Array) -> Array:
         """Return the columns dx (1, r). Raises `numpy.linalg.LinAlgError` at the end of the branch."""
-        slope = float(self._imbalance(p, x)[1])
+        slope = float(evaluated(self._imbalance, p, x)[1][0, 0])
         if not (np.isfinite(slope) and slope):
             raise np.linalg.LinAlgError("the slope of the stretch balance is zero or not finite")
         return -np.asarray(G) / slope
