@@ -157,7 +157,7 @@ def crossing(excess: Callable[[float], float], known: Sequence[tuple[float, floa
     def at(argument: float) -> float:
         if argument not in values:
             found = excess(argument)
-            values[argument] = 0.0 if abs(found) <= accuracy else found
+            values[argument] = found if abs(found) > accuracy else 0.0  # what is not a number ends it too
         return values[argument]
 
     low, high = (argument for argument, _ in known)

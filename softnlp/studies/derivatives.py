@@ -19,9 +19,9 @@ from softnlp.nlp.problem import CompiledProblem
 from softnlp.nlp.solver import Engine, Solution
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.joint import joint_solution
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
-from softnlp.studies.force_inversion import joint_solution
 
 Array = NDArray[np.float64]
 
