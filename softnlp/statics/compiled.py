@@ -16,12 +16,14 @@ from softnlp.model.quantities import Model
 from softnlp.model.tip import DEAD_LOADS, TipConditions
 from softnlp.statics.branch import branch_function
 from softnlp.statics.loadcase import RodFunctions, rod_functions
-from softnlp.statics.pose import shape_function
+from softnlp.statics.pose import Mapped, shape_function
+from softnlp.statics.single_shooting import SingleShooting, single_shooting
 from softnlp.statics.stability import MOST_INTERVALS, conjugate_points, transition_function
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
+_WORTH_COMPILING = 12  # poses
 MOST_GRIDS = 64
 """How many grids, and problems on grids, are kept of one rod."""
 
@@ -38,15 +40,34 @@ class RodEquations:
     declared: dict[str, Quantity]
     grids: dict[Hashable, Any] = field(default_factory=dict)
     _mapped: dict[int, ca.Function] = field(default_factory=dict)
+    _asked: list[int] = field(default_factory=lambda: [0])
 
     @cached_property
     def branch(self) -> ca.Function:
         """The stretch's branch, see `branch_function`; built at first use, as all that follows."""
         return branch_function(self.functions.model)
 
+    def single_shooting(self) -> SingleShooting | None:
+        """Return machine code for single poses, from when it pays: compiling it takes as long as some poses do.
+
+        None before, under other conditions than dead loads, and where there is nothing to compile with.
+        """
+        self._asked[0] += 1
+        if self._asked[0] <= _WORTH_COMPILING or self.functions.conditions is not DEAD_LOADS:
+            return None
+        return self._compiled
+
     @cached_property
-    def shape(self) -> ca.Function:
-        """The shape between nodes, see `shape_function`."""
+    def _compiled(self) -> SingleShooting | None:
+        return single_shooting(self.functions)
+
+    @property
+    def shape(self) -> Mapped:
+        """The shape between nodes, see `shape_function`; in machine code where that has been compiled."""
+        return self.__dict__.get("_compiled") or self._shape
+
+    @cached_property
+    def _shape(self) -> ca.Function:
         return shape_function(self.functions.field)
 
     @cached_property
