@@ -23,7 +23,8 @@ from softnlp.statics.stability import MOST_INTERVALS, conjugate_points, transiti
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
-_WORTH_COMPILING = 12  # poses
+_WORTH_COMPILING = 16  # poses
+_OF_A_POSE = 0.15  # that a shape takes
 MOST_GRIDS = 64
 """How many grids, and problems on grids, are kept of one rod."""
 
@@ -40,7 +41,7 @@ class RodEquations:
     declared: dict[str, Quantity]
     grids: dict[Hashable, Any] = field(default_factory=dict)
     _mapped: dict[int, ca.Function] = field(default_factory=dict)
-    _asked: list[int] = field(default_factory=lambda: [0])
+    _asked: list[float] = field(default_factory=lambda: [0.0])
 
     @cached_property
     def branch(self) -> ca.Function:
@@ -48,11 +49,15 @@ class RodEquations:
         return branch_function(self.functions.model)
 
     def single_shooting(self) -> SingleShooting | None:
-        """Return machine code for single poses, from when it pays: compiling it takes as long as some poses do.
+        """Return machine code for single poses, from when what was done without it has taken as long as to compile it.
 
         None before, under other conditions than dead loads, and where there is nothing to compile with.
         """
-        self._asked[0] += 1
+        return self._worth(1.0)
+
+    def _worth(self, poses: float) -> SingleShooting | None:
+        """Return it, counting what it would do this time: as much as for so many poses."""
+        self._asked[0] += poses
         if self._asked[0] <= _WORTH_COMPILING or self.functions.conditions is not DEAD_LOADS:
             return None
         return self._compiled
@@ -64,7 +69,7 @@ class RodEquations:
     @property
     def shape(self) -> Mapped:
         """The shape between nodes, see `shape_function`; in machine code where that has been compiled."""
-        return self.__dict__.get("_compiled") or self._shape
+        return self._worth(_OF_A_POSE) or self._shape
 
     @cached_property
     def _shape(self) -> ca.Function:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from softnlp.model.numerics import Numerics
 from softnlp.model.rod import STATE_SIZE
 from softnlp.nlp.solver import EquationResidual
-from softnlp.statics.grid_size import first_intervals, next_intervals
+from softnlp.statics.grid_size import first_intervals, most_intervals, next_intervals
 from softnlp.statics.pose_grid import HOPELESS, dearer
 from softnlp.statics.single_shooting import AtStretch, Shot, SingleShooting
 
@@ -37,7 +37,8 @@ def proposed(
         size = max(near.shape[1] - 1, first)
         if dearer(size, first):
             size = first
-    while size <= _MOST_INTERVALS:
+    most = min(_MOST_INTERVALS, most_intervals("multiple-shooting"))
+    while size <= most:
         shot = single.shoot(at, force, moment, size, start)
         if shot is None:
             return None

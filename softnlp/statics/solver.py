@@ -17,26 +17,17 @@ from softnlp.base.status import Status
 from softnlp.model.numerics import Numerics, Transcribing
 from softnlp.model.quantities import Model
 from softnlp.model.rod import STATE_SIZE, Loads
-from softnlp.nlp.solver import Solution, certificate, discretisation_correction, outputs
+from softnlp.nlp.solver import Solution, discretisation_correction
 from softnlp.statics.attempts import LOADS, Attempt, Goal, Neighbour, Work, attempts, from_near
 from softnlp.statics.branch import BranchPoint, stretch_on_branch
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.compiled import RodEquations, rod_equations
 from softnlp.statics.grid_size import first_intervals, most_intervals, next_intervals
 from softnlp.statics.loadcase import RodFunctions
-from softnlp.statics.pose import (
-    SHAPE_POINTS,
-    Mapped,
-    bending_angle,
-    between_nodes,
-    pose_of,
-    pose_warnings,
-    shape_of,
-    stability,
-)
+from softnlp.statics.pose import Mapped, between_nodes
 from softnlp.statics.pose_grid import HOPELESS, TIP, Grid, Solved, compiled_grid, dearer, iteration_cost
-from softnlp.statics.proposed import certificate as certificate_of
-from softnlp.statics.proposed import outputs_of, proposed, residual
+from softnlp.statics.pose_step import solved_step
+from softnlp.statics.proposed import proposed, residual
 from softnlp.statics.step import Step
 
 Array = NDArray[np.float64]
@@ -359,53 +350,15 @@ class PoseSolver:
         self, pressure: Array, loads: Loads, found: Solved, iterations: int, began: float
     ) -> tuple[Step, Solved | None]:
         """Let IPOPT close a solution, where it takes part, and return its step."""
-        if self.numerics.engine != "auto":
-            return self._finished(pressure, loads, found, iterations, began), found
-        grid = found.grid
-        try:
-            solution = closed(grid.reference, found.solution, self.numerics, TIP)
-        except DisputedError as error:
-            seconds = time.perf_counter() - began
-            return Step(pressure, Status.DISPUTED, str(error), iterations=iterations, solve_time=seconds), None
-        if solution is not found.solution:
-            nodes, constants = grid.nodes(solution.x), grid.constants(solution)
-            found = replace(found, solution=solution, nodes=nodes, constants=constants, shot=None)
-        return self._finished(pressure, loads, found, iterations, began), found
-
-    def _finished(self, pressure: Array, loads: Loads, solved: Solved, iterations: int, began: float) -> Step:
-        """Turn the solution of a pose into a step in SI units, with its certificate."""
-        solution = solved.solution
-        if solved.shot is not None:
-            at, _ = solved.shot
-            result, lines = outputs_of(*solved.shot), certificate_of(*solved.shot)
-            L_0, F_0, arc_tip = at.length_unit, at.force_unit, at.arc_tip
-        else:
-            problem = solved.grid.problem
-            result, lines = outputs(problem, solution), certificate(problem, solution)
-            L_0, F_0 = (float(v) for v in np.asarray(problem.units(solution.x, solution.p)).ravel())
-            arc_tip = np.asarray(self.functions.arc(solution.p, float(result["stretch"][0]), 1.0)).ravel()[:3]
-        s = np.linspace(0, 1, SHAPE_POINTS)
-        shape = shape_of(between_nodes(self.shape, solved.nodes, solved.constants, s), s, L_0, F_0)
-        bending = bending_angle(self.shape, solved.nodes, solved.constants)
-        pose = pose_of(self.model, result, shape, bending, arc_tip * L_0, stability(loads, solved.stable))
-        warnings = list(pose_warnings(self.model, pose))
-        if solved.error > self.numerics.accuracy:
-            warnings.append(
-                f"estimated discretisation error {solved.error:.2g} of the length is above the accuracy asked for with "
-                f'{solved.intervals} intervals; set [solver] intervals = "auto" or a larger number'
-            )
-        return Step(
-            pressure=pressure,
-            status=Status.SOLVED,
-            message=Status.SOLVED.advice,
-            pose=pose,
-            residual=solution.residual,
-            certificate=lines,
-            discretisation_error=solved.error,
-            intervals=solved.intervals,
-            iterations=iterations,
-            solve_time=time.perf_counter() - began,
-            warnings=tuple(warnings),
-            engine=self.numerics.engine,
-            ipopt=solution.ipopt,
-        )
+        if self.numerics.engine == "auto":
+            grid = found.grid
+            try:
+                solution = closed(grid.reference, found.solution, self.numerics, TIP)
+            except DisputedError as error:
+                seconds = time.perf_counter() - began
+                return Step(pressure, Status.DISPUTED, str(error), iterations=iterations, solve_time=seconds), None
+            if solution is not found.solution:
+                nodes, constants = grid.nodes(solution.x), grid.constants(solution)
+                found = replace(found, solution=solution, nodes=nodes, constants=constants, shot=None)
+        step = solved_step(self.equations, self.model, self.numerics, pressure, loads, found, iterations, began)
+        return step, found
