@@ -157,7 +157,8 @@ class SingleShooting:
         return self._between
 
     def _between(self, nodes: Array, constants: Array, h: Array) -> Array:
-        data = np.vstack([np.repeat(constants[:, None], h.size, axis=1), h])
+        column = np.asarray(constants).reshape(-1, 1)
+        data = np.vstack([np.repeat(column, h.size, axis=1), np.reshape(h, (1, -1))])
         ends = self._code.run_each("between", _SUBSTEPS, data, nodes)
         return np.vstack([ends, self._code.apply("strains", np.vstack([ends, data[:-1]]))])
 
