@@ -34,7 +34,7 @@ def first_intervals(transcription: str, constants: Array, moment: Array, arc_tar
     section, length = RodSection(*constants[:_LENGTH]), float(constants[_LENGTH])
     first = FIRST_INTERVALS[transcription]
     bent = section.pressure_moment_x / section.bending_x, section.pressure_moment_y / section.bending_y
-    curl = length * float(np.hypot(*bent))
+    curl = 100 * float(np.sin(0.01 * length * np.hypot(*bent)))  # of the axis, R e3, over the first hundredth
     # The dead tip moment alone would bend or twist the rod so far; half as finely: it is not there at first.
     turned = float(np.linalg.norm(moment)) * length / min(section.bending_x, section.bending_y, section.torsion)
     curl = max(curl, turned / 2)
