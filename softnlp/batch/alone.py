@@ -36,7 +36,7 @@ class Alone:
         model, pressure, loads = self._pose(column)
         plan = self.plan
         if plan.contact is None:
-            self._free = self._free or PoseSolver(plan.model, self._numerics)
+            self._free = self._free or PoseSolver(plan.model, self._numerics, by_machine=False)
             return self._free.with_model(model).solve(pressure, loads, near)
         self._blocked = self._blocked or BlockedSolver(plan.model, self._numerics, plan.contact)
         # from zero pressure: the neighbours in a chunk are not on the way to each other

@@ -16,12 +16,15 @@ from softnlp.model.quantities import Model
 from softnlp.model.tip import DEAD_LOADS, TipConditions
 from softnlp.statics.branch import branch_function
 from softnlp.statics.loadcase import RodFunctions, rod_functions
-from softnlp.statics.pose import shape_function
+from softnlp.statics.pose import Mapped, shape_function
+from softnlp.statics.single_shooting import SingleShooting, single_shooting
 from softnlp.statics.stability import MOST_INTERVALS, conjugate_points, transition_function
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
+_WORTH_COMPILING = 16  # poses
+_OF_A_POSE = 0.15  # that a shape takes
 MOST_GRIDS = 64
 """How many grids, and problems on grids, are kept of one rod."""
 
@@ -38,15 +41,38 @@ class RodEquations:
     declared: dict[str, Quantity]
     grids: dict[Hashable, Any] = field(default_factory=dict)
     _mapped: dict[int, ca.Function] = field(default_factory=dict)
+    _asked: list[float] = field(default_factory=lambda: [0.0])
 
     @cached_property
     def branch(self) -> ca.Function:
         """The stretch's branch, see `branch_function`; built at first use, as all that follows."""
         return branch_function(self.functions.model)
 
+    def single_shooting(self) -> SingleShooting | None:
+        """Return machine code for single poses, from when what was done without it has taken as long as to compile it.
+
+        None before, under other conditions than dead loads, and where there is nothing to compile with.
+        """
+        return self._worth(1.0)
+
+    def _worth(self, poses: float) -> SingleShooting | None:
+        """Return it, counting what it would do this time: as much as for so many poses."""
+        self._asked[0] += poses
+        if self._asked[0] <= _WORTH_COMPILING or self.functions.conditions is not DEAD_LOADS:
+            return None
+        return self._compiled
+
     @cached_property
-    def shape(self) -> ca.Function:
-        """The shape between nodes, see `shape_function`."""
+    def _compiled(self) -> SingleShooting | None:
+        return single_shooting(self.functions)
+
+    @property
+    def shape(self) -> Mapped:
+        """The shape between nodes, see `shape_function`; in machine code where that has been compiled."""
+        return self._worth(_OF_A_POSE) or self._shape
+
+    @cached_property
+    def _shape(self) -> ca.Function:
         return shape_function(self.functions.field)
 
     @cached_property

@@ -188,7 +188,8 @@ class Tips:
         grid = self.poses.grid(self.intervals)
         solution = Solution(point.states, program.reduced.fixed(point.theta, program.p), 0.0, 0, "")
         nodes = grid.nodes(point.states)
-        return Solved(grid, solution, nodes, nodes, grid.constants(solution), 0.0, 0.0, stable=True)
+        constants = grid.constants(solution)
+        return Solved(lambda: grid, self.intervals, solution, nodes, nodes, constants, 0.0, 0.0, stable=True)
 
     def nearest(self, program: Program, most: int | None = None, below: float = np.inf) -> list[Point]:
         """Return tips of a table over the limits, apart from each other, nearer than `below`, the nearest first."""
