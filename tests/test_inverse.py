@@ -19,8 +19,8 @@ from softnlp.model.conventions import COEFFICIENT_SETS, Coefficients
 from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.nlp.bounded import Limits, Measured, least_norm, nearest, quadratic_step
+from softnlp.nlp.places import spread
 from softnlp.nlp.reduced import Point
-from softnlp.nlp.search import spread
 from softnlp.results import load_run, to_json
 from softnlp.statics.solver import PoseSolver
 from softnlp.studies.derivatives import PoseDerivatives
@@ -346,7 +346,7 @@ def test_the_least_norm_stops_where_the_map_ends() -> None:
 
     start = _ring(np.array([1.0, 1.3]))
     limits = Limits(np.full(2, -2.0), np.full(2, 3.0), 10.0)
-    end, _ = least_norm(ends_here, start, limits, measured_curvature=False)
+    end, _ = least_norm(ends_here, start, limits, np.zeros((2, 2)))
     assert end is start
     lengths = [np.abs(z - start.z).max() for z in tried]
     assert all(b < a / 2 for a, b in pairwise(lengths))
@@ -367,8 +367,7 @@ def test_the_least_norm_without_curvature_has_it_nearly_when_its_steps_are_used_
 
     limits = Limits(np.full(2, -2.0), np.full(2, 3.0), 10.0)
     start = ring(centre + np.array([0.0, radius]))
-    end, second = least_norm(ring, start, limits, measured_curvature=False)
-    assert second is None
+    end, _ = least_norm(ring, start, limits, np.zeros((2, 2)))
     assert measured == 61
     assert end.r == pytest.approx([0], abs=1e-9)
     assert end.z == pytest.approx(centre * (1 - radius / np.linalg.norm(centre)), abs=1e-6)

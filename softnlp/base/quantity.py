@@ -48,13 +48,7 @@ class Quantity:
 
 
 def quantity(
-    name: str,
-    unit: str,
-    nominal: Any,
-    *,
-    scale: float = 1.0,
-    lower: Any = -_INF,
-    upper: Any = _INF,
+    name: str, unit: str, nominal: Any, *, scale: float = 1.0, lower: Any = -_INF, upper: Any = _INF
 ) -> Quantity:
     """Declare a quantity.
 

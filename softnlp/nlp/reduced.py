@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -145,15 +144,15 @@ class Reduced:
         return Measured(point.theta, (point.c - self.lower)[equal], point.c_slope[equal], point)
 
     def least_squares(
-        self, p: Array, start: Point, limits: Limits, unit: float = 1.0, **curvature: Any
-    ) -> tuple[Point, Array | None]:
+        self, p: Array, start: Point, limits: Limits, second: Array | None = None, unit: float = 1.0
+    ) -> tuple[Point, Array]:
         """Return the point of least residuals near a start, and their curvature: `softnlp.nlp.bounded.nearest`."""
-        end, second = nearest(self._map(p, unit), self.measured(start, unit), limits, **curvature)
+        end, second = nearest(self._map(p, unit), self.measured(start, unit), limits, second)
         return end.memo, second
 
-    def minimum_norm(self, p: Array, start: Point, limits: Limits, **curvature: Any) -> tuple[Point, Array | None]:
+    def minimum_norm(self, p: Array, start: Point, limits: Limits, second: Array | None = None) -> tuple[Point, Array]:
         """Return the point of least theta near a start that keeps the equalities: `softnlp.nlp.bounded.least_norm`."""
-        end, second = least_norm(self._map(p), self.measured(start), limits, **curvature)
+        end, second = least_norm(self._map(p), self.measured(start), limits, second)
         return end.memo, second
 
     def _map(self, p: Array, unit: float = 1.0) -> Map:
@@ -180,7 +179,7 @@ class Reduced:
         lower_x, upper_x = self.problem.lower_x[: begin.size], self.problem.upper_x[: begin.size]
         if self._squares and not self._rows:
             unit = float(np.linalg.norm(first.r)) or 1.0
-            end, _ = self.least_squares(p, first, Limits(lower_x, upper_x, np.inf), unit)
+            end, _ = self.least_squares(p, first, Limits(lower_x, upper_x, np.inf), unit=unit)
             return self._solution(end, first, p, 0, "a trust region ended")
         last = first
         known: dict[bytes, Point] = {begin.tobytes(): last}

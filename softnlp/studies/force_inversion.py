@@ -17,7 +17,7 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
-from softnlp.nlp.search import crossing
+from softnlp.nlp.places import crossing
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
 from softnlp.statics.joint import joint_solution
@@ -92,10 +92,12 @@ def pressure_for_force(
     near: Blocked | None = None
 
     def excess(P: float) -> float:
-        step, _ = tried[P] = solver.solve(direction * P, loads, wall, near)
-        return (step.contact.force if step.contact is not None else np.nan) - force
+        if P not in tried:
+            tried[P] = solver.solve(direction * P, loads, wall, near)
+        contact = tried[P][0].contact
+        return np.nan if contact is None else contact.force - force
 
-    low = 0.0, -force
+    low = 0.0
     for P in np.linspace(0, highest, _STEPS + 1).tolist():
         above = excess(P)
         step, solved = tried[P]
@@ -103,15 +105,14 @@ def pressure_for_force(
             return np.full_like(direction, np.nan), step
         if above >= 0:
             break
-        low, near = (P, above), solved or near
+        low, near = P, solved or near
     else:
-        message = (
-            f"{Status.OUT_OF_REACH.advice}: {above + force:.4g} N at {highest / BAR:.4g} bar, {force:.4g} N wanted"
-        )
+        found = f"{above + force:.4g} N at {highest / BAR:.4g} bar"
+        message = f"{Status.OUT_OF_REACH.advice}: {found}, {force:.4g} N wanted"
         lost = Step(direction * highest, Status.OUT_OF_REACH, message, solve_time=step.solve_time)
         return np.full_like(direction, np.nan), lost
     exact = contact.closure == "weighted"
-    pressure = crossing(excess, (low, (P, above)), (1e-10 if exact else 1e-3) * force)
+    pressure = crossing(excess, low, P, (1e-10 if exact else 1e-3) * force)
     step, solved = tried[pressure]
     if solved is not None and not exact:
         refined = _jointly(solver, solved, direction, pressure, force)

@@ -20,9 +20,9 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.rod import Loads
 from softnlp.nlp.bounded import Limits, could_gain
 from softnlp.nlp.implicit import ImplicitDerivatives
+from softnlp.nlp.places import each_from_the_last, least_apart, spread
 from softnlp.nlp.problem import Constraint
 from softnlp.nlp.reduced import Point, Reduced
-from softnlp.nlp.search import each_from_the_last, least_apart, spread
 from softnlp.nlp.solver import Engine, Solution
 from softnlp.statics.branch import BranchPoint, stretch_on_branch
 from softnlp.statics.case import alone
@@ -102,10 +102,10 @@ class Program:
         """Return a tip found for another target on the same grid."""
         return self.reduced.judged(point.theta, point.states, point.moves, self.p)
 
-    def searched(self, start: Point, second: Array | None = None, *, curved: bool = True) -> tuple[Point, Array | None]:
+    def searched(self, start: Point, second: Array | None = None) -> tuple[Point, Array]:
         """Return the best tip near a start, and the curvature there, see `Reduced.least_squares`."""
         search = self.reduced.minimum_norm if self.meets else self.reduced.least_squares
-        return search(self.p, start, self.tips.limits, second=second, measured_curvature=curved)
+        return search(self.p, start, self.tips.limits, second)
 
     def engine(self, **options: Any) -> Engine:
         """Return IPOPT on all unknowns, with options beside those asked for; built at first use."""

@@ -24,10 +24,10 @@ from softnlp.model.quantities import Model
 from softnlp.model.robot import SELF_INTERSECTION
 from softnlp.model.rod import Loads
 from softnlp.nlp.optimality import OPTIMAL, not_optimal
+from softnlp.nlp.places import best_first, in_rounds, pattern_search
 from softnlp.nlp.reduced import Point
-from softnlp.nlp.search import best_first, in_rounds, pattern_search
 from softnlp.nlp.solver import FROM_SOLUTION
-from softnlp.statics.closing import DisputedError, close, other_tip
+from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.kept import pose_solver
 from softnlp.statics.pose_grid import TIP, Solved
 from softnlp.statics.step import Aimed, Step
@@ -57,7 +57,7 @@ class Found:
     """
 
     point: Point
-    second: Array | None
+    second: Array
     met: bool
     continues: bool
     cost: float
@@ -240,7 +240,7 @@ class InverseKinematics:
         if self._method == "nlp":
             z = program.by_ipopt(begin)
             return None if z is None else z * BAR
-        return program.searched(begin, found.second, curved=False)[0].theta * BAR
+        return program.searched(begin, found.second)[0].theta * BAR
 
     def _at(self, aim: Aim, pressure: Array) -> Reached | Step:
         """Return a stable pose that a body can take as an answer, else the step that says why there is none."""
@@ -291,13 +291,13 @@ class InverseKinematics:
         stability and self-intersection are no rows of the program. So is a target that fewer sets meet than it has
         conditions: its misfit is flat where it is zero.
         """
-        engine, start = solved.grid.reference, solved.solution
+        pose, whole = solved.solution, None
         if not (only_pose or self._moving == 0 or (meets and self._moving < aim.conditions)):
             program = self._tips(solved.intervals).program(aim, meets=meets)
-            engine = program.engine(**FROM_SOLUTION)
-            start = replace(start, x=np.concatenate([step.pressure / BAR, start.x]), p=program.p)
+            start = replace(pose, x=np.concatenate([step.pressure / BAR, pose.x]), p=program.p)
+            whole = program.engine(**FROM_SOLUTION), start
         try:
-            found = close(engine, start, other_tip(solved.grid.problem, solved.solution, self._numerics, TIP))
+            found = closed(solved.grid.reference, pose, self._numerics, TIP, whole)
         except DisputedError as error:
             return Step(step.pressure, Status.DISPUTED, str(error), iterations=step.iterations, aimed=aim.aimed(None))
         return replace(step, engine=self._numerics.engine, ipopt=found.ipopt)

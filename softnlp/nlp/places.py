@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from itertools import product
 from typing import TypeVar
 
@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from softnlp.nlp.bounded import Limits
 
 Array = NDArray[np.float64]
+
+_STILL = 1e-6  # a move that the limits leave no longer than this is none
+_NARROW = 1e-12  # of a bracket: what is left of it at a jump
 S = TypeVar("S")
 T = TypeVar("T")
 
@@ -142,27 +145,15 @@ def pattern_search(
     return here
 
 
-_STILL = 1e-6  # a move that the limits leave no longer than this is none
+def crossing(excess: Callable[[float], float], low: float, high: float, accuracy: float) -> float:
+    """Return where a function that is below 0 at one end and not at the other is 0, by Brent's method.
 
-
-def crossing(excess: Callable[[float], float], known: Sequence[tuple[float, float]], accuracy: float) -> float:
-    """Return where a function that is below 0 at one known argument and above 0 at the other is 0, by Brent's method.
-
-    It ends where the function is within the accuracy of 0, or at a jump across it.
+    It ends where the function is within the accuracy of 0, or no number, else at a jump across 0.
     """
     from scipy.optimize import brentq
 
-    values = dict(known)
+    def cut(argument: float) -> float:
+        found = excess(argument)
+        return found if abs(found) > accuracy else 0.0
 
-    def at(argument: float) -> float:
-        if argument not in values:
-            found = excess(argument)
-            values[argument] = found if abs(found) > accuracy else 0.0  # what is not a number ends it too
-        return values[argument]
-
-    low, high = (argument for argument, _ in known)
-    root: float = brentq(at, low, high, xtol=_NARROW * abs(high - low), rtol=_NARROW)
-    return root
-
-
-_NARROW = 1e-12
+    return float(brentq(cut, low, high, xtol=_NARROW * abs(high - low), rtol=_NARROW))
