@@ -90,7 +90,7 @@ class Reduced:
         r = ca.MX(0, 1) if residuals is None else residuals
         moves = ca.MX.sym("moves", x.numel() - self._scales.size, self._scales.size)
         self._tail = problem.function("rows", [ca.vertcat(*rows, r)])
-        judged = ca.vertcat(problem.nlp["f"], self._tail(x, p))
+        judged = ca.vertcat(ca.MX(0, 1) if self._squares else problem.nlp["f"], self._tail(x, p))
         slopes = ca.jtimes(judged, x, ca.vertcat(ca.DM.eye(self._scales.size), moves))
         self._judged = ca.Function("judged", [x, p, moves], [ca.densify(judged), ca.densify(slopes)])
         self._rows = sum(row.numel() for row in rows)
@@ -128,9 +128,13 @@ class Reduced:
     def judged(self, theta: Array, states: Array, moves: Array, p: Array) -> Point:
         """Return a point whose states and their slopes are known."""
         values, slopes = evaluated(self._judged, np.concatenate([theta, states]), p, moves)
-        (f, c, r), m = np.split(values.ravel(), [1, 1 + self._rows]), self._rows + 1
-        by_rows = np.ascontiguousarray(slopes)  # as SciPy's SLSQP takes a gradient
-        return Point(theta, states, moves, float(f[0]), c, r, by_rows[0], by_rows[1:m], by_rows[m:])
+        first = 0 if self._squares else 1
+        m = first + self._rows
+        c, r, c_slope, r_slope = values[first:m, 0], values[m:, 0], slopes[first:m], slopes[m:]
+        f, f_slope = (
+            (r @ r / 2, r @ r_slope) if self._squares else (values[0, 0], slopes[0].copy())
+        )  # for SciPy's SLSQP
+        return Point(theta, states, moves, float(f), c, r, f_slope, c_slope, r_slope)
 
     def residuals(self, points: Sequence[Point], p: Array) -> Array:
         """Return the residuals (m, n) at points whose states are known, at other fixed values p."""

@@ -5,9 +5,8 @@ It is posed once. `Reduced` searches it in the pressures alone, IPOPT in all unk
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -146,11 +145,9 @@ class Tips:
 
     def program(self, aim: Aim, *, meets: bool = False) -> Program:
         """Return the problem of a target, see `inverse_problem`; compiled at first use for targets of its kind."""
-        equations, limits = self.poses.equations, self.limits
         kind = (aim.target.position is None, aim.target.direction is None, meets)
-        bounds = (*limits.lower, *limits.upper, limits.largest_sum)
-        key = ("inverse", self.numerics.transcription, self.intervals, kind, bounds, self.numerics.ipopt)
-        posed, reduced = equations.kept(key, lambda: self._posed(aim, meets=meets))
+        key = ("inverse", self._key, kind, self.numerics.ipopt)
+        posed, reduced = self.poses.equations.kept(key, lambda: self._posed(aim, meets=meets))
         values = {name: v for name, v in self.poses.values(np.zeros(0), self.loads).items() if name != "pressure"}
         return Program(posed, reduced, self, meets, posed.compiled.pack({**values, **aim.values()}))
 
@@ -193,18 +190,19 @@ class Tips:
 
     def nearest(self, program: Program, most: int | None = None, below: float = np.inf) -> list[Point]:
         """Return tips of a table over the limits, apart from each other, nearer than `below`, the nearest first."""
-        if not self._table:
-            places = spread(self.limits, _ARCS if self.intervals is None else _POSES)
-            self._table.extend(each_from_the_last(places, program.at))
-        misfit = program.misfits(self._table)
-        places = np.array([np.full(self.limits.lower.size, np.nan) if t is None else t.theta for t in self._table])
+        places = spread(self.limits, _ARCS if self.intervals is None else _POSES)
+        numbers = program.reduced.fixed(self.limits.lower, program.p).tobytes()
+        table = self.poses.equations.kept(("tips", self._key, numbers), lambda: each_from_the_last(places, program.at))
+        misfit = program.misfits(table)
         span = np.maximum(self.limits.upper - self.limits.lower, 1e-9)
         chosen = least_apart(misfit, places, _APART * span, most or len(misfit))
-        return [point for k in chosen if misfit[k] < below and (point := self._table[k]) is not None]
+        return [point for k in chosen if misfit[k] < below and (point := table[k]) is not None]
 
-    @cached_property
-    def _table(self) -> list[Point | None]:
-        return []
+    @property
+    def _key(self) -> tuple[Hashable, ...]:
+        """What tells compiled problems and tables apart, beside what is asked of the tip."""
+        limits = (*self.limits.lower, *self.limits.upper, self.limits.largest_sum)
+        return (self.numerics.transcription, self.intervals, limits)
 
 
 def pressure_limits(poses: PoseSolver, lower: Array, upper: Array) -> tuple[Limits, BranchPoint | None]:
