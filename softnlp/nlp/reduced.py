@@ -131,9 +131,8 @@ class Reduced:
         first = 0 if self._squares else 1
         m = first + self._rows
         c, r, c_slope, r_slope = values[first:m, 0], values[m:, 0], slopes[first:m], slopes[m:]
-        f, f_slope = (
-            (r @ r / 2, r @ r_slope) if self._squares else (values[0, 0], slopes[0].copy())
-        )  # for SciPy's SLSQP
+        # SciPy's SLSQP misreads a gradient that is not contiguous
+        f, f_slope = (r @ r / 2, r @ r_slope) if self._squares else (values[0, 0], slopes[0].copy())
         return Point(theta, states, moves, float(f), c, r, f_slope, c_slope, r_slope)
 
     def residuals(self, points: Sequence[Point], p: Array) -> Array:
