@@ -28,7 +28,7 @@ from softnlp.model.conventions import Coefficients
 from softnlp.model.materials import Material, formula_law, material
 from softnlp.model.robot import ROBOTS, Robot, robot, violations
 from softnlp.model.rod import Loads
-from softnlp.model.section import deform
+from softnlp.model.round_chambers import deform
 from softnlp.results import Body, to_dataset, view_of_dataset, view_of_run
 from softnlp.statics.step import Run
 

@@ -18,7 +18,7 @@ import casadi as ca
 from softnlp.batch.kernels import Step
 from softnlp.model import rod
 from softnlp.nlp.transcription import RK4
-from softnlp.statics.loadcase import RodFunctions, unpack_section
+from softnlp.statics.loadcase import RodFunctions, unpack_section, whole_weight
 
 POSITION, ROTATION, MOMENT = slice(0, 3), slice(3, 12), slice(12, 15)
 STATE = 15
@@ -49,8 +49,7 @@ def reduced_rod(functions: RodFunctions) -> ReducedRod:
     nc = functions.field.size1_in(1)
     data, s, h = ca.SX.sym("data", nc + 6), ca.SX.sym("s"), ca.SX.sym("h")
     c, force, moment = data[:nc], data[nc : nc + 3], data[nc + 3 :]
-    section = unpack_section(c)
-    weight = c[len(rod.RodSection._fields)] * ca.vertcat(section.load_x, section.load_y, section.load_z)
+    weight = whole_weight(c)
 
     def full(state: Any, at: Any) -> Any:
         """Return [p, R, N, M] with the force in closed form."""

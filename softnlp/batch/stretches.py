@@ -51,7 +51,7 @@ class Stretches:
         self._shooting = shooting
         model = functions.model
         self._shared = shared
-        self._sets = model.robot.chamber_sets
+        self._sets = model.sets
         self._stiffens = min(model.coefficients.elongation, model.coefficients.bending) >= 0
         self._grid = np.linspace(1.0, _LARGEST[shared], _SAMPLES[shared])
         self._curve: tuple[Array, Array] | None = None

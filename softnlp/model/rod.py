@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 
 from softnlp.model.gravity import gravity_named
-from softnlp.model.section import Section
+from softnlp.model.section import SectionState
 
 Vector = tuple[float, float, float]
 
@@ -56,8 +56,8 @@ class RodSection(NamedTuple):
     """What the rod asks of its section at s, in one consistent system of units.
 
     shear, axial, bending_x, bending_y, torsion : GA, EA, EI_x, EI_y, GJ. pressure_force : F_P.
-    pressure_moment_x, pressure_moment_y : sum d_i x P_i A_c e3. load_x, load_y, load_z : f_e, force per length, world
-    frame.
+    pressure_moment_x, pressure_moment_y : sum d_i x P_i A_c e3. line_density : mass per length. length : of the whole
+    stretched rod.
     """
 
     shear: Any
@@ -68,30 +68,29 @@ class RodSection(NamedTuple):
     pressure_force: Any
     pressure_moment_x: Any
     pressure_moment_y: Any
-    load_x: Any
-    load_y: Any
-    load_z: Any
+    line_density: Any
+    length: Any
 
 
-def rod_section(section: Section, density: Any, gravity: Any, length_unit: Any, force_unit: Any) -> RodSection:
-    """Return the section as the rod sees it, with lengths and forces divided by the given units [m, N].
+def rod_section(state: SectionState, length: Any, length_unit: Any, force_unit: Any) -> RodSection:
+    """Return the section as the rod sees it, with lengths and forces divided by the units [m, N].
 
-    The weight is f_e = rho A g per length of the stretched rod.
+    length : of the whole stretched rod, in the unit of length. Accelerations stay in m/s^2.
     """
-    EI_x, EI_y = section.bending_stiffness
-    M_x, M_y = section.pressure_moment
+    EI_x, EI_y = state.bending_stiffness
+    M_x, M_y = state.pressure_moment
     moment_unit = force_unit * length_unit
-    f_e = [density * section.area * gravity[k] * length_unit / force_unit for k in range(3)]
     return RodSection(
-        section.shear_stiffness / force_unit,
-        section.axial_stiffness / force_unit,
+        state.shear_stiffness / force_unit,
+        state.axial_stiffness / force_unit,
         EI_x / (moment_unit * length_unit),
         EI_y / (moment_unit * length_unit),
-        section.torsional_stiffness / (moment_unit * length_unit),
-        section.pressure_force / force_unit,
+        state.torsional_stiffness / (moment_unit * length_unit),
+        state.pressure_force / force_unit,
         M_x / moment_unit,
         M_y / moment_unit,
-        *f_e,
+        state.line_density * length_unit / force_unit,
+        length,
     )
 
 
@@ -129,17 +128,17 @@ def wall_resultants(x: Any, section: RodSection) -> tuple[Any, Any]:
     return N + section.pressure_force * R[:, 2], M + R @ pressure_moment(section)
 
 
-def field(x: Any, section: RodSection) -> Any:
+def field(x: Any, section: RodSection, force: Any, moment: Any) -> Any:
     """Return dx/ds, Eqs. (2), (8), (13), for the stretched arc length s in 0..L.
 
+    force, moment : f_e and l_e of all loads, (3,) per length, world frame.
     The pressure term of the paper's moment balance, sum P_i A_c [(v + u x d_i) x e3 + d_i x (u x e3)], is by the Jacobi
-    identity F_P v x e3 + u x M_P, which is what N and M take out of n and m: N' = -f_e, M' = -p' x N.
+    identity F_P v x e3 + u x M_P, which is what N and M take out of n and m: N' = -f_e, M' = -p' x N - l_e.
     """
     _, R, N, _ = unpack(x)
     v, u = strains(x, section)
-    f_e = ca.vertcat(section.load_x, section.load_y, section.load_z)
     dp = R @ v
-    return ca.vertcat(dp, ca.reshape(R @ hat(u), 9, 1), -f_e, -ca.cross(dp, N))
+    return ca.vertcat(dp, ca.reshape(R @ hat(u), 9, 1), -force, -ca.cross(dp, N) - moment)
 
 
 def base_balance(x: Any) -> Any:

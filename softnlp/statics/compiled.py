@@ -1,8 +1,8 @@
-"""What is compiled for one kind of model and one kind of tip conditions; other numbers need nothing built."""
+"""What is compiled for one kind of model and its loads; other numbers need nothing built."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.quantity import Quantity
+from softnlp.model.load import Load
 from softnlp.model.quantities import Model
-from softnlp.model.tip import DEAD_LOADS, TipConditions
 from softnlp.statics.branch import branch_function
 from softnlp.statics.loadcase import RodFunctions, rod_functions
 from softnlp.statics.pose import shape_function
 from softnlp.statics.stability import MOST_INTERVALS, conjugate_points, transition_function
+from softnlp.statics.varying import VaryingRod, varying_rod
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -28,7 +29,7 @@ MOST_GRIDS = 64
 
 @dataclass(frozen=True, eq=False)
 class RodEquations:
-    """The rod of one kind of model under one kind of tip conditions, with the grids compiled for it so far.
+    """The rod of one kind of model under some loads, with the grids compiled for it so far.
 
     declared : every quantity, with the numbers of the model for which it was made. grids : by what tells them apart,
     those used last at the end.
@@ -48,6 +49,11 @@ class RodEquations:
     def shape(self) -> ca.Function:
         """The shape between nodes, see `shape_function`."""
         return shape_function(self.functions.field)
+
+    @cached_property
+    def varying(self) -> VaryingRod:
+        """The rod whose section varies along s."""
+        return varying_rod(self.functions)
 
     @cached_property
     def _transition(self) -> ca.Function:
@@ -77,7 +83,7 @@ class RodEquations:
         }
 
 
-def rod_equations(model: Model, conditions: TipConditions = DEAD_LOADS) -> RodEquations:
-    """Compile the rod of a model."""
-    functions = rod_functions(model, conditions)
+def rod_equations(model: Model, loads: Sequence[Load] = ()) -> RodEquations:
+    """Compile the rod of a model. loads : beside the dead ones."""
+    functions = rod_functions(model, loads)
     return RodEquations(functions, functions.declared())

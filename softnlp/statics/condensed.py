@@ -176,7 +176,7 @@ def _pieces(
     columns : directions, of which the last `right_sides` carry gaps and a change of the constants.
     """
     nx, ny = functions.state_size, functions.tip_unknowns
-    nc, na = functions.field.size1_in(1), functions.tip.size1_in(5)
+    nc, na = functions.field.size1_in(1), functions.tip.size1_in(3)
     step = rk_step(functions.field, tableau)
 
     def sym(name: str, *shape: int) -> ca.SX:
@@ -197,7 +197,7 @@ def _pieces(
     advance = ca.Function("advance", [V, state, gap, c, dc, h], [arrived], {"cse": True})
 
     y, a, units = sym("y", ny), sym("a", na), sym("units", 2)
-    tip_residual = functions.tip(state, c, ca.SX.zeros(3), ca.SX.zeros(3), y, a, units)
+    tip_residual = functions.tip(state, c, y, a, units)
     linear = ca.horzcat(ca.jtimes(tip_residual, ca.vertcat(state, c), moves), ca.jacobian(tip_residual, y))
     tip = ca.Function("tip", [V, state, c, dc, y, a, units], [ca.densify(linear)], {"cse": True})
 
@@ -222,8 +222,8 @@ def _sweep_function(
     K, nx, ny, r = method.intervals, functions.state_size, functions.tip_unknowns, right_sides
     columns = base_directions.shape[1] + r
     advance, tip, section = _pieces(functions, method.tableau, columns, r)
-    n_p, na = section.size1_in(0), functions.tip.size1_in(5)
-    x, p = ca.MX.sym("x", 1 + nx * (K + 1) + ny), ca.MX.sym("p", n_p + na)
+    n_p, every = section.size1_in(0), sum(q.size for q in functions.declared().values())
+    x, p = ca.MX.sym("x", 1 + nx * (K + 1) + ny), ca.MX.sym("p", every)
     g = ca.MX.sym("g", x.numel(), r)
     c_now, c_slope, balance_slope, scales_now = section(p[:n_p], x[0])
     d_stretch = -g[0, :] / balance_slope
@@ -238,6 +238,7 @@ def _sweep_function(
     held = ca.vertcat(-base[:12, :], ca.DM.zeros(6, r), -base[12:, :])
     start = ca.horzcat(ca.MX(free), held)
     steps = advance.mapaccum(K)
-    every = steps(start, nodes[:, :K], gaps, ca.repmat(c_now, 1, K), ca.repmat(d_constants, 1, K), ca.DM.ones(1, K) / K)
-    last = tip(every[:, -columns:], nodes[:, K], c_now, d_constants, x[x.numel() - ny :], p[n_p:], scales_now)
-    return ca.Function("condensed", [x, p, g], [ca.horzcat(start, every), last, d_stretch])
+    swept = steps(start, nodes[:, :K], gaps, ca.repmat(c_now, 1, K), ca.repmat(d_constants, 1, K), ca.DM.ones(1, K) / K)
+    a = functions.tip_numbers(p)
+    last = tip(swept[:, -columns:], nodes[:, K], c_now, d_constants, x[x.numel() - ny :], a, scales_now)
+    return ca.Function("condensed", [x, p, g], [ca.horzcat(start, swept), last, d_stretch])

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from softnlp.base.status import Status
 from softnlp.model.numerics import Numerics, Transcribing
-from softnlp.model.quantities import Model
+from softnlp.model.quantities import LOADS, Model
 from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.nlp.solver import Solution, certificate, discretisation_correction, outputs
 from softnlp.nlp.transcription import method_named
-from softnlp.statics.attempts import LOADS, Attempt, Goal, Neighbour, Work, attempts, from_near
+from softnlp.statics.attempts import Attempt, Goal, Neighbour, Work, attempts, from_near
 from softnlp.statics.branch import BranchPoint, stretch_on_branch
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.compiled import RodEquations, rod_equations
@@ -226,10 +226,11 @@ class PoseSolver:
     def _turn_of_moment(self, column: Array, stretch: float) -> float:
         """Return how far the dead tip moment alone would bend or twist the rod [rad]."""
         constants, _, units = (np.asarray(part).ravel() for part in self.functions.section(column, stretch))
-        after = self.model.robot.chamber_sets + 3  # the pressures and the tip force
+        after = self.model.sets + 3  # the pressures and the tip force
         section, scaled = unpack_section(constants), column[after : after + 3] / np.prod(units)
-        length = constants[len(section)]
-        return float(np.linalg.norm(scaled) * length / min(section.bending_x, section.bending_y, section.torsion))
+        return float(
+            np.linalg.norm(scaled) * section.length / min(section.bending_x, section.bending_y, section.torsion)
+        )
 
     def target_accuracy(self, loads: Loads) -> float:
         """Return the estimate to aim for: a third of the accuracy, since estimates are good to a factor of 3."""

@@ -23,7 +23,7 @@ def unloaded_case(name: str, functions: RodFunctions, given: Mapping[str, Quanti
     The outputs are those of `softnlp.statics.loadcase.load_case`; there are no states, so `transcribed` is empty.
     """
     model = functions.model
-    N = model.robot.chambers
+    N = model.chambers
     column = ca.vertcat(*(given[key].symbol for key in quantities(model)))
     stretch = ca.MX.sym("stretch")
     constants, balance, units = functions.section(column, stretch)

@@ -119,7 +119,7 @@ def _arc_function(solver: PoseSolver, names: Sequence[str]) -> ca.Function:
     column, stretch = ca.SX.sym("quantities", functions.section.size1_in(0)), ca.SX.sym("stretch")
     c, balance, units = functions.section(column, stretch)
     state = functions.arc(column, stretch, 1.0)
-    L_0, N = units[0], functions.model.robot.chambers
+    L_0, N = units[0], functions.model.chambers
     _, u = rod.strains(state, unpack_section(c))
     angle = stretch * ca.sqrt(u[0] ** 2 + u[1] ** 2 + _NO_CURVATURE)
     lengths = functions.lengths(state, c)[:N] * L_0
