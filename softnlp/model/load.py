@@ -86,7 +86,7 @@ class Load(Protocol):
         """
         return ()
 
-    def named(self, numbers: Mapping[str, Any]) -> Any:
+    def named(self, numbers: Mapping[str, Any]) -> object:
         """Return its scaled numbers, by the last part of their names, as `given` has them.
 
         Parameters
@@ -142,7 +142,7 @@ class Load(Protocol):
         Returns
         -------
         Sequence
-            One residual for each of `equations`.
+            (unknowns,) one for each of `equations`, in any consistent system of units [1].
         """
         return ()
 

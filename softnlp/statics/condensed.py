@@ -182,6 +182,15 @@ def _pieces(
     def sym(name: str, *shape: int) -> ca.SX:
         return ca.SX.sym(name, *shape)
 
+    column, stretch = sym("p", functions.section.size1_in(0)), sym("stretch")
+    constants, balance, scales = functions.section(column, stretch)
+    c_slope = ca.jacobian(constants, stretch)
+    section = ca.Function(
+        "section",
+        [column, stretch],
+        [constants, c_slope, ca.jacobian(balance, stretch), scales],
+        {"cse": True},
+    )
     r = right_sides
     V, state, gap, c, dc, h = (
         sym("V", nx, columns),
@@ -191,7 +200,9 @@ def _pieces(
         sym("dc", nc, r),
         sym("h"),
     )
-    moves = ca.vertcat(V, ca.horzcat(ca.SX(nc, columns - r), dc))
+    moving = ca.SX(nc, r)  # those of the constants that follow the stretch
+    moving[c_slope.sparsity().row(), :] = dc[c_slope.sparsity().row(), :]
+    moves = ca.vertcat(V, ca.horzcat(ca.SX(nc, columns - r), moving))
     arrived = ca.jtimes(step(state, c, h), ca.vertcat(state, c), moves)
     arrived[:, columns - r :] += gap
     advance = ca.Function("advance", [V, state, gap, c, dc, h], [arrived], {"cse": True})
@@ -201,14 +212,6 @@ def _pieces(
     linear = ca.horzcat(ca.jtimes(tip_residual, ca.vertcat(state, c), moves), ca.jacobian(tip_residual, y))
     tip = ca.Function("tip", [V, state, c, dc, y, a, units], [ca.densify(linear)], {"cse": True})
 
-    column, stretch = sym("p", functions.section.size1_in(0)), sym("stretch")
-    constants, balance, scales = functions.section(column, stretch)
-    section = ca.Function(
-        "section",
-        [column, stretch],
-        [constants, ca.jacobian(constants, stretch), ca.jacobian(balance, stretch), scales],
-        {"cse": True},
-    )
     return advance, tip, section
 
 

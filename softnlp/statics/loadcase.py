@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import casadi as ca
@@ -80,17 +80,21 @@ class RodFunctions:
         numbers = model or self.model
         return {**quantities(numbers), **{q.name: q for load in self.loads for q in load.quantities(numbers)}}
 
-    @property
+    @cached_property
     def _tip_names(self) -> list[str]:
         return [q.name for load in (DeadTip(), *self.loads) for q in load.quantities(self.model)]
 
-    def tip_numbers(self, p: Any) -> Any:
-        """Return a of a column of every quantity that is declared, an array or an expression."""
-        names, rows, start = self._tip_names, dict[str, range](), 0
+    @cached_property
+    def _tip_rows(self) -> list[int]:
+        rows, start = dict[str, range](), 0
         for name, q in self.declared().items():
             rows[name] = range(start, start + q.size)
             start += q.size
-        return p[[row for name in names for row in rows[name]]]
+        return [row for name in self._tip_names for row in rows[name]]
+
+    def tip_numbers(self, p: Any) -> Any:
+        """Return a of a column of every quantity that is declared, an array or an expression."""
+        return p[self._tip_rows]
 
     def tip_column(self, given: Mapping[str, Quantity]) -> ca.MX:
         """Return a of quantities by key."""
