@@ -14,6 +14,7 @@ import pytest
 
 import softnlp
 from softnlp import load_materials, load_scenario
+from softnlp.base.columns import OUTPUTS
 from softnlp.cli import main
 from softnlp.scenario.read import scenario_from_text
 
@@ -33,7 +34,7 @@ _SAVE_AS = re.compile(r"Save this as `([\w.]+)`[^`]*$")
 
 
 def blocks(page: str) -> list[tuple[str, str, str]]:
-    """Return (what stands before it, language, code) of each block of a page."""
+    """Return (what stands before it, language, code) of each block of a page, "../CONTRIBUTING" among them."""
     text = (DOCS / f"{page}.md").read_text()
     found, end = [], 0
     for match in _BLOCK.finditer(text):
@@ -94,12 +95,31 @@ def test_the_error_that_the_tutorial_shows_is_what_is_said(
     assert capsys.readouterr().err == shown
 
 
+def test_a_newcomer_adds_each_thing_as_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The blocks of CONTRIBUTING: those that begin with a file's name are saved, the others run and import them."""
+    monkeypatch.syspath_prepend(tmp_path)
+    before, names, files = dict(OUTPUTS), dict[str, Any](), []
+    try:
+        for _, language, code in blocks("../CONTRIBUTING"):
+            if language == "python" and (name := re.match(r"# (\w+)\.py\n", code)):
+                (tmp_path / f"{name[1]}.py").write_text(code)
+                files.append(name[1])
+            elif language == "python":
+                exec(compile(code, "CONTRIBUTING.md", "exec"), names)
+    finally:
+        OUTPUTS.clear()
+        OUTPUTS.update(before)
+        for file in files:
+            sys.modules.pop(file, None)
+    assert files == ["sharpest_bend", "follower", "leaf_spring"]
+
+
 def test_every_extension_is_short() -> None:
     for before, language, code in blocks("extending"):
         assert len(code.splitlines()) < LONGEST_EXTENSION, before
         assert language in ("python", "toml")
     headings = re.findall(r"^## (.+)$", (DOCS / "extending.md").read_text(), re.MULTILINE)
-    assert headings == ["A material", "A law", "A robot", "A closure", "A study"]
+    assert headings == ["A material", "A law", "A robot", "A closure", "A load", "A section", "A study"]
 
 
 def test_the_scenario_of_a_how_to_is_the_one_that_its_figure_runs() -> None:
