@@ -21,6 +21,7 @@ from softnlp.model.load import Load
 from softnlp.model.quantities import Model, force_unit
 from softnlp.model.robot import ROBOTS
 from softnlp.model.round_chambers import deform
+from softnlp.model.section import RodSection
 from softnlp.model.tip import TipContact
 from softnlp.nlp.transcription import Collocation, MultipleShooting
 from softnlp.statics.loadcase import LoadCase, RodFunctions, load_case, rod_functions, unpack_section
@@ -87,7 +88,7 @@ def test_the_constants_are_the_witness_s_section_in_the_units_of_the_robot(seed:
     assert float(balance) == pytest.approx(0.0, abs=1e-7 * case.design.section.F_P / case.F_0)
     further = float(case.functions.section(case.column, 1.1 * case.design.section.stretch)[1])
     assert further * case.F_0 > 1e-2 * case.design.section.F_P
-    assert unpack_section(plain(c))._fields == rod.RodSection._fields
+    assert unpack_section(plain(c))._fields == RodSection._fields
     assert list(unpack_section(plain(c))) == list(plain(c)[:10])
 
 

@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from softnlp.base.errors import InputError
 from softnlp.model.dead_tip import DeadTip
-from softnlp.model.rod import RodSection, tip_balance
+from softnlp.model.rod import tip_balance
+from softnlp.model.section import RodSection
 from softnlp.model.tip import AtTip, Closure, Given, TipContact, contact_point, gap, length_error
 
 CLOSURES = ("free", "weighted", "compliant", "rigid")

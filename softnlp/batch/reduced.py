@@ -18,7 +18,7 @@ import casadi as ca
 from softnlp.batch.kernels import Step
 from softnlp.model import rod
 from softnlp.nlp.transcription import RK4
-from softnlp.statics.loadcase import RodFunctions, unpack_section, whole_weight
+from softnlp.statics.loadcase import RodFunctions, whole_weight
 
 POSITION, ROTATION, MOMENT = slice(0, 3), slice(3, 12), slice(12, 15)
 STATE = 15
@@ -119,7 +119,7 @@ def checked(functions: RodFunctions, full: Any, state: Any, rates: Any, given: l
     old = ca.SX.sym("old", before.numel())
     x = ca.vertcat(state, y, integrals)
     gap, curvature, there = old[n], old[before.numel() - 1], full(state, s + h)
-    sharper = larger_curvature(curvature, [full(old[:n], s), there], c)
+    sharper = larger_curvature(functions, curvature, [full(old[:n], s), there], c)
     return Step(
         rates=function("rates", [x, data, s], ca.vertcat(rates, functions.field(y, c), gained)),
         begin=function("begin", [before, data, s], ca.vertcat(state, full(state, s), integrals)),
@@ -142,9 +142,9 @@ def smallest_minor(S: Any) -> Any:
     return ca.fmin(S[0, 0], ca.fmin(second, third))
 
 
-def larger_curvature(known: Any, states: list[Any], c: Any) -> Any:
+def larger_curvature(functions: RodFunctions, known: Any, states: list[Any], c: Any) -> Any:
     """Return the largest of a curvature and those of the axis at states, per its deformed length."""
     for x in states:
-        v, u = rod.strains(x, unpack_section(c))
+        v, u = functions.strains(x[: rod.STATE_SIZE], c)
         known = ca.fmax(known, ca.sqrt(u[0] ** 2 + u[1] ** 2) / v[2])
     return known

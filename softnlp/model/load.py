@@ -12,10 +12,9 @@ from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any, NamedTuple, Protocol
 
-from softnlp.base.errors import InputError
 from softnlp.base.quantity import Quantity
 from softnlp.model.model import Model
-from softnlp.model.rod import RodSection
+from softnlp.model.section import RodSection
 
 Wrench = tuple[Any, Any]
 """A force and a moment, (3,) each, in the world frame; a zero may be the number 0."""
@@ -162,32 +161,3 @@ class Load(Protocol):
             By key; what is not in it keeps its value.
         """
         return {key: 0.0 * value for key, value in values.items()}
-
-
-def unit_scale(unit: str, length: Any, force: Any) -> Any:
-    """Return one SI unit's size in the scaled system: SI value = scaled value * this; accelerations are not scaled.
-
-    Raises
-    ------
-    InputError
-        For a unit that is not known.
-    """
-    scales = {
-        "1": 1.0,
-        "rad": 1.0,
-        "m": length,
-        "m^2": length**2,
-        "1/m": 1 / length,
-        "N": force,
-        "N m": force * length,
-        "N/m": force / length,
-        "N/rad": force,
-        "Pa": force / length**2,
-        "m/s^2": 1.0,
-        "kg": force,
-        "kg/m": force / length,
-        "kg/m^3": force / length**3,
-    }
-    if unit not in scales:
-        raise InputError(f"expected one of {', '.join(scales)}, got {unit!r}", key="unit")
-    return scales[unit]

@@ -15,7 +15,7 @@ from softnlp.base.quantity import Quantity, quantity
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.model.materials import Material
 from softnlp.model.robot import DIMENSIONS, LOWERABLE_RULES, Robot, check, touching_stretch
-from softnlp.model.section import SectionRadii, SectionState
+from softnlp.model.section import Section, SectionRadii, SectionState
 
 _SIZES = tuple(d.field for d in DIMENSIONS if d.scale is not None)
 _COEFFICIENT_NAMES = {
@@ -168,7 +168,7 @@ def with_numbers(
 
 
 @dataclass(frozen=True, eq=False)
-class RoundChambers:
+class RoundChambers(Section):
     """The paper's section as a `softnlp.model.section.Section`.
 
     Attributes
@@ -197,9 +197,9 @@ class RoundChambers:
         return self.robot.set_of_chamber
 
     @property
-    def sets(self) -> int:
-        """As `Robot.chamber_sets`."""
-        return self.robot.chamber_sets
+    def by_sum(self) -> bool:
+        """Whether no coefficient is negative: every chamber has the same bore."""
+        return bool(min(self.coefficients.elongation, self.coefficients.bending) >= 0)
 
     def check(self, numbers: Mapping[str, Any] | None = None) -> None:
         """Raise `RobotError` where the robot, or one of these numbers, cannot be made."""

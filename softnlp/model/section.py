@@ -1,15 +1,18 @@
 """What rod, cases and batches ask of a cross-section: its quantities, its state by name, its outline.
 
-A section of another kind is a class of these methods, in one file: `Segment(robot, material, section=...)` takes it.
-The paper's is `softnlp.model.round_chambers`.
+A section of another kind is a class that inherits from `Section`, in one file: `Segment(robot, material, section=...)`
+takes it. The paper's is `softnlp.model.round_chambers`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Protocol
 
+import casadi as ca
+
+from softnlp.base.errors import InputError
 from softnlp.base.quantity import Quantity
 from softnlp.model.conventions import Coefficients, Conventions
 from softnlp.model.materials import Material
@@ -44,6 +47,8 @@ class SectionState:
         (N, 2) d_i of the chambers [m].
     chamber_stiffness
         Of one reinforced chamber along its axis, which the closure `compliant` takes, a number [N].
+    own
+        What else `Section.strains` takes: numbers, each with the name of its unit [SI].
     """
 
     imbalance: Any
@@ -57,6 +62,7 @@ class SectionState:
     pressure_moment: tuple[Any, Any]
     centres: tuple[tuple[Any, Any], ...]
     chamber_stiffness: Any
+    own: Sequence[tuple[Any, str]] = field(default=(), kw_only=True)
 
     @property
     def stiffnesses(self) -> list[Any]:
@@ -84,27 +90,74 @@ class SectionRadii:
     bore: float
 
 
+class RodSection(NamedTuple):
+    """What the rod asks of its section at s, in one consistent system of units.
+
+    shear, axial, bending_x, bending_y, torsion : GA, EA, EI_x, EI_y, GJ. pressure_force : F_P.
+    pressure_moment_x, pressure_moment_y : sum d_i x P_i A_c e3. line_density : mass per length. length : of the whole
+    stretched rod.
+    """
+
+    shear: Any
+    axial: Any
+    bending_x: Any
+    bending_y: Any
+    torsion: Any
+    pressure_force: Any
+    pressure_moment_x: Any
+    pressure_moment_y: Any
+    line_density: Any
+    length: Any
+
+
+def rod_section(state: SectionState, length: Any, length_unit: Any, force_unit: Any) -> RodSection:
+    """Return the section as the rod sees it, with lengths and forces divided by the units [m, N].
+
+    length : of the whole stretched rod, in the unit of length. Accelerations stay in m/s^2.
+    """
+    EI_x, EI_y = state.bending_stiffness
+    M_x, M_y = state.pressure_moment
+    moment_unit = force_unit * length_unit
+    return RodSection(
+        state.shear_stiffness / force_unit,
+        state.axial_stiffness / force_unit,
+        EI_x / (moment_unit * length_unit),
+        EI_y / (moment_unit * length_unit),
+        state.torsional_stiffness / (moment_unit * length_unit),
+        state.pressure_force / force_unit,
+        M_x / moment_unit,
+        M_y / moment_unit,
+        state.line_density * length_unit / force_unit,
+        length,
+    )
+
+
 class Section(Protocol):
     """A kind of cross-section with its numbers, any of which may be a symbol elsewhere.
 
-    Its methods are written with operators and casadi functions, on numbers and symbols alike, in SI units. `numbers`
-    are by the keys of `quantities`.
+    One of your own inherits from this class. Its methods are written with operators and casadi functions, on numbers
+    and symbols alike, in SI units. `numbers` are by the keys of `quantities`.
     """
 
     @property
     def kind(self) -> Hashable:
-        """What the equations depend on beside numbers; sections of a kind share what is compiled."""
-        ...
+        """What its equations depend on beside numbers; sections of a class and a kind share what is compiled."""
+        return ()
 
     @property
     def set_of_chamber(self) -> tuple[int, ...]:
         """The set of each chamber, both counted from 0, (N,) entries [1]."""
-        ...
+        return ()
 
     @property
     def sets(self) -> int:
         """The number of sets, with one pressure each."""
-        ...
+        return max(self.set_of_chamber, default=-1) + 1
+
+    @property
+    def by_sum(self) -> bool:
+        """Whether pressures enter the imbalance by their sum alone and only add to stiffnesses; batches are quicker."""
+        return False
 
     def check(self, numbers: Mapping[str, Any] | None = None) -> None:
         """Raise `RobotError` for a section that cannot be made.
@@ -114,7 +167,6 @@ class Section(Protocol):
         numbers
             By key; None are its own.
         """
-        ...
 
     def quantities(self) -> Sequence[Quantity]:
         """Return its numbers as quantities, "robot.length" among them, the unpressurised length of its segment.
@@ -127,7 +179,7 @@ class Section(Protocol):
         ...
 
     def at(self, numbers: Mapping[str, Any], pressures: Any, stretch: Any) -> SectionState:
-        """Return the section at a stretch.
+        """Return the section at a stretch; imbalance and stiffnesses are linear in the pressures.
 
         Parameters
         ----------
@@ -144,6 +196,27 @@ class Section(Protocol):
             As said.
         """
         ...
+
+    def strains(self, section: RodSection, own: Sequence[Any], force: Any, moment: Any) -> tuple[Any, Any]:
+        """Return the strains under what wall and fluid carry together, Eq. (5): R^T M + M_P = K u.
+
+        Without a load v has to be e3, which is what the stretch means.
+
+        Parameters
+        ----------
+        section, own
+            Its state, and (entries,) the numbers of `SectionState.own`, in any consistent system of units [SI].
+        force, moment
+            (3,) R^T N and R^T M in the same units, body frame [SI].
+
+        Returns
+        -------
+        tuple
+            (3,) v [1] and (3,) u [1/m], per stretched length, body frame.
+        """
+        m = moment + ca.vertcat(section.pressure_moment_x, section.pressure_moment_y, 0)
+        v = ca.vertcat(force[0] / section.shear, force[1] / section.shear, force[2] / section.axial + 1)
+        return v, ca.vertcat(m[0] / section.bending_x, m[1] / section.bending_y, m[2] / section.torsion)
 
     def outline(self, numbers: Mapping[str, Any], stretch: Any) -> SectionRadii:
         """Return the section's deformed radii.
@@ -175,8 +248,37 @@ class Section(Protocol):
         list
             One line each.
         """
-        ...
+        return []
 
 
 SectionType = Callable[[Any, Material, Coefficients, Conventions], Section]
 """Makes a section of a robot, its silicone, coefficients and conventions: a class, or a function."""
+
+
+def unit_scale(unit: str, length: Any, force: Any) -> Any:
+    """Return one SI unit's size in the scaled system: SI value = scaled value * this; accelerations are not scaled.
+
+    Raises
+    ------
+    InputError
+        For a unit that is not known.
+    """
+    scales = {
+        "1": 1.0,
+        "rad": 1.0,
+        "m": length,
+        "m^2": length**2,
+        "1/m": 1 / length,
+        "N": force,
+        "N m": force * length,
+        "N/m": force / length,
+        "N/rad": force,
+        "Pa": force / length**2,
+        "m/s^2": 1.0,
+        "kg": force,
+        "kg/m": force / length,
+        "kg/m^3": force / length**3,
+    }
+    if unit not in scales:
+        raise InputError(f"expected one of {', '.join(scales)}, got {unit!r}", key="unit")
+    return scales[unit]

@@ -48,7 +48,7 @@ class RodEquations:
     @cached_property
     def shape(self) -> ca.Function:
         """The shape between nodes, see `shape_function`."""
-        return shape_function(self.functions.field)
+        return shape_function(self.functions)
 
     @cached_property
     def varying(self) -> VaryingRod:

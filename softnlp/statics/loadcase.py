@@ -20,13 +20,14 @@ from softnlp.model import rod
 from softnlp.model.dead_tip import DeadTip
 from softnlp.model.load import Load
 from softnlp.model.quantities import Model, force_unit, quantities, section_function
+from softnlp.model.section import RodSection, rod_section, unit_scale
 from softnlp.nlp.case import Equation
 from softnlp.nlp.transcription import Transcribed, Transcription
 from softnlp.statics.wrenches import line_loads, tip_equations, tip_rows, unknown_units
 
 Array = NDArray[np.float64]
 
-_SECTION_SIZE = len(rod.RodSection._fields)
+_SECTION_SIZE = len(RodSection._fields)
 _GRAVITY = slice(_SECTION_SIZE, _SECTION_SIZE + 3)
 _NEWTON_STEPS = 30
 
@@ -41,7 +42,8 @@ class RodFunctions:
     loads : beside the dead ones; those that act along the rod come first.
     section : (quantities, stretch) -> c, scaled stretch imbalance, units (L_0, EI / L_0^2). taken : which, in
     order: the model's, then those of loads that act along the rod. field : (x, c) -> dx/ds on s in 0..1. lengths :
-    (x, c) -> rates of the chamber lengths, the bending angle and the backbone length.
+    (x, c) -> rates of the chamber lengths, the bending angle and the backbone length. strains : (p, R, N, M; c) ->
+    v, u.
     tip : (x, c, y, a, units) -> the tip residuals, 6 and as many more as y has entries.
     contact : (x, c, y, a, units) -> T_i (N), e_L, e_h where there is a `TipContact`. arc : (quantities, stretch, s) ->
     state without gravity or tip load, exact there and the first guess elsewhere.
@@ -53,6 +55,7 @@ class RodFunctions:
     section: ca.Function
     field: ca.Function
     lengths: ca.Function
+    strains: ca.Function
     tip: ca.Function
     contact: ca.Function
     arc: ca.Function
@@ -106,23 +109,29 @@ def rod_functions(model: Model, loads: Sequence[Load] = ()) -> RodFunctions:
     chambers = model.chambers
     line, loads = line_loads(model, loads)
     with_lengths = chambers if any(load.needs_lengths for load in loads) else 0
-    section = rod.RodSection(*(ca.SX.sym(name) for name in rod.RodSection._fields))
+    section = RodSection(*(ca.SX.sym(name) for name in RodSection._fields))
     centres = [(ca.SX.sym("d_x"), ca.SX.sym("d_y")) for _ in range(chambers)]
     chamber, x = ca.SX.sym("chamber"), ca.SX.sym("x", rod.STATE_SIZE + with_lengths)
     flat = [coordinate for centre in centres for coordinate in centre]
-    c = ca.vertcat(*section, *line.symbols[:1], *flat, chamber, *line.symbols[1:])
-    along = ca.vertcat(*strain_rates(x, section, centres))
+    probed = model.section.at(model.numbers, np.zeros(model.sets), 1.0)
+    own = [ca.SX.sym("own") for _ in probed.own]
+    c = ca.vertcat(*section, *line.symbols[:1], *flat, chamber, *own, *line.symbols[1:])
+    v, u = model.section.strains(section, own, *rod.in_body(x))
+    rates = [ca.norm_2(v + ca.cross(u, ca.vertcat(d_x, d_y, 0))) for d_x, d_y in centres]
+    along = ca.vertcat(*rates, ca.norm_2(u[:2]), ca.norm_2(v))
     lengths = ca.Function("lengths", [x, c], [section.length * along], {"cse": True})
-    field = ca.vertcat(rod.field(x, section, *line.wrench(x, section)), along[:with_lengths])
+    field = ca.vertcat(rod.field(x, v, u, *line.wrench(x, section)), along[:with_lengths])
+    strains = ca.Function("strains", [x[: rod.STATE_SIZE], c], [v, u])
 
     def build(numbers: Mapping[str, Any], stretch: Any) -> list[Any]:
         L_0, F_0 = numbers["robot.length"], force_unit(model, numbers)
         state = model.section.at(numbers, numbers["pressure"], stretch)
-        scaled = rod.rod_section(state, stretch, L_0, F_0)
+        scaled = rod_section(state, stretch, L_0, F_0)
+        more = [value / unit_scale(unit, L_0, F_0) for value, unit in state.own]
         d = [coordinate / L_0 for centre in state.centres for coordinate in centre]
         g, *others = line.numbers(numbers, L_0, F_0)
         return [
-            ca.vertcat(*scaled, g, *d, state.chamber_stiffness / F_0, *others),
+            ca.vertcat(*scaled, g, *d, state.chamber_stiffness / F_0, *more, *others),
             state.imbalance / F_0,
             ca.vertcat(L_0, F_0),
         ]
@@ -132,8 +141,9 @@ def rod_functions(model: Model, loads: Sequence[Load] = ()) -> RodFunctions:
     column = ca.SX.sym("quantities", packed.size1_in(0))
     stretch, s = ca.SX.sym("stretch"), ca.SX.sym("s")
     at_rest = packed(column, stretch)[0]
-    resting = unpack_section(at_rest)
-    arc = rod.arc_state(s * resting.length, resting)
+    unloaded = ca.vertcat(ca.SX.zeros(3), ca.vec(ca.SX.eye(3)), ca.SX.zeros(6))
+    bent = strains(unloaded, at_rest)[1]
+    arc = rod.arc_state(s * unpack_section(at_rest).length, bent[0], bent[1])
     if with_lengths:  # their rates are constant on an arc
         full = ca.vertcat(arc, ca.SX.zeros(chambers))
         arc = ca.vertcat(arc, s * lengths(full, at_rest)[:chambers])
@@ -146,17 +156,11 @@ def rod_functions(model: Model, loads: Sequence[Load] = ()) -> RodFunctions:
         section=packed,
         field=ca.Function("field", [x, c], [section.length * field], {"cse": True}),
         lengths=lengths,
+        strains=strains,
         tip=ca.Function("tip", [x, c, *given], [tip], {"cse": True}),
         contact=ca.Function("contact", [x, c, *given], contact),
         arc=ca.Function("arc", [column, stretch, s], [arc]),
     )
-
-
-def strain_rates(x: Any, section: rod.RodSection, centres: Sequence[tuple[Any, Any]]) -> list[Any]:
-    """Return the rates of the chamber lengths, the bending angle and the backbone length, per stretched length."""
-    v, u = rod.strains(x, section)
-    rates = [ca.norm_2(v + ca.cross(u, ca.vertcat(d_x, d_y, 0))) for d_x, d_y in centres]
-    return [*rates, ca.norm_2(u[:2]), ca.norm_2(v)]
 
 
 @lru_cache(maxsize=8)
@@ -183,9 +187,9 @@ def stretch_near(imbalance: ca.Function, columns: Array, start: Array) -> Array:
     return found
 
 
-def unpack_section(c: Any) -> rod.RodSection:
+def unpack_section(c: Any) -> RodSection:
     """Return the rod's section from the constants of a load case."""
-    return rod.RodSection(*(c[k] for k in range(_SECTION_SIZE)))
+    return RodSection(*(c[k] for k in range(_SECTION_SIZE)))
 
 
 def centres_of(c: Any, chambers: int) -> list[tuple[Any, Any]]:

@@ -10,7 +10,7 @@ from softnlp.model import rod
 from softnlp.model.quantities import Model
 from softnlp.model.rod import Loads
 from softnlp.nlp.transcription import RK4, rk_step
-from softnlp.statics.loadcase import unpack_section
+from softnlp.statics.loadcase import RodFunctions, unpack_section
 from softnlp.statics.step import Pose, Shape
 
 Array = NDArray[np.float64]
@@ -21,18 +21,19 @@ _SAMPLES, _ZOOMS, _GRADES, _GAUSS = 6, 12, 16, 4  # of the bending angle's quadr
 _MOST_PARTS = 225
 
 
-def shape_function(field: ca.Function) -> ca.Function:
-    """Return (state, c, h) -> [state a step h further, strains (v, u), n, m], scaled, for the field of a load case.
+def shape_function(functions: RodFunctions) -> ca.Function:
+    """Return (state, c, h) -> [state a step h further, strains (v, u), n, m], scaled.
 
     n and m are the paper's, of the wall alone.
     """
+    field = functions.field
     x, c, h = ca.SX.sym("x", field.size1_in(0)), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("h")
     step = rk_step(field, RK4)
     end = x
     for _ in range(_SUBSTEPS):
         end = step(end, c, h / _SUBSTEPS)
     section = unpack_section(c)
-    every = ca.vertcat(end, *rod.strains(end, section), *rod.wall_resultants(end, section))
+    every = ca.vertcat(end, *functions.strains(end[: rod.STATE_SIZE], c), *rod.wall_resultants(end, section))
     return ca.Function("shape", [x, c, h], [every], {"cse": True})
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from softnlp.model import rod
 from softnlp.nlp.transcription import RK4, rk_step
-from softnlp.statics.loadcase import RodFunctions, centres_of, unpack_section
+from softnlp.statics.loadcase import RodFunctions, centres_of
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ def varying_rod(functions: RodFunctions) -> VaryingRod:
     local = in_units(x[: rod.STATE_SIZE], 1, F_0, 1, F_here)
     rates = part * functions.field(local, c_here)
     whole = ca.vertcat(in_units(rates, 1, F_here, 1, F_0), slope, 1)
-    v, u = rod.strains(local, unpack_section(c_here))
+    v, u = functions.strains(local, c_here)
     L = part * x[STRETCH]
     chambers = [
         ca.norm_2(L * (v + ca.cross(u, ca.vertcat(d[k], d[k + 1], 0))) + ca.vertcat(moved[k], moved[k + 1], 0))

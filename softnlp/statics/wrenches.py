@@ -11,9 +11,10 @@ import numpy as np
 
 from softnlp.base.quantity import Quantity
 from softnlp.model.dead_tip import DeadTip
-from softnlp.model.load import AtPoint, AtTip, Load, unit_scale
+from softnlp.model.load import AtPoint, AtTip, Load
 from softnlp.model.model import Model
-from softnlp.model.rod import STATE_SIZE, RodSection, tip_balance
+from softnlp.model.rod import STATE_SIZE, tip_balance
+from softnlp.model.section import RodSection, unit_scale
 from softnlp.model.tip import TipContact, gap, length_error
 from softnlp.model.weight import Weight
 from softnlp.nlp.case import Equation

@@ -109,7 +109,7 @@ class Optimiser:
 
     def __init__(self, evaluator: Evaluator) -> None:
         self.evaluator = evaluator
-        self._shape = shape_function(evaluator.functions.field)
+        self._shape = shape_function(evaluator.functions)
         self._compiled: dict[tuple[int, bytes], DesignProblem] = {}
 
     def problem(self, intervals: int, plane: Array | None = None) -> DesignProblem:
