@@ -1,7 +1,7 @@
 """The rod against a wall with its base force and moment as unknowns: single shooting over many poses at once.
 
 As in `softnlp.batch.reduced` the force is known up to a constant, N(s) = N_0 - f_e s; with a wall and
-chamber reactions N_0 is unknown beside M(0) and the forces y of the tip conditions. A state is [p, R, M, chamber
+chamber reactions N_0 is unknown beside M(0) and the forces y of the contact. A state is [p, R, M, chamber
 lengths]; data stacks the constants c of the load case and N_0.
 """
 
@@ -22,7 +22,7 @@ UNKNOWN = 6
 
 @dataclass(frozen=True, eq=False)
 class ReducedContact:
-    """Steps and maps for tip conditions with a wall; N chambers, ny forces of the conditions.
+    """Steps and maps for a contact at the tip; N chambers, ny forces of it.
 
     value : state (15 + N). directions : [state, its derivatives by N_0 and M(0) ((15 + N) x 6)]. check : [state, gap,
     bending angle, backbone length, curvature]; gap and curvature are as in `softnlp.batch.reduced`, as is onward.
@@ -40,7 +40,7 @@ class ReducedContact:
 
 
 def reduced_contact(functions: RodFunctions) -> ReducedContact:
-    """Build the steps and maps from the rod functions of tip conditions with a wall."""
+    """Build the steps and maps from the rod functions with a contact at the tip."""
     nc, N, ny = functions.field.size1_in(1), functions.model.chambers, functions.tip_unknowns
     size = STATE + N
     data, s, h = ca.SX.sym("data", nc + 3), ca.SX.sym("s"), ca.SX.sym("h")

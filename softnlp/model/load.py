@@ -76,7 +76,7 @@ class Load(Protocol):
         Parameters
         ----------
         model
-            Of the last segment.
+            Of a segment; sizes are to be the same for every segment of a body.
 
         Returns
         -------

@@ -76,7 +76,7 @@ class BlockedGrid:
         return slice(start, start + 3)
 
     def tip_forces(self, x: Array) -> Array:
-        """Return the scaled forces that the tip conditions add."""
+        """Return the scaled forces that the loads add."""
         return x[1 + self.state_size * len(self.case.transcribed.points) :]
 
     @property

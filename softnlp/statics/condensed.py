@@ -6,7 +6,7 @@ For J(x) dx = -g, with x = [stretch | x_0 | ... | x_K | y] and g = [balance | ba
     stretch   the balance depends on nothing else, so d(lambda) = -g_0 / b'(lambda)
     base      d(p, R, L_i)_0 = -g_base; d(n, m)_0 stays unknown: six directions and one known part
     interval  dx_k+1 = F_x dx_k + F_c c' d(lambda) + g_k, one Runge-Kutta step with seven forward directions
-    tip       6 + n_y equations for d(n, m)_0 and the forces y that the tip conditions add
+    tip       6 + n_y equations for d(n, m)_0 and the forces y that the loads add
 
 The same numbers as a sparse factorisation gives, for the cost of one sweep.
 """

@@ -70,11 +70,6 @@ class RodFunctions:
         """The number of entries of y."""
         return int(self.tip.size1_in(2))
 
-    @property
-    def has_contact(self) -> bool:
-        """Whether there is a `TipContact`."""
-        return self.contact.n_out() > 0
-
     def declared(self, model: Model | None = None) -> dict[str, Quantity]:
         """Return every quantity of a load case by name: those of the model, then those of the loads.
 
@@ -207,7 +202,7 @@ def whole_weight(c: Any) -> Any:
 class LoadCase:
     """One robot in one state of loading, as equations in scaled units.
 
-    symbols : its unknowns, the stretch, the column of all states, and the forces that the tip conditions add, if any.
+    symbols : its unknowns, the stretch, the column of all states, and what the loads add, if anything.
     residuals : as many equations. ends : those of them before and behind the intervals.
     fine_residuals : the same at half the step. outputs : by name, SI and world frame: "stretch", "tip_position" (3),
     "tip_rotation" (3x3), "chamber_lengths" (N), "bending_angle", "backbone_length", and "tip_forces", those added.

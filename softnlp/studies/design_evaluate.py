@@ -141,7 +141,7 @@ class Evaluator:
 
     @property
     def functions(self) -> RodFunctions:
-        """The rod's functions with the tip conditions of the shape that is solved last."""
+        """The rod's functions with the loads of the shape that is solved last."""
         return self.solver.functions if self.solver else self.poses.functions
 
     def free(self, model: Model, pressure: float) -> Evaluation:
