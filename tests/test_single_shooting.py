@@ -36,7 +36,9 @@ def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def both(model: Model, engine: EngineName = "newton", **chosen: object) -> tuple[PoseSolver, PoseSolver]:
     numerics = replace(Numerics(engine=engine), **chosen)  # type: ignore[arg-type]
-    return PoseSolver(model, numerics), PoseSolver(model, numerics, by_machine=False)
+    return PoseSolver(model, numerics), PoseSolver(
+        model, numerics, equations=compiled.rod_equations(model, by_machine=False)
+    )
 
 
 def drawn(seed: int) -> tuple[Model, Loads, Array]:

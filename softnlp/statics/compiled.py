@@ -58,7 +58,8 @@ class RodEquations:
     def _worth(self, poses: float) -> SingleShooting | None:
         """Return it, counting what it would do this time: as much as for so many poses."""
         self._asked[0] += poses
-        if self._asked[0] <= _WORTH_COMPILING or self.functions.conditions is not DEAD_LOADS:
+        possible = self.functions.by_machine and self.functions.conditions is DEAD_LOADS
+        if not possible or self._asked[0] <= _WORTH_COMPILING:
             return None
         return self._compiled
 
@@ -103,7 +104,7 @@ class RodEquations:
         }
 
 
-def rod_equations(model: Model, conditions: TipConditions = DEAD_LOADS) -> RodEquations:
-    """Compile the rod of a model."""
-    functions = rod_functions(model, conditions)
+def rod_equations(model: Model, conditions: TipConditions = DEAD_LOADS, *, by_machine: bool = True) -> RodEquations:
+    """Compile the rod of a model. by_machine : see `RodFunctions`."""
+    functions = rod_functions(model, conditions, by_machine=by_machine)
     return RodEquations(functions, functions.declared())

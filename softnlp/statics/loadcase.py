@@ -51,7 +51,8 @@ class RodFunctions:
     s in 0..1. lengths : (x, c) -> rates of the chamber lengths, the bending angle and the backbone length.
     tip : (x, c, force, moment, y, a, units) -> the tip residuals, 6 and as many more as y has entries.
     contact : (x, c, y, a, units) -> T_i (N), e_L, e_h. arc : (quantities, stretch, s) -> state without gravity or tip
-    load, exact there and the first guess elsewhere.
+    load, exact there and the first guess elsewhere. by_machine : whether machine code may take the place of the virtual
+    machine where that pays: the same numbers but for round-off, from when on depends on what was solved before.
     """
 
     model: Model
@@ -62,6 +63,7 @@ class RodFunctions:
     tip: ca.Function
     contact: ca.Function
     arc: ca.Function
+    by_machine: bool = True
 
     @property
     def state_size(self) -> int:
@@ -83,8 +85,8 @@ class RodFunctions:
         return {**quantities(numbers), **taken}
 
 
-def rod_functions(model: Model, conditions: TipConditions = DEAD_LOADS) -> RodFunctions:
-    """Compile the rod of a model for symbols in place of its numbers."""
+def rod_functions(model: Model, conditions: TipConditions = DEAD_LOADS, *, by_machine: bool = True) -> RodFunctions:
+    """Compile the rod of a model for symbols in place of its numbers. by_machine : see `RodFunctions`."""
     chambers = model.robot.chambers
     with_lengths = chambers if conditions.has_contact else 0
     c = ca.SX.sym("c", _SECTION_SIZE + 2 + 2 * chambers)
@@ -121,6 +123,7 @@ def rod_functions(model: Model, conditions: TipConditions = DEAD_LOADS) -> RodFu
         tip=ca.Function("tip", [x, c, force, moment, y, a, units], [conditions.residual(at)], {"cse": True}),
         contact=ca.Function("contact", [x, c, y, a, units], judged),
         arc=ca.Function("arc", [column, stretch, s], [arc]),
+        by_machine=by_machine,
     )
 
 

@@ -46,7 +46,7 @@ class PoseSolver:
     """Solves poses of one model; compiled grids are kept between poses, so a sequence pays for each once.
 
     model : robot, silicone, coefficients, conventions, all numbers. unloaded_accuracy : estimate to aim for, times 3,
-    where no load acts, if it is below that of the numerics. by_machine : whether poses may come from machine code.
+    where no load acts, if it is below that of the numerics.
     """
 
     def __init__(
@@ -56,10 +56,8 @@ class PoseSolver:
         *,
         unloaded_accuracy: float = UNLOADED_ACCURACY * 3,
         equations: RodEquations | None = None,
-        by_machine: bool = True,
     ) -> None:
         self.numerics = numerics
-        self._by_machine = by_machine
         self._unloaded_accuracy = unloaded_accuracy
         self.equations = equations or rod_equations(model)
         self._set_model(model)
@@ -171,7 +169,7 @@ class PoseSolver:
     def _proposed(self, column: Array, loads: Loads, near: Solved | None) -> Solved | None:
         """Return the pose that single shooting finds in machine code, where that is compiled and certain of it."""
         numerics = self.numerics
-        if not self._by_machine or numerics.transcription != "multiple-shooting" or numerics.engine == "ipopt":
+        if numerics.transcription != "multiple-shooting" or numerics.engine == "ipopt":
             return None
         single = self.equations.single_shooting()
         if single is None:
