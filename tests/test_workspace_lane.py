@@ -10,23 +10,24 @@ import pytest
 
 from softnlp import BAR, Loads, Numerics, material, robot
 from softnlp.base.status import Status
-from softnlp.batch import newton, stretches
+from softnlp.batch import newton
 from softnlp.batch.alone import Alone
 from softnlp.batch.chunk import ChunkSolver
 from softnlp.batch.contact_newton import PATH, BlockedShot, ContactBatch, Stage
 from softnlp.batch.grids import MOST_INTERVALS
-from softnlp.batch.jit import can_compile
 from softnlp.batch.newton import Batch, BatchSolver, Shot
 from softnlp.batch.plan import Plan, cells
 from softnlp.batch.pose_lane import PoseLane
 from softnlp.batch.poses import STATUSES, Lane, Rows
-from softnlp.batch.reduced import reduced_rod
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import COEFFICIENT_SETS, Coefficients
 from softnlp.model.quantities import Model
 from softnlp.model.tip import TipContact
+from softnlp.native.jit import can_compile
+from softnlp.statics import stretches
 from softnlp.statics.branch import branch_function, stretch_on_branch
 from softnlp.statics.loadcase import rod_functions
+from softnlp.statics.reduced import reduced_rod
 from softnlp.statics.solver import PoseSolver
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.forward import forward

@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 from softnlp.batch.arrays import joined, some, spread
 from softnlp.batch.bodies import self_intersecting
 from softnlp.batch.contact_newton import PATH, BlockedShot, ContactBatch, Stage
-from softnlp.batch.kernels import Kernels
 from softnlp.batch.plan import Plan
 from softnlp.batch.pose_lane import PoseLane, Poses, Sections, entries
-from softnlp.batch.reduced import POSITION
 from softnlp.batch.reduced_contact import reduced_contact
-from softnlp.batch.shooting import shooting
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.quantities import LOADS
 from softnlp.model.rod import Loads
 from softnlp.model.tip import TipContact
+from softnlp.native.kernels import Kernels
+from softnlp.native.shooting import shooting
 from softnlp.statics.blocked import TOUCHING
 from softnlp.statics.blocked_step import PULL
 from softnlp.statics.loadcase import rod_functions, unpack_section
+from softnlp.statics.reduced import POSITION
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.wall import Wall, standing_wall
 

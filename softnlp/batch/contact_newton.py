@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from softnlp.batch.arrays import replaced, some
 from softnlp.batch.grids import MOST_INTERVALS, grid_level, whole_groups
-from softnlp.batch.kernels import WIDTH
-from softnlp.batch.reduced import MOMENT, POSITION, ROTATION, STATE
 from softnlp.batch.reduced_contact import UNKNOWN
-from softnlp.batch.shooting import Shooting
+from softnlp.native.kernels import WIDTH
+from softnlp.native.shooting import Shooting
 from softnlp.statics.condensed import plane_directions
 from softnlp.statics.loadcase import RodFunctions, whole_weight
+from softnlp.statics.reduced import MOMENT, POSITION, ROTATION, STATE
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from softnlp.batch.arrays import some
 from softnlp.batch.bodies import self_intersecting
-from softnlp.batch.kernels import Kernels
-from softnlp.batch.newton import Batch, BatchSolver, Shot, base_state
+from softnlp.batch.newton import Batch, BatchSolver, Shot
 from softnlp.batch.plan import Plan
-from softnlp.batch.reduced import STATE, reduced_rod
-from softnlp.batch.shooting import shooting
-from softnlp.batch.stretches import Stretches, stretch_maps
 from softnlp.model.quantities import LOADS
+from softnlp.native.kernels import Kernels
+from softnlp.native.shooting import shooting
 from softnlp.statics.loadcase import rod_functions, unpack_section
+from softnlp.statics.reduced import STATE, base_state, reduced_rod
+from softnlp.statics.stretches import Stretches, stretch_maps
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

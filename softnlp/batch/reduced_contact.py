@@ -1,6 +1,6 @@
 """The rod against a wall with its base force and moment as unknowns: single shooting over many poses at once.
 
-As in `softnlp.batch.reduced` the force is known up to a constant, N(s) = N_0 - f_e s; with a wall and
+As in `softnlp.statics.reduced` the force is known up to a constant, N(s) = N_0 - f_e s; with a wall and
 chamber reactions N_0 is unknown beside M(0) and the forces y of the contact. A state is [p, R, M, chamber
 lengths]; data stacks the constants c of the load case and N_0.
 """
@@ -12,9 +12,9 @@ from typing import Any
 
 import casadi as ca
 
-from softnlp.batch.kernels import Step
-from softnlp.batch.reduced import MOMENT, STATE, advanced, checked, function
+from softnlp.native.kernels import Step
 from softnlp.statics.loadcase import RodFunctions, whole_weight
+from softnlp.statics.reduced import MOMENT, STATE, advanced, checked, function
 
 UNKNOWN = 6
 """Directions of a shooting: N_0, then M(0)."""
@@ -25,7 +25,7 @@ class ReducedContact:
     """Steps and maps for a contact at the tip; N chambers, ny forces of it.
 
     value : state (15 + N). directions : [state, its derivatives by N_0 and M(0) ((15 + N) x 6)]. check : [state, gap,
-    bending angle, backbone length, curvature]; gap and curvature are as in `softnlp.batch.reduced`, as is onward.
+    bending angle, backbone length, curvature]; gap and curvature are as in `softnlp.statics.reduced`, as is onward.
     tip : [state, derivatives, data, y, a, units] -> [residual (6 + ny), its derivatives by N_0,
     M(0) and y, column by column]; a is what the loads take (`softnlp.statics.loadcase.RodFunctions`).
     arc : [quantities, stretch] -> the unloaded state.

@@ -23,9 +23,10 @@ from softnlp.statics.blocked_step import failed_step, solved_step, touching_step
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.compiled import RodEquations, rod_equations
 from softnlp.statics.free_shape import Free, FreeShapes, Route, free_shape, from_zero, route_from
+from softnlp.statics.grid_size import MOST_INTERVALS
 from softnlp.statics.loadcase import RodFunctions
 from softnlp.statics.pose_grid import iteration_cost
-from softnlp.statics.solver import MOST_INTERVALS, SEARCHED_BY, PoseSolver
+from softnlp.statics.solver import SEARCHED_BY, PoseSolver
 from softnlp.statics.step import Step
 from softnlp.statics.wall import Situation, Wall, keeps_plane, slipping_pressure
 

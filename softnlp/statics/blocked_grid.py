@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +19,7 @@ from softnlp.statics.compiled import RodEquations
 from softnlp.statics.condensed import CondensedSolver, plane_directions
 from softnlp.statics.free_shape import Free
 from softnlp.statics.loadcase import LoadCase, load_case
-from softnlp.statics.pose import between_nodes
+from softnlp.statics.pose import Mapped, between_nodes
 from softnlp.statics.wall import Situation
 from softnlp.statics.weighted import Weighted
 
@@ -160,7 +159,7 @@ class Blocked:
     free: Free
 
 
-def transferred(found: Blocked, grid: BlockedGrid, shape: ca.Function) -> Array:
+def transferred(found: Blocked, grid: BlockedGrid, shape: Mapped) -> Array:
     """Return the unknowns of a solution on another grid, see `between_nodes`."""
     x = found.solution.x
     if found.grid is grid:

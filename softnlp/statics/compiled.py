@@ -16,13 +16,16 @@ from softnlp.model.load import Load
 from softnlp.model.quantities import Model
 from softnlp.statics.branch import branch_function
 from softnlp.statics.loadcase import RodFunctions, rod_functions
-from softnlp.statics.pose import shape_function
+from softnlp.statics.pose import Mapped, shape_function
+from softnlp.statics.single_shooting import SingleShooting, single_shooting
 from softnlp.statics.stability import MOST_INTERVALS, conjugate_points, transition_function
 from softnlp.statics.varying import VaryingRod, varying_rod
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
+_WORTH_COMPILING = 16  # poses
+_OF_A_POSE = 0.15  # that a shape takes
 MOST_GRIDS = 64
 """How many grids, and problems on grids, are kept of one rod."""
 
@@ -39,15 +42,39 @@ class RodEquations:
     declared: dict[str, Quantity]
     grids: dict[Hashable, Any] = field(default_factory=dict)
     _mapped: dict[int, ca.Function] = field(default_factory=dict)
+    _asked: list[float] = field(default_factory=lambda: [0.0])
 
     @cached_property
     def branch(self) -> ca.Function:
         """The stretch's branch, see `branch_function`; built at first use, as all that follows."""
         return branch_function(self.functions.model)
 
+    def single_shooting(self) -> SingleShooting | None:
+        """Return machine code for single poses, from when what was done without it has taken as long as to compile it.
+
+        None before, under other loads than dead ones, and where there is nothing to compile with.
+        """
+        return self._worth(1.0)
+
+    def _worth(self, poses: float) -> SingleShooting | None:
+        """Return it, counting what it would do this time: as much as for so many poses."""
+        self._asked[0] += poses
+        possible = self.functions.by_machine and not self.functions.loads
+        if not possible or self._asked[0] <= _WORTH_COMPILING:
+            return None
+        return self._compiled
+
     @cached_property
-    def shape(self) -> ca.Function:
-        """The shape between nodes, see `shape_function`."""
+    def _compiled(self) -> SingleShooting | None:
+        return single_shooting(self.functions)
+
+    @property
+    def shape(self) -> Mapped:
+        """The shape between nodes, see `shape_function`; in machine code where that has been compiled."""
+        return self._worth(_OF_A_POSE) or self._shape
+
+    @cached_property
+    def _shape(self) -> ca.Function:
         return shape_function(self.functions)
 
     @cached_property
@@ -83,7 +110,7 @@ class RodEquations:
         }
 
 
-def rod_equations(model: Model, loads: Sequence[Load] = ()) -> RodEquations:
-    """Compile the rod of a model. loads : beside the dead ones."""
-    functions = rod_functions(model, loads)
+def rod_equations(model: Model, loads: Sequence[Load] = (), *, by_machine: bool = True) -> RodEquations:
+    """Compile the rod of a model. loads : beside the dead ones. by_machine : see `RodFunctions`."""
+    functions = rod_functions(model, loads, by_machine=by_machine)
     return RodEquations(functions, functions.declared())

@@ -27,6 +27,7 @@ from softnlp.nlp.linear import BorderedSolver, LinearSolver, SparseSolver
 from softnlp.nlp.problem import CompiledProblem
 from softnlp.nlp.transcription import MultipleShooting, Tableau, rk_step
 from softnlp.statics.loadcase import LoadCase, RodFunctions, stretch_imbalance
+from softnlp.statics.tangents import Tangents, tangents
 
 Array = NDArray[np.float64]
 
@@ -70,12 +71,9 @@ class CondensedSolver:
         """
         rows, known = len(self._into[0]), self._base.shape[1]
         given = np.zeros(x.size) if g is None else g
-        directions, tip, turned = evaluated(self._sweep(1), x, p, given)
-        if not np.max(np.abs(tip)) < _LARGEST:  # nan is not either
-            raise np.linalg.LinAlgError("the linearised tip equations are not finite")
+        directions, tip, turned = self._swept(x, p, given[:, None])
         matrix = np.delete(tip, known, axis=1)
-        every = directions.reshape(*self._shape, known + 1)
-        return TipSystem(matrix, tip[:, known] + given[-rows:], every, float(turned[0, 0]))
+        return TipSystem(matrix, tip[:, known] + given[-rows:], directions, float(turned[0, 0]))
 
     def solve(self, x: Array, p: Array, g: Array) -> Array:
         """Return dx. Raises `numpy.linalg.LinAlgError` where the tip equations are singular or not finite."""
@@ -88,16 +86,50 @@ class CondensedSolver:
     def solve_many(self, x: Array, p: Array, G: Array) -> Array:
         """Return the columns dx for as many right sides G (n, r) in one sweep. Raises as `solve`."""
         r, rows, known = G.shape[1], len(self._into[0]), self._base.shape[1]
-        directions, tip, turned = evaluated(self._sweep(r), x, p, G)
-        if not np.max(np.abs(tip)) < _LARGEST:  # nan is not either
-            raise np.linalg.LinAlgError("the linearised tip equations are not finite")
+        every, tip, turned = self._swept(x, p, G)
         matrix = np.delete(tip, np.s_[known : known + r], axis=1)
         right = tip[:, known : known + r] + G[-rows:]
         found = np.linalg.solve(self._into @ matrix, -(self._into @ right))
         nx, nodes = self._shape
-        every = directions.reshape(nx, nodes, known + r)
         states = every[:, :, :known] @ found[:known] + every[:, :, known:]
         return np.concatenate([turned, states.transpose(1, 0, 2).reshape(nx * nodes, r), found[known:]])
+
+    def _swept(self, x: Array, p: Array, G: Array) -> tuple[Array, Array, Array]:
+        """Return directions (nx, K + 1, d + r), the linearised tip (rows, d + r + n_y) and d(stretch) (1, r).
+
+        Raises `numpy.linalg.LinAlgError` where the tip equations are not finite.
+        """
+        r, known = G.shape[1], self._base.shape[1]
+        own = tangents(self._functions)
+        if own.ready(self._method.intervals):
+            with np.errstate(all="ignore"):
+                every, tip, turned = self._by_machine(own, x, p, G)
+        else:
+            directions, tip, turned = evaluated(self._sweep(r), x, p, G)
+            every = directions.reshape(*self._shape, known + r)
+        if not np.max(np.abs(tip)) < _LARGEST:  # nan is not either
+            raise np.linalg.LinAlgError("the linearised tip equations are not finite")
+        return every, tip, turned
+
+    def _by_machine(self, own: Tangents, x: Array, p: Array, G: Array) -> tuple[Array, Array, Array]:
+        """Return what the sweep function does, its intervals differentiated in machine code and then put together."""
+        nx, nodes = self._shape
+        r, known, rows, K = G.shape[1], self._base.shape[1], len(self._into[0]), nodes - 1
+        _, tip, section = _pieces(self._functions, self._method.tableau, known + r, r)
+        n_p = section.size1_in(0)
+        c, slope, balance_slope, scales = evaluated(section, p[:n_p], x[:1])
+        d_stretch = -G[:1] / balance_slope
+        states = x[1 : 1 + nx * nodes].reshape(nodes, nx)
+        maps, by_stretch = own.maps(states[:K].T, c[:, 0], slope[:, 0], 1 / K)
+        forced = by_stretch[:, :, None] * d_stretch + G[1 + nx - 6 : -rows].reshape(K, nx, r)
+        every = np.zeros((nodes, nx, known + r))
+        every[0, _FORCE, :known] = self._base
+        every[0, :12, known:], every[0, 18:, known:] = -G[1:13], -G[13 : 1 + nx - 6]
+        for k in range(K):
+            np.matmul(maps[k], every[k], out=every[k + 1])
+            every[k + 1, :, known:] += forced[k]
+        (linear,) = evaluated(tip, every[K], states[K], c, slope @ d_stretch, x[1 + nx * nodes :], p[n_p:], scales)
+        return every.transpose(1, 0, 2), linear, d_stretch
 
     def _sweep(self, right_sides: int) -> ca.Function:
         """Return the sweep for so many right sides, built at first use."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Hashable
+from typing import Any
 
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.load import Load
@@ -22,7 +23,7 @@ MOST_KINDS = 8
 """How many rods are kept; those that were used least recently go."""
 
 
-def pose_solver(model: Model, numerics: Numerics, **settings: float) -> PoseSolver:
+def pose_solver(model: Model, numerics: Numerics, **settings: Any) -> PoseSolver:
     """Return a solver for use in this thread, which shares what it compiles with all others for models of its kind."""
     return PoseSolver(model, numerics, equations=kept_equations(model), **settings)
 

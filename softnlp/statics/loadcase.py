@@ -46,7 +46,9 @@ class RodFunctions:
     v, u.
     tip : (x, c, y, a, units) -> the tip residuals, 6 and as many more as y has entries.
     contact : (x, c, y, a, units) -> T_i (N), e_L, e_h where there is a `TipContact`. arc : (quantities, stretch, s) ->
-    state without gravity or tip load, exact there and the first guess elsewhere.
+    state without gravity or tip load, exact there and the first guess elsewhere. by_machine : whether machine
+    code may take the place of the virtual machine where that pays: the same numbers but for round-off, from when on
+    depends on what was solved before.
     """
 
     model: Model
@@ -59,6 +61,7 @@ class RodFunctions:
     tip: ca.Function
     contact: ca.Function
     arc: ca.Function
+    by_machine: bool = True
 
     @property
     def state_size(self) -> int:
@@ -99,8 +102,11 @@ class RodFunctions:
         return ca.vertcat(*(given[name].symbol for name in self._tip_names))
 
 
-def rod_functions(model: Model, loads: Sequence[Load] = ()) -> RodFunctions:
-    """Compile the rod of a model for symbols in place of its numbers. loads : beside the dead ones."""
+def rod_functions(model: Model, loads: Sequence[Load] = (), *, by_machine: bool = True) -> RodFunctions:
+    """Compile the rod of a model for symbols in place of its numbers.
+
+    loads : beside the dead ones. by_machine : see `RodFunctions`.
+    """
     chambers = model.chambers
     line, loads = line_loads(model, loads)
     with_lengths = chambers if any(load.needs_lengths for load in loads) else 0
@@ -155,6 +161,7 @@ def rod_functions(model: Model, loads: Sequence[Load] = ()) -> RodFunctions:
         tip=ca.Function("tip", [x, c, *given], [tip], {"cse": True}),
         contact=ca.Function("contact", [x, c, *given], contact),
         arc=ca.Function("arc", [column, stretch, s], [arc]),
+        by_machine=by_machine,
     )
 
 

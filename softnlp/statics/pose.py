@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any, Protocol
+
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +20,15 @@ Array = NDArray[np.float64]
 
 SHAPE_POINTS = 61
 _SUBSTEPS = 4
-_SAMPLES, _ZOOMS, _GRADES, _GAUSS = 6, 12, 16, 4  # of the bending angle's quadrature
-_MOST_PARTS = 225
+# Of the bending angle's quadrature.
+_SAMPLES, _ZOOMS, _MOST_PARTS = 6, 12, 225
+_ENDS = (1 - np.cos(np.pi * np.arange(_SAMPLES) / (_SAMPLES - 1))) / 2  # Chebyshev points, 0 and 1 among them
+_TO_POWERS = np.linalg.inv(np.vander(_ENDS, increasing=True))
+_GRADES = np.append(0.0, 0.5 ** np.arange(16, -1, -1))  # from the least outwards
+_GRADED_GAUSS = np.polynomial.legendre.leggauss(4)
+_LITTLE = 0.25  # change of a curvature over its mean, up to which a quadrature without grades is at round-off
+_GAUSS = tuple(part / 2 + middle for part, middle in zip(np.polynomial.legendre.leggauss(12), (0.5, 0.0), strict=True))
+_TO_GAUSS = (np.vander(_GAUSS[0], _SAMPLES, increasing=True) @ _TO_POWERS).T  # from samples to its points
 
 
 def shape_function(functions: RodFunctions) -> ca.Function:
@@ -37,31 +47,52 @@ def shape_function(functions: RodFunctions) -> ca.Function:
     return ca.Function("shape", [x, c, h], [every], {"cse": True})
 
 
-def between_nodes(function: ca.Function, nodes: Array, constants: Array, s: Array) -> Array:
+class Mapped(Protocol):
+    """What `shape_function` returns, or the same in machine code."""
+
+    def map(self, n: int) -> Callable[..., Any]:
+        """Return what takes n columns of states, the constants and n steps (1, n)."""
+        ...
+
+
+def between_nodes(function: Mapped, nodes: Array, constants: Array, s: Array) -> Array:
     """Evaluate `shape_function` at any s in 0..1 from the node to its left; (30, len(s))."""
     K = nodes.shape[1] - 1
     left = np.minimum(np.floor(s * K + 1e-9).astype(int), K)
     return np.asarray(function.map(s.size)(nodes[:, left], constants, (s - left / K)[None, :]))
 
 
-def bending_angle(function: ca.Function, nodes: Array, constants: Array) -> float:
+def bending_angle(function: Mapped, nodes: Array, constants: Array) -> float:
     """Return the integral of sqrt(u_x^2 + u_y^2) over s [rad], to 1e-7 also where the curvature vanishes on the way.
 
     function : of `shape_function`. The curvature is smooth, its norm has a kink where it crosses zero, or nearly so. In
-    every interval, or part of the rod where those are many, the curvature is the polynomial through `_SAMPLES` points,
-    and the quadrature of its norm is graded towards the point where that is smallest.
+    every interval, or part of the rod where those are many, the curvature is the polynomial through `_SAMPLES` points.
+    Where it changes little its norm is smooth too; elsewhere the quadrature of the norm is graded towards the point
+    where that is smallest.
     """
     K = min(nodes.shape[1] - 1, _MOST_PARTS)
     length = float(unpack_section(constants).length)  # in L_0
-    ends = (1 - np.cos(np.pi * np.arange(_SAMPLES) / (_SAMPLES - 1))) / 2  # Chebyshev points, 0 and 1 among them
-    s = ((np.arange(K)[:, None] + ends[:-1]) / K).ravel()
+    s = ((np.arange(K)[:, None] + _ENDS[:-1]) / K).ravel()
     u = between_nodes(function, nodes, constants, np.append(s, 1.0))[21:23]
     last = u[:, _SAMPLES - 1 :: _SAMPLES - 1]  # the right end of each interval is the left one of the next
     values = np.concatenate([u[:, :-1].reshape(2, K, -1), last[:, :, None]], axis=2)
-    coefficients = np.einsum("ij,akj->aki", np.linalg.inv(np.vander(ends, increasing=True)), values)
+    middle = values.mean(axis=2, keepdims=True)
+    away = np.abs(values - middle).sum(axis=0).max(axis=1)
+    smooth = away < _LITTLE * np.hypot(*middle[:, :, 0])
+    total = np.hypot(*(values[:, smooth] @ _TO_GAUSS)) @ _GAUSS[1]
+    angle: float = (np.sum(total) + np.sum(_graded(values[:, ~smooth]))).item() * length / K
+    return angle
+
+
+def _graded(values: Array) -> Array:
+    """Return the integrals over 0..1 of the norm of polynomials through values (2, k, samples), (k,)."""
+    K = values.shape[1]
+    if K == 0:
+        return np.zeros(0)
+    coefficients = np.einsum("ij,akj->aki", _TO_POWERS, values)
 
     def norm(at: Array) -> Array:
-        """Return the curvature's norm at local coordinates (K, n) in 0..1."""
+        """Return the norm at local coordinates (K, n) in 0..1."""
         found = np.zeros((2, *at.shape))
         for c in np.moveaxis(coefficients, 2, 0)[::-1]:
             found = found * at + c[:, :, None]
@@ -74,16 +105,14 @@ def bending_angle(function: ca.Function, nodes: Array, constants: Array) -> floa
         best = np.argmin(norm(at), axis=1)
         left, width = at[np.arange(K), np.clip(best - 1, 0, 6)], width / 4
     least = left + width / 2
-    graded = np.append(0.0, 0.5 ** np.arange(_GRADES, -1, -1))  # from the least outwards
-    points, weights = np.polynomial.legendre.leggauss(_GAUSS)
+    points, weights = _GRADED_GAUSS
     total = np.zeros(K)
     for reach in (least, least - 1.0):  # to the left end and to the right one
-        middle = least[:, None] - reach[:, None] * (graded[1:] + graded[:-1]) / 2
-        half = np.abs(reach)[:, None] * (graded[1:] - graded[:-1]) / 2
+        middle = least[:, None] - reach[:, None] * (_GRADES[1:] + _GRADES[:-1]) / 2
+        half = np.abs(reach)[:, None] * (_GRADES[1:] - _GRADES[:-1]) / 2
         at = middle[:, :, None] + half[:, :, None] * points
         total += np.sum(norm(at.reshape(K, -1)).reshape(at.shape) * half[:, :, None] * weights, axis=(1, 2))
-    angle: float = np.sum(total).item() * length / K
-    return angle
+    return total
 
 
 def shape_of(values: Array, s: Array, length_unit: float, force_unit: float) -> Shape:

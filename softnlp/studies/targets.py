@@ -144,7 +144,17 @@ class GridMap:
         """Return a point as a pose on this grid, not examined, for going on to another grid."""
         p = self._grid.problem.pack(self._poses.values(point.pressure, self._loads))
         solution, nodes = Solution(point.x, p, 0.0, 0, ""), self._grid.nodes(point.x)
-        return Solved(self._grid, solution, nodes, nodes, self._grid.constants(solution), 0.0, 0.0, stable=True)
+        return Solved(
+            lambda: self._grid,
+            self.intervals,
+            solution,
+            nodes,
+            nodes,
+            self._grid.constants(solution),
+            0.0,
+            0.0,
+            stable=True,
+        )
 
     def _newton(self, pressure: Array, x: Array, p: Array) -> TipPoint | None:
         """Take Newton steps, each with the derivatives by pressure; those of the last step belong to the point."""

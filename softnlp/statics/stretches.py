@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.units import BAR
-from softnlp.batch.shooting import Shooting
+from softnlp.native.shooting import Shooting
 from softnlp.statics.branch import SILICONE, branch_function
 from softnlp.statics.loadcase import RodFunctions
 

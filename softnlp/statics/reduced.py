@@ -14,11 +14,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
-from softnlp.batch.kernels import Step
 from softnlp.model import rod
+from softnlp.native.kernels import Step
 from softnlp.nlp.transcription import RK4
 from softnlp.statics.loadcase import RodFunctions, whole_weight
+
+Array = NDArray[np.float64]
 
 POSITION, ROTATION, MOMENT = slice(0, 3), slice(3, 12), slice(12, 15)
 STATE = 15
@@ -70,6 +74,17 @@ def reduced_rod(functions: RodFunctions) -> ReducedRod:
             ca.vertcat(full(state, 1), rod.tip_balance(full(state, 1), force, moment)),
         ),
     )
+
+
+def base_state(base: Array) -> Array:
+    """Return the state at the base for M(0), with its derivatives by M(0)."""
+    state = np.zeros((4 * STATE + 1, base.shape[1]))
+    state[[3, 7, 11]] = 1.0
+    state[MOMENT] = base
+    for j in range(3):
+        state[STATE * (j + 1) + MOMENT.start + j] = 1.0
+    state[4 * STATE] = np.inf
+    return state
 
 
 def function(name: str, given: list[Any], result: Any) -> ca.Function:
