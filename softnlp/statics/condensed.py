@@ -128,7 +128,8 @@ class CondensedSolver:
         for k in range(K):
             np.matmul(maps[k], every[k], out=every[k + 1])
             every[k + 1, :, known:] += forced[k]
-        (linear,) = evaluated(tip, every[K], states[K], c, slope @ d_stretch, x[1 + nx * nodes :], p[n_p:], scales)
+        y, a = x[1 + nx * nodes :], self._functions.tip_numbers(p)
+        (linear,) = evaluated(tip, every[K], states[K], c, slope @ d_stretch, y, a, scales)
         return every.transpose(1, 0, 2), linear, d_stretch
 
     def _sweep(self, right_sides: int) -> ca.Function:
@@ -220,7 +221,7 @@ def _pieces(
     section = ca.Function(
         "section",
         [column, stretch],
-        [constants, c_slope, ca.jacobian(balance, stretch), scales],
+        [constants, ca.densify(c_slope), ca.jacobian(balance, stretch), scales],
         {"cse": True},
     )
     r = right_sides
