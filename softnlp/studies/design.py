@@ -22,7 +22,7 @@ from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.statics.wall import checked_contact
-from softnlp.studies.design_candidate import Candidate, Workshop, structure
+from softnlp.studies.design_candidate import Candidate, CandidateEvaluator, structure
 from softnlp.studies.design_evaluate import Evaluator
 from softnlp.studies.design_task import MOST_ENUMERATED, DesignTask, Setting, check_task, with_choices
 from softnlp.studies.forward import checked_loads
@@ -144,19 +144,19 @@ def finished(setting: Setting, task: DesignTask, candidates: Sequence[Candidate]
 
 def _candidates(setting: Setting, task: DesignTask, workers: int) -> Iterator[Candidate]:
     """Yield every candidate as it is done."""
-    workshop = Workshop(setting, task)
+    evaluator = CandidateEvaluator(setting, task)
     if prod(len(values) for values in task.lists.values()) > MOST_ENUMERATED:
-        yield from searched(workshop)
+        yield from searched(evaluator)
         return
     every = list(enumerate(task.combinations(), start=1))
     if workers > 1:
         yield from _in_processes(setting, task, every, workers)
         return
     for number, combination in every:
-        yield workshop.candidate(number, combination)
+        yield evaluator.candidate(number, combination)
 
 
-def searched(workshop: Workshop) -> Iterator[Candidate]:
+def searched(evaluator: CandidateEvaluator) -> Iterator[Candidate]:
     """Yield the candidates of a search by optuna's tree-structured Parzen estimator; none twice, at most `trials`.
 
     A candidate that is not feasible counts as worse than every feasible one that was met before it.
@@ -175,7 +175,7 @@ def searched(workshop: Workshop) -> Iterator[Candidate]:
             key="choices",
         ) from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    task = workshop.task
+    task = evaluator.task
     study = optuna.create_study(
         direction="maximize" if task.maximise else "minimize", sampler=optuna.samplers.TPESampler(seed=_SEED)
     )
@@ -186,7 +186,7 @@ def searched(workshop: Workshop) -> Iterator[Candidate]:
         place = tuple(trial.suggest_categorical(name, list(range(len(values)))) for name, values in task.lists.items())
         if place not in met:
             combination = {name: values[k] for k, (name, values) in zip(place, task.lists.items(), strict=True)}
-            candidate = workshop.candidate(len(met) + 1, combination)
+            candidate = evaluator.candidate(len(met) + 1, combination)
             if candidate.is_feasible and isfinite(candidate.objective):
                 value = candidate.objective / task.objective.scale
                 worst = min(worst, task.sign * value)
@@ -240,8 +240,8 @@ def _begin(found: Queue[Candidate], stop: Event) -> None:
 
 def _chunk(setting: Setting, task: DesignTask, chunk: Sequence[tuple[int, Mapping[str, Any]]]) -> None:
     """Send the candidates of a chunk, each as it is done."""
-    workshop = Workshop(setting, task)
+    evaluator = CandidateEvaluator(setting, task)
     for number, combination in chunk:
         if _Worker.stop.is_set():
             return
-        _Worker.found.put(workshop.candidate(number, combination))
+        _Worker.found.put(evaluator.candidate(number, combination))

@@ -18,7 +18,6 @@ from softnlp.model.rules import neighbours
 from softnlp.statics.arc import Arc, unloaded_arc
 from softnlp.statics.blocked_grid import Blocked
 from softnlp.statics.kept import blocked_solver, pose_solver
-from softnlp.statics.loadcase import RodFunctions
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.step import Pose, Step
 from softnlp.statics.wall import Wall, standing_wall
@@ -138,11 +137,6 @@ class Evaluator:
         numerics = setting.numerics
         self.solver = blocked_solver(model, numerics, setting.contact) if task.needs_force else None
         self.poses = self.solver.poses if self.solver else pose_solver(model, numerics)
-
-    @property
-    def functions(self) -> RodFunctions:
-        """The rod's functions with the tip conditions of the shape that is solved last."""
-        return self.solver.functions if self.solver else self.poses.functions
 
     def free(self, model: Model, pressure: float) -> Evaluation:
         """Return the free shape at a pressure [Pa]: in closed form without loads, else solved."""
