@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-import queue
 import re
 import threading
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import chdir
 from dataclasses import replace
 from functools import cache
@@ -318,25 +318,35 @@ def test_processes_find_what_one_finds() -> None:
     assert [c.material.name for c in one.candidates] == [c.material.name for c in two.candidates]
 
 
-def test_a_process_sends_each_candidate_as_it_is_done_and_stops_between_two(monkeypatch: pytest.MonkeyPatch) -> None:
-    # a whole chunk at once would keep who presses Ctrl-C waiting for all of it
-    sent: queue.Queue[Candidate] = queue.Queue()
-    stop = threading.Event()
-    monkeypatch.setattr(design_module._Worker, "found", sent, raising=False)
-    monkeypatch.setattr(design_module._Worker, "stop", stop, raising=False)
-    task = DesignTask({"material": [SOFT, material("Dragon Skin 10"), material("Ecoflex 00-30")]}, 1.0 * BAR,
-                      maximise="bending_angle")  # fmt: skip
-    whole = design_module.CandidateEvaluator.candidate
+def test_candidates_come_one_by_one_and_none_is_begun_after_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who presses Ctrl-C waits for the candidates that are being evaluated alone."""
+    begun: list[int] = []
+    seen, one = threading.Event(), design(D25, SOFT, numbers_task(1)).candidates[0]
 
     def candidate(self: Any, number: int, combination: Any) -> Candidate:
-        if number == 2:
-            stop.set()
-        return whole(self, number, combination)
+        begun.append(number)
+        if number > 1:
+            seen.wait()
+        return replace(one, number=number)
+
+    def pool(workers: int, begin: Any, *given: Any) -> ThreadPoolExecutor:
+        begin(*given)
+        return ThreadPoolExecutor(1)
+
+    def stop(count: int, done: Candidate) -> None:
+        assert (count, done.number) == (1, 1)
+        threading.Timer(0.2, seen.set).start()
+        raise KeyboardInterrupt
 
     monkeypatch.setattr(design_module.CandidateEvaluator, "candidate", candidate)
-    setting = design(D25, SOFT, replace(task, choices={"material": [SOFT]})).setting
-    design_module._chunk(setting, task, list(enumerate(task.combinations(), start=1)))
-    assert [sent.get_nowait().number for _ in range(sent.qsize())] == [1, 2]
+    monkeypatch.setattr(design_module, "worker_pool", pool)
+    with pytest.raises(KeyboardInterrupt):
+        design(D25, SOFT, numbers_task(6), workers=2, progress=stop)
+    assert begun == [1, 2]
+
+
+def numbers_task(count: int) -> DesignTask:
+    return DesignTask({"chamber_diameter": list(np.linspace(4e-3, 4.5e-3, count))}, 1.0 * BAR, maximise="stretch")
 
 
 def test_a_search_finds_the_best_of_few(monkeypatch: pytest.MonkeyPatch) -> None:

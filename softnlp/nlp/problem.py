@@ -392,10 +392,8 @@ def _refuse_ill_posed(problem: CompiledProblem, has_objective: bool) -> None:
             f"the constraints {added_text} cannot all be met by freeing {free_text}: they move {len(rows) - rank} "
             "combination(s) of unknowns too few; free a quantity that enters them"
         )
-    start = 0
     for q in problem.free:
-        columns = list(range(start, start + q.size))
-        start += q.size
+        columns = problem._free_column.places[q.name]
         if not np.all(entries_in_column[columns] + entries_in_cost[columns]):
             raise IllPosedError(
                 f"'{q.name}' is free but enters no equation and no objective, so nothing determines it; fix it"

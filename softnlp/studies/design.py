@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import as_completed
 from dataclasses import dataclass, replace
 from math import isfinite, prod
-from multiprocessing.queues import Queue
-from multiprocessing.synchronize import Event
-from queue import Empty
 from typing import Any
 
 from softnlp.base.errors import InputError
-from softnlp.base.processes import begin_worker, process_context
+from softnlp.base.processes import worker_pool
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.model.materials import Material
@@ -28,9 +25,7 @@ from softnlp.studies.design_task import MOST_ENUMERATED, DesignTask, Setting, ch
 from softnlp.studies.forward import checked_loads
 
 Progress = Callable[[int, Candidate], None]
-_CHUNK = 8  # candidates that a process is given at once; most of one structure, which is compiled once
 _SEED = 7  # of a search
-_PATIENCE = 0.2  # [s] without a candidate, after which it is asked whether a process has failed
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,48 +195,27 @@ def searched(evaluator: CandidateEvaluator) -> Iterator[Candidate]:
 def _in_processes(
     setting: Setting, task: DesignTask, every: Sequence[tuple[int, Mapping[str, Any]]], workers: int
 ) -> Iterator[Candidate]:
-    """Yield candidates as processes finish them, those of one structure together."""
+    """Yield candidates as processes finish them, begun in the order of their structures."""
     grouped = sorted(every, key=lambda pair: structure(*with_choices(setting, pair[1])))
-    chunks = [grouped[k : k + _CHUNK] for k in range(0, len(grouped), _CHUNK)]
-    count = min(workers, len(chunks), os.cpu_count() or 1)
-    context = process_context()
-    found, stop = context.Queue(), context.Event()
-    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_begin, initargs=(found, stop))
+    pool = worker_pool(min(workers, len(every), os.cpu_count() or 1), _Worker.begin, setting, task)
     try:
-        jobs = [pool.submit(_chunk, setting, task, chunk) for chunk in chunks]
-        left = len(every)
-        while left:
-            try:
-                candidate = found.get(timeout=_PATIENCE)
-            except Empty:
-                for job in jobs:
-                    if job.done():
-                        job.result()  # raises what ended it
-            else:
-                left -= 1
-                yield candidate
+        for done in as_completed([pool.submit(_Worker.candidate, *pair) for pair in grouped]):
+            yield done.result()
     finally:
-        stop.set()
         pool.shutdown(wait=True, cancel_futures=True)
 
 
 class _Worker:
-    """What a worker was told as it began: where candidates go, and what says that no more are wanted."""
+    """What a worker keeps between two candidates: an evaluator, whose programs are compiled once a structure."""
 
-    found: Queue[Candidate]
-    stop: Event
+    evaluator: CandidateEvaluator
 
+    @classmethod
+    def begin(cls, setting: Setting, task: DesignTask) -> None:
+        """Keep what was asked."""
+        cls.evaluator = CandidateEvaluator(setting, task)
 
-def _begin(found: Queue[Candidate], stop: Event) -> None:
-    begin_worker()
-    found.cancel_join_thread()  # a parent that stops reads no more
-    _Worker.found, _Worker.stop = found, stop
-
-
-def _chunk(setting: Setting, task: DesignTask, chunk: Sequence[tuple[int, Mapping[str, Any]]]) -> None:
-    """Send the candidates of a chunk, each as it is done."""
-    evaluator = CandidateEvaluator(setting, task)
-    for number, combination in chunk:
-        if _Worker.stop.is_set():
-            return
-        _Worker.found.put(evaluator.candidate(number, combination))
+    @classmethod
+    def candidate(cls, number: int, combination: Mapping[str, Any]) -> Candidate:
+        """Return a candidate of the evaluator."""
+        return cls.evaluator.candidate(number, combination)
