@@ -14,7 +14,6 @@ from softnlp.model.quantities import Model
 from softnlp.nlp.optimality import not_optimal
 from softnlp.nlp.search import minima, spread
 from softnlp.statics.pose_grid import next_size
-from softnlp.statics.wall import Situation
 from softnlp.studies.design_evaluate import Evaluation, Evaluator, broken_rules, unmet
 from softnlp.studies.design_problem import HOLDS, Active, DesignProblem, Optimum, design_problem
 from softnlp.studies.design_task import OUTPUTS, Range
@@ -62,11 +61,7 @@ class Optimiser:
 
     def problem(self, begun: Evaluation, intervals: int) -> DesignProblem:
         """Return the program for a design on a grid, compiled at first use for all that bend in the same plane."""
-        solver, P = self.evaluator.solver, begun.pressure * self.evaluator.direction
-        plane = None
-        if solver is not None:
-            situation = Situation(P, self.evaluator.setting.loads, begun.wall)
-            plane = solver.with_model(begun.model).plane(situation)
+        plane = self.evaluator.plane(begun)
         key = (intervals, b"" if plane is None else np.round(plane, 12).tobytes())
         if key not in self._compiled:
             self._compiled[key] = design_problem(self.evaluator, intervals, plane)
@@ -157,8 +152,7 @@ class Optimiser:
     def _intervals(self, begun: Evaluation) -> int:
         """Return a grid for the program that is fine enough for the curl of a start."""
         poses = self.evaluator.poses.with_model(begun.model)
-        column = poses.column(poses.values(begun.pressure * self.evaluator.direction, self.evaluator.setting.loads))
-        coarse = poses.first_intervals(column, begun.outputs["stretch"])
+        coarse = poses.first_intervals(poses.column(self.evaluator.values(begun)), begun.outputs["stretch"])
         return min(max(next_size(coarse), _COARSEST), _FINEST)
 
     def _starts(self, model: Model, pressure: float | Range) -> Iterator[Evaluation]:

@@ -25,7 +25,6 @@ from softnlp.statics.condensed import CondensedSolver
 from softnlp.statics.loadcase import LoadCase
 from softnlp.statics.pose import between_nodes
 from softnlp.statics.posed import problem
-from softnlp.statics.wall import Situation
 from softnlp.studies.design_evaluate import Evaluation, Evaluator, chamber_gaps, free_outputs, robot_outputs
 from softnlp.studies.design_task import OUTPUTS, DesignTask, Range
 
@@ -92,34 +91,26 @@ class DesignProblem:
 
     def start(self, begun: Evaluation) -> Start:
         """Return where the program begins at a solved design."""
-        evaluator, compiled = self.evaluator, self.problem
-        P, solver = begun.pressure * evaluator.direction, evaluator.solver
-        poses = evaluator.poses.with_model(begun.model)
-        values = poses.values(P, evaluator.setting.loads)
-        column = poses.column(values)
-        if solver is not None:
-            pressed = np.array([float(P[k] > 0) for k in begun.model.robot.set_of_chamber])
-            situation = Situation(P, evaluator.setting.loads, begun.wall)
-            values = solver.with_model(begun.model).values(situation, pressed, np.zeros(0))
-        objective = evaluator.task.objective
-        scale = max(abs(begun.outputs[objective.name]), objective.scale)
-        values |= {_PRESSURE: begun.pressure, _OBJECTIVE_SCALE: scale}
-        p = self._packed(values)
+        compiled, objective = self.problem, self.evaluator.task.objective
+        values = self.evaluator.values(begun)
+        column = self.evaluator.poses.column(values)
+        values[_PRESSURE] = begun.pressure
+        values[_OBJECTIVE_SCALE] = max(abs(begun.outputs[objective.name]), objective.scale)
         head = compiled.pack_free({q.name: values[q.name] for q in compiled.free})
-        x = np.concatenate([head, *(self._guess(shape, begun, column) for shape in self.cases)])
+        known = {q.name: values[q.name] for q in compiled.fixed if q.name in values}
+        x, p = (
+            np.concatenate([head, *(self._guess(shape, begun, column) for shape in self.cases)]),
+            compiled.pack(known),
+        )
         if len(self.cases) > 1:
-            straight = np.where(np.arange(column.size) < P.size, 0.0, column)
-            head = compiled.pack_free({q.name: 0.0 if q.name == _PRESSURE else values[q.name] for q in compiled.free})
+            straight = np.where(np.arange(column.size) < self.evaluator.direction.size, 0.0, column)
+            head = np.where([q.name == _PRESSURE for q in compiled.free], 0.0, head)
             rest = np.concatenate([head, *(shape.arc(straight, 1.0) for shape in self.cases)])
             at_start, at_rest = (float(compiled.residual(at, p)[-1]) for at in (x, rest))
             # A start nearer to a fold than designs may be is inside its own limit.
             size = np.copysign(min(abs(at_rest), abs(at_start) / (2 * _FOLD)), at_start)
-            p = self._packed({**values, _FOLD_SCALE: size})
+            p = compiled.pack({**known, _FOLD_SCALE: size})
         return Start(self.engine, p, x)
-
-    def _packed(self, values: Mapping[str, Any]) -> Array:
-        """Return p of the values of all quantities."""
-        return self.problem.pack({q.name: values[q.name] for q in self.problem.fixed if q.name in values})
 
     def _guess(self, shape: LoadCase, begun: Evaluation, column: Array) -> Array:
         """Return the unknowns of a shape at a solved design; where there is none of it, the arc's."""
