@@ -20,6 +20,7 @@ from softnlp.nlp.problem import CompiledProblem, Constraint
 from softnlp.nlp.search import Start
 from softnlp.nlp.solver import Engine, Solution
 from softnlp.nlp.transcription import MultipleShooting
+from softnlp.statics.blocked_grid import transferred
 from softnlp.statics.case import case
 from softnlp.statics.condensed import CondensedSolver
 from softnlp.statics.loadcase import LoadCase
@@ -115,12 +116,10 @@ class DesignProblem:
     def _guess(self, shape: LoadCase, begun: Evaluation, column: Array) -> Array:
         """Return the unknowns of a shape at a solved design; where there is none of it, the arc's."""
         stretch, s, size = begun.outputs["stretch"], shape.transcribed.points, shape.functions.state_size
-        free, blocked, solver = begun.free, begun.blocked, self.evaluator.solver
-        if s.size and shape.name == "blocked" and blocked and solver:
-            x = blocked.solution.x
-            states = between_nodes(solver.equations.shape, blocked.grid.nodes(x), blocked.constants, s)[:size]
-            return np.concatenate([[stretch], states.T.ravel(), blocked.grid.tip_forces(x)])
-        if s.size and shape.name == "free" and free:
+        free, solver = begun.free, self.evaluator.solver
+        if shape.name == "blocked" and begun.blocked and solver:
+            return transferred(begun.blocked, shape, solver.equations.shape)
+        if shape.name == "free" and s.size and free:
             states = between_nodes(self.evaluator.poses.shape, free.nodes, free.constants, s)[:size]
             return np.concatenate([[stretch], states.T.ravel()])
         return shape.arc(column, stretch)
@@ -172,7 +171,8 @@ def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) ->
     body = _body(evaluator.poses.model)
     ranges = {f"robot.{name}": values for name, values in task.ranges.items()}
     declared = body.quantities | {
-        key: replace(body.quantities[key], lower=values.lower, upper=values.upper) for key, values in ranges.items()
+        key: replace(body.quantities[key], scale=values.upper, lower=values.lower, upper=values.upper)
+        for key, values in ranges.items()
     }
     limits = task.pressure if isinstance(task.pressure, Range) else Range(0.0, np.inf)
     applied = quantity(_PRESSURE, "Pa", 1e5, scale=1e5, lower=limits.lower, upper=limits.upper)
