@@ -23,6 +23,7 @@ from softnlp import (
     at_least,
     at_most,
     design,
+    function_law,
     material,
     robot,
 )
@@ -504,6 +505,20 @@ def test_the_largest_bend_of_an_arc_is_short_of_a_whole_turn() -> None:
     assert candidate.is_feasible
     assert candidate.objective == pytest.approx(0.999 * 2 * np.pi, rel=1e-6)
     assert [limit.name for limit in candidate.active] == ["self_intersection"]
+
+
+def test_laws_of_one_name_are_told_apart() -> None:
+    """What is compiled for the stress of one is of no use for the other."""
+
+    def rubber(power: int) -> Material:
+        law = function_law("mine", lambda stretch, c: c * (stretch - stretch**-power), ["c"])
+        return Material("mine", law, {"c": 0.03})
+
+    task = bending(0.3 * BAR, choices={"material": [rubber(2), rubber(3)]})
+    soft, stiff = design(D25, SOFT, task).candidates
+    assert soft.is_feasible
+    assert stiff.is_feasible
+    assert soft.objective > 1.2 * stiff.objective
 
 
 def test_a_candidate_that_starts_behind_the_wall_says_so() -> None:

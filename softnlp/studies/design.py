@@ -19,7 +19,7 @@ from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.statics.wall import checked_contact
-from softnlp.studies.design_candidate import Candidate, CandidateEvaluator, structure
+from softnlp.studies.design_candidate import Candidate, CandidateEvaluator
 from softnlp.studies.design_evaluate import Evaluator
 from softnlp.studies.design_task import MOST_ENUMERATED, DesignTask, Setting, check_task, with_choices
 from softnlp.studies.forward import checked_loads
@@ -195,11 +195,15 @@ def searched(evaluator: CandidateEvaluator) -> Iterator[Candidate]:
 def _in_processes(
     setting: Setting, task: DesignTask, every: Sequence[tuple[int, Mapping[str, Any]]], workers: int
 ) -> Iterator[Candidate]:
-    """Yield candidates as processes finish them, begun in the order of their structures."""
-    grouped = sorted(every, key=lambda pair: structure(*with_choices(setting, pair[1])))
+    """Yield candidates as processes finish them; those that share what is compiled are begun one after another."""
+
+    def kind(pair: tuple[int, Mapping[str, Any]]) -> tuple[int, int, str]:
+        robot, material = with_choices(setting, pair[1])
+        return robot.chamber_sets, robot.chambers_per_set, material.law.name
+
     pool = worker_pool(min(workers, len(every), os.cpu_count() or 1), _Worker.begin, setting, task)
     try:
-        for done in as_completed([pool.submit(_Worker.candidate, *pair) for pair in grouped]):
+        for done in as_completed([pool.submit(_Worker.candidate, *pair) for pair in sorted(every, key=kind)]):
             yield done.result()
     finally:
         pool.shutdown(wait=True, cancel_futures=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -94,14 +94,13 @@ class CandidateEvaluator:
     def __init__(self, setting: Setting, task: DesignTask) -> None:
         self.setting = setting
         self.task = task
-        self._made: dict[tuple[int, int, str], Optimiser] = {}
+        self._made: dict[Hashable, Optimiser] = {}
 
     def optimiser(self, model: Model) -> Optimiser:
-        """Return what is compiled for the structure of a model."""
-        key = structure(model.robot, model.material)
-        if key not in self._made:
-            self._made[key] = Optimiser(Evaluator(self.setting, self.task, model))
-        return self._made[key]
+        """Return what is compiled for the kind of a model."""
+        if model.kind not in self._made:
+            self._made[model.kind] = Optimiser(Evaluator(self.setting, self.task, model))
+        return self._made[model.kind]
 
     def candidate(self, number: int, combination: Mapping[str, Any]) -> Candidate:
         """Return a combination's candidate; never raises for one that cannot be made or solved."""
@@ -160,7 +159,8 @@ class CandidateEvaluator:
     def _at_free_pressure(self, model: Model, pressure: Range) -> Outcome:
         """Optimise the pressure alone, unless one requirement is missed at every pressure."""
         optimiser = self.optimiser(model)
-        looked = [optimiser.evaluator.free(model, float(P)) for P in np.linspace(*_ends(pressure), _LEVELS)]
+        least = max(pressure.lower, pressure.upper / _LEVELS)  # not zero, where nothing bends
+        looked = [optimiser.evaluator.free(model, float(P)) for P in np.linspace(least, pressure.upper, _LEVELS)]
         missing = [
             (e, {name: off for name, _, off in missed(e.outputs, self.task.requirements)}) for e in looked if e.outputs
         ]
@@ -175,25 +175,13 @@ class CandidateEvaluator:
         robot = model.robot
         if (robot.chambers_per_set - 1) * float(robot.chamber_angle) >= 2 * np.pi / robot.chamber_sets:
             return Outcome(None, ("sets that interleave cannot be optimised; choose a smaller chamber_angle",))
-        optimiser, pressure = self.optimiser(model), self.task.pressure
-        if not isinstance(pressure, PressureSteps):
-            return optimiser.best(model, pressure)
+        pressure = self.task.pressure
         found = Outcome(None, ("there is no step of the pressure",))
-        for P in pressure.values():
-            found = optimiser.best(model, P)
+        for P in pressure.values() if isinstance(pressure, PressureSteps) else [pressure]:
+            found = self.optimiser(model).best(model, P)
             if not found.reasons:
                 break
         return found
-
-
-def _ends(pressure: Range) -> tuple[float, float]:
-    """Return the pressures between which to look; not zero, where nothing bends."""
-    return max(pressure.lower, pressure.upper / _LEVELS), pressure.upper
-
-
-def structure(robot: Robot, material: Material) -> tuple[int, int, str]:
-    """Return what candidates must share to share what is compiled."""
-    return robot.chamber_sets, robot.chambers_per_set, material.law.name
 
 
 def _candidate(
