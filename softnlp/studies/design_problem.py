@@ -171,7 +171,9 @@ def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) ->
     body = _body(evaluator.poses.model)
     ranges = {f"robot.{name}": values for name, values in task.ranges.items()}
     declared = body.quantities | {
-        key: replace(body.quantities[key], scale=values.upper, lower=values.lower, upper=values.upper)
+        key: replace(
+            body.quantities[key], scale=(values.lower + values.upper) / 2, lower=values.lower, upper=values.upper
+        )
         for key, values in ranges.items()
     }
     limits = task.pressure if isinstance(task.pressure, Range) else Range(0.0, np.inf)
