@@ -242,11 +242,6 @@ def _judged(problem: Problem, solution: Solution, tolerance: float) -> Answer:
         message = f"no solution was found ({solution.engine_status}); start nearer, or follow a path from a solution"
     elif compiled.has_objective and not solution.optimal:
         status, message = Status.NOT_OPTIMAL, not_optimal(solution.kkt, solution.engine_status)
-    values = dict(compiled.free_values(solution.x))
-    start = 0
-    for q in compiled.fixed:
-        values[q.name] = solution.p[start : start + q.size]
-        start += q.size
     multipliers: dict[str, Array] = {}
     if compiled.has_objective and solution.ipopt is not None and solution.ipopt.rows.size:
         multipliers = {e.name: solution.ipopt.rows[e.rows] for e in compiled.equations}
@@ -255,7 +250,7 @@ def _judged(problem: Problem, solution: Solution, tolerance: float) -> Answer:
         problem=problem,
         status=status,
         message=message,
-        values=values,
+        values=compiled.values(solution.x, solution.p),
         outputs=outputs(compiled, solution) if status is Status.SOLVED else {},
         residuals=certificate(compiled, solution),
         multipliers=multipliers,

@@ -317,7 +317,7 @@ class BlockedSolver:
             return grid.problem.pack(self.values(begin.towards(end, u), pressed, lengths))
 
         if near is not None:
-            x = transferred(near, grid, self.equations.shape)
+            x = transferred(near, grid.case, self.equations.shape)
         else:
             free_x = shapes.guess(begin, grid.case.transcribed.points)
             x = np.concatenate([free_x, np.zeros(self.functions.tip_unknowns)])
@@ -366,7 +366,7 @@ class BlockedSolver:
     def _refined(self, found: Blocked, grid: BlockedGrid) -> Blocked | None:
         """Return a solution solved again on a finer grid, or None where that leads elsewhere."""
         p = grid.problem.pack(self.values(found.situation, found.pressed, found.free.lengths))
-        guess = transferred(found, grid, self.equations.shape)
+        guess = transferred(found, grid.case, self.equations.shape)
         solution = grid.engine.solve(p, guess)
         if not solution.holds(self.numerics.tolerance) or grid.distance(solution.x - guess) > 0.05:
             return None
