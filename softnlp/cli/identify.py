@@ -65,16 +65,15 @@ def _tensile(asked: Scenario, folder: Path | None, json: bool) -> int:
         figure = partial(tensile_figure, fit, task.name, task.before)
         write_results(to, asked, {"identified.json": document, **tables}, {"figure": figure})
 
+    for problem in fit.problems:  # first: what follows of such a fit means nothing
+        complain(f"{asked.path}: [tensile] {problem}")
     show(folder, json, write, lambda: document, lambda: _say_tensile(task, fit))
-    for problem in fit.problems:
-        complain(f"{asked.path.name}: [tensile] {problem}")
     return SOME_UNSOLVED if fit.problems else SOLVED
 
 
 def _say_tensile(task: TensileTask, fit: TensileFit) -> None:
     """Print the constants of every law."""
-    low, high = next(iter(fit.fits.values())).fitted_stretch
-    say(f"{task.name}: {task.stretch.size} points, stretch {low:.4g} to {high:.4g}{task.left_out}")
+    say(f"{task.name}: {task.about}{task.left_out}")
     if task.before is not None:
         from softnlp.studies.tensile import tensile_misfit
 
