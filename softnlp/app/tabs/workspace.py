@@ -89,6 +89,7 @@ def _source(session: Session) -> None:
         document = session.document
         if wanted != document.sweeps_wall:
             document.sweeps_wall = wanted
+            session.use()
             if wanted and not document.table("contact"):
                 document.replace("contact", {"closure": "compliant"})
             session.reread()
