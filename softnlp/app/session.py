@@ -29,6 +29,7 @@ Listener = Callable[[], None]
 
 LARGEST_FILE = 5_000_000
 """Bytes of a file that is taken in."""
+_POSES = {"forward", "blocked-force"}  # studies of which the page shows the pose
 _MOST_KEPT = 2_000_000  # characters of files; a browser keeps some five million for a tab
 
 
@@ -59,8 +60,6 @@ class Session:
     document : what is on the screen, also where it does not make sense yet. scenario : what the last text that did
     says, SI. problem : why the text does not, or None; it names table and key. pressure : (sets,) shown [Pa].
     follows_file : whether a saved file has the pressures of the opened one, or else the pose shown as its only step.
-    study : that of the file that is saved: the study on the screen once the file was of it, or it was run or its own
-    tables changed; a study that a person only looks at leaves the file as it is.
     """
 
     def __init__(self, text: str = START, name: str = "scenario.toml") -> None:
@@ -114,7 +113,7 @@ class Session:
     def _start(self, document: Document) -> None:
         """Take over a document, as it was opened."""
         self.document = document
-        self.opened_study = self.study = document.study
+        self.opened_study = self._last_used = document.study
         self._used = {document.study}
 
     def _try(self, document: Document, name: str, given: Mapping[str, bytes]) -> Scenario:
@@ -187,15 +186,24 @@ class Session:
     def choose(self, study: str) -> None:
         """Turn to another study of the same robot."""
         if study in self._used:
-            self.study = study
+            self._last_used = study
         if study != self.document.study:
             self.document.start(study)
             self.reread()
 
+    @property
+    def study(self) -> str:
+        """The study of the file that is saved: that on the screen, once the file was of it or it was run or changed.
+
+        One that a person only looks at leaves the file as it is, but for a pose at a wall: the page shows its numbers.
+        """
+        looked = self.document.study
+        return looked if looked in self._used or {looked, self._last_used} <= _POSES else self._last_used
+
     def use(self) -> None:
         """Make the study on the screen that of the file."""
-        self.study = self.document.study
-        self._used.add(self.study)
+        self._last_used = self.document.study
+        self._used.add(self._last_used)
 
     def _use_for(self, table: str) -> None:
         """Make the study on the screen that of the file where a table changes that the file's study does not have."""
@@ -242,7 +250,7 @@ class Session:
     def kept(self) -> str:
         """Return all that is on the screen as text, for `recall`."""
         kept: dict[str, Any] = {"name": self.name, "source": self.document.source(), "study": self.document.study}
-        kept |= {"file_study": self.study, "used": sorted(self._used)}
+        kept |= {"last_used": self._last_used, "used": sorted(self._used)}
         sound = None if self.problem is None else self._sound  # what the picture shows meanwhile
         return json.dumps(kept | {"sound": sound, "pressure": None if self.follows_file else self.pressure.tolist()})
 
@@ -272,7 +280,7 @@ class Session:
             self.reread()
         self._used |= used & set(SCHEMAS)
         self.choose(str(study))
-        self.study = str(kept["file_study"]) if kept.get("file_study") in self._used else self.study
+        self._last_used = str(kept["last_used"]) if kept.get("last_used") in self._used else self._last_used
         if pressure is not None and len(pressure) == len(self.pressure):
             self.set_pressure(np.asarray(pressure, dtype=float))
 
