@@ -159,11 +159,13 @@ def _say_robots(asked: Scenario, found: Identified) -> None:
         rows.append([key, *(f"{v:.6g}" for v in values), found.notes[name]])
     say_rows(["constant", "value", "standard_error", "start", "note"], rows)
     before, after = found.errors(False), found.errors()
+    misfits = ("rmse_before", "rmse_after", "mape_before_percent", "mape_after_percent")
     say_rows(
-        ["observable", "numbers", "rmse_before", "rmse_after", "mape_before_percent", "mape_after_percent", "sigma"],
+        ["observable", "unit", "numbers", *misfits, "sigma"],
         [
             [
                 OUTPUTS[key].key,
+                str(OUTPUTS[key].unit),
                 str(after[key].count),
                 *(f"{m[key].rmse / OUTPUTS[key].scale:.4g}" for m in (before, after)),
                 *(f"{m[key].mape:.3g}" for m in (before, after)),
