@@ -27,6 +27,7 @@ GHOST_TINT, IDLE_TINT = 0.16, 0.40  # how much of its colour a faint body and a 
 MOST_GHOSTS = 3
 ELEVATION = 16.0  # of the viewer [deg]
 _ARROW = 0.32  # length of a load's arrow, of L_0
+_LOW, _ROOM = 5.0, 1.5  # how much less high than wide a text is; distance from others, of a moment's radius
 _ROUND, _CLEAR = 0.7, 0.65  # radius of a moment's arrow, of that length, and at least so much of the outer diameter
 _CANVAS = 5.6  # side of the square that the panel may draw in [inch]
 _BOX = (4.4, 3.7)  # largest width and height of the box of the axes, labels not included [inch]
@@ -284,13 +285,25 @@ def draw_turn(
         along = np.multiply.outer(np.cos(angle) * reach, first) + np.multiply.outer(np.sin(angle) * reach, second)
         return np.asarray(centre + along)
 
-    # The gap is on the right, where the text is: the head ends before it.
+    # The gap is on the right, where the text is if no other stands there: the head ends before it.
     bend = at(np.radians(np.linspace(45, 335, 49)))
     heads = [np.array([at(np.radians(305.0), radius * part), bend[-1]]) for part in (0.78, 1.22)]
     draw_lines(axes, [bend, *heads], 1.6, colors=INK, zorder=6, label=label)
-    end = at(0.0, 1.15 * radius)
-    _write_load(axes, end, text, "left", INK)
-    return [bend, (end + 1.4 * radius * camera.right)[None]]  # with room for the text before the numbers of the axis
+    up = np.cross(camera.eye, camera.right)
+    others = [t.get_position_3d() for t in axes.texts if len(t.get_text()) > 1]  # not the letters of axes
+    written = np.array(others or [bend[0] + 9 * radius * up])
+
+    def crowded(angle: float) -> float:
+        """How near other texts are, which are wide and low."""
+        away = at(angle, 1.15 * radius) - written
+        return float(-np.min(np.abs(away @ camera.right) + _LOW * np.abs(away @ up)))
+
+    angle = min(np.radians([0.0, 180.0, 60.0, -60.0, 120.0, -120.0]), key=lambda a: max(crowded(a), -_ROOM * radius))
+    end = at(angle, 1.15 * radius)
+    to_right = bool(np.cos(angle) > 0)
+    _write_load(axes, end, text, "left" if to_right else "right", INK)
+    # with room for the text before the numbers of the axis
+    return [bend, (end + (1.4 if to_right else -1.4) * radius * camera.right)[None]]
 
 
 def _write_load(axes: Any, place: Array, text: str, side: str, ink: str) -> None:

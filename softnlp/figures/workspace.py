@@ -132,7 +132,8 @@ def _cloud_panel(
 ) -> int:
     """Draw the cloud in 3-D with the outlines on the walls behind it; return how many poses are drawn."""
     low, high = limits
-    axes = space_axes(figure, (-0.015, 0.045, 0.56, 0.88), limits, zoom=1.04, hanging=hanging)
+    slender = high[2] - low[2] > _SLENDER * max((high - low)[:2])
+    axes = space_axes(figure, (-0.015, 0.045, 0.56, 0.88), limits, zoom=0.9 if slender else 1.04, hanging=hanging)
     floor, side = (high[2], high[0]) if hanging else (low[2], low[0])
     # the walls that the viewer sees behind the cloud, one for each projection
     for (first, second, sight, _), wall, found in zip(VIEWS, (floor, high[1], side), outlines, strict=True):
@@ -148,6 +149,7 @@ def _cloud_panel(
     return len(k)
 
 
+_SLENDER = 1.3  # height over width from which on the height bounds the picture in 3-D
 _BOUNDARY: dict[str, Any] = {"colors": INK, "width": 1.1}
 _HULL: dict[str, Any] = {"colors": GREY, "width": 0.9, "linestyles": (0, (4, 3))}
 
