@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import chdir
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -34,9 +35,11 @@ from softnlp import (
     robot,
 )
 from softnlp.cli import main
+from softnlp.figures.design import design_figure
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import AS_PRINTED
 from softnlp.model.quantities import Model
+from softnlp.results.design import held_back
 from softnlp.scenario.design import (
     ActuationTable,
     LimitsTable,
@@ -569,6 +572,20 @@ def test_a_broken_scenario_is_one_line(name: str, tmp_path: Path, capsys: pytest
     assert captured.err.startswith(f"softnlp: {path}: ")
     for word in words:
         assert word in captured.err
+
+
+def test_what_holds_the_best_back_stands_beneath_the_bars_of_its_figure() -> None:
+    found = design(D25, SOFT, angle_task(("chamber_diameter",), starts=1))
+    figure = design_figure(found)
+    figure.canvas.draw()
+    assert found.best is not None
+    lines = [text for text in figure.texts if text.get_text() in {"held back by", *held_back(found, found.best)}]
+    assert len(lines) == 1 + len(found.best.active) > 1
+    below = min(axes.get_tightbbox().y0 for axes in figure.axes[:1])
+    boxes = [text.get_window_extent() for text in lines]
+    assert max(box.y1 for box in boxes) < below
+    assert min(box.y0 for box in boxes) > 0
+    assert all(upper.y0 > lower.y1 for upper, lower in pairwise(boxes))
 
 
 def test_every_key_of_a_design_is_documented() -> None:

@@ -147,7 +147,7 @@ def executor_crew(executor: Executor, plan: Plan, fingerprint: str) -> Iterator[
     client = getattr(executor, "_client", None)
     if client is not None and hasattr(client, "scatter"):
         if not (threads := sum(client.nthreads().values())):
-            raise InputError("the Dask cluster has no workers", key="--cluster")
+            raise InputError("the Dask cluster has no workers", key="executor")
         scattered = client.scatter(plan, broadcast=True, hash=False)
         yield Crew(executor, scattered, fingerprint, 3 * threads + 2)
         return
