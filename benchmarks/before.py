@@ -5,7 +5,7 @@
 Version 0.1 is taken out of the repository's history and runs with the packages that are installed here; without a
 history there is nothing to compare, and the program says so. Scenarios are those that version 0.1 shipped, with
 `engine = "newton"` and `engine = "auto"` beside it. Times are processor time, of a process of its own each: "cold" is
-the process's first run, "warm" the least of those that follow in it, and of a command the whole process. The two
+the process's first run, "warm" the least of those that follow in it, and "command" the whole process. The two
 versions take turns, and the least of the turns counts.
 """
 
@@ -31,10 +31,10 @@ from softnlp.cli.console import say
 COMMIT = "22b2c47"
 ROOT = Path(__file__).parents[1]
 SCENARIOS = (
-    *("D25L60_one_set", "D25L60_loaded_tip", "D25L60_blocked_force", "D25L60_constrained"),
-    *("blocked/D25L60_weighted", "inverse/circle", "inverse/circle_loaded", "identify/measured_angles"),
-    *("identify/measured_forces", "design/choice_of_silicone"),
+    *("D25L60_one_set", "D25L60_loaded_tip", "D15L60_hanging", "blocked/D25L60", "blocked/D25L60_weighted"),
+    *("blocked/D25L60_constrained", "blocked/D25L60_force", "inverse/circle", "inverse/circle_loaded"),
 )
+OTHERS = ("identify/measured_angles", "identify/measured_forces", "design/D25L60_dimensions")
 SWEEPS = ("workspace/D25L60_grid", "workspace/D25L60_blocked")
 COMMANDS = {"import softnlp": ["-c", "import softnlp"], "softnlp --version": ["-m", "softnlp", "--version"]}
 _SOLVE = """
@@ -75,7 +75,7 @@ def main() -> int:
         with tarfile.open(fileobj=io.BytesIO(taken.stdout)) as archive:
             archive.extractall(old, filter="data")
         lines = []
-        for line in timed(old, Path(folder), asked.only, asked.repeats):
+        for line in timed(old, asked.only, asked.repeats):
             say(f"{line.what}: {line.before:.3f} s, newton {line.newton:.3f} s, auto {line.auto:.3f} s")
             lines.append(line)
     page = table(lines)
@@ -85,13 +85,13 @@ def main() -> int:
     return 0
 
 
-def timed(old: Path, folder: Path, only: str, repeats: int) -> Iterator[Timed]:
+def timed(old: Path, only: str, repeats: int) -> Iterator[Timed]:
     """Yield one line after the other."""
     for what, arguments in COMMANDS.items():
         if only in what:
             before, now = _least([(old, arguments), (ROOT, arguments)], repeats)
             yield Timed(what, before, now, now)
-    for name in (*SCENARIOS, *SWEEPS):
+    for name in (*SCENARIOS, *OTHERS, *SWEEPS):
         path = old / "scenarios" / f"{name}.toml"
         if only not in name or not path.exists():
             continue
@@ -99,10 +99,10 @@ def timed(old: Path, folder: Path, only: str, repeats: int) -> Iterator[Timed]:
         verb = "sweep" if name in SWEEPS else "run"
         runs = []
         for root, file in ((old, path), (ROOT, files["newton"]), (ROOT, files["auto"])):
-            out = ["--out", str(folder / "out")] if verb == "sweep" else ["--json"]
+            out = ["--out", "out"] if verb == "sweep" else ["--json"]
             runs.append((root, ["-m", "softnlp", verb, str(file), *out]))
         yield Timed(f"{name}, command", *_least(runs, repeats))
-        if verb == "run":
+        if name in SCENARIOS:  # what version 0.1 runs from Python
             solves = [(root, ["-c", _SOLVE, arguments[3], "4"]) for root, arguments in runs]
             turns = [[json.loads(_process(root, arguments)[1]) for root, arguments in solves] for _ in range(repeats)]
             for k, kind in enumerate(("cold", "warm")):

@@ -77,7 +77,7 @@ def test_weighted_is_the_minimum_of_an_objective(weights: tuple[float, float, fl
     step, found = solved(solver, 0.5)
     declared = solver.functions.declared()
     case = load_case("blocked", solver.functions, declared, MultipleShooting(10))
-    taken = ca.vertcat(*(q.symbol for name, q in declared.items() if name.startswith("contact.")))
+    taken = solver.functions.tip_column(declared)
     units = ca.vertcat(case.length_unit, case.force_unit)
     tip = case.transcribed.nodes[:, -1]
     e_L = solver.functions.contact(tip, case.constants, case.symbols[2], taken, units)[1] * case.length_unit

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import QUICK, plan
 
 from softnlp import (
     BAR,
@@ -261,6 +262,15 @@ def test_a_sweep_is_audited_and_ipopt_sweeps_alike(tmp_path: Path) -> None:
         found[engine] = load_workspace(tmp_path / engine)
     for engine in ENGINES[1:]:
         np.testing.assert_allclose(found[engine].tip_position, found["newton"].tip_position, atol=1e-6 * D25.length)
+
+
+def test_as_many_poses_are_audited_as_promised_however_they_are_cut_into_chunks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(auditing, "EVERY", 9)
+    summary = run_sweep(plan("[workspace]\nlevels = 3\nto_bar = 1.2\n" + QUICK, chunk=4), tmp_path / "out")
+    assert (summary.done, summary.failed) == (27, 0)
+    assert summary.audit.audited == 3
 
 
 def test_poses_that_ipopt_does_not_confirm_are_named(

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from softnlp import BAR, InputError, Loads, Numerics, Run, Status, forward, inverse, load_scenario, material, robot
 from softnlp.cli import main
+from softnlp.figures import run_figure
 from softnlp.model.conventions import COEFFICIENT_SETS, Coefficients
 from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
@@ -435,6 +436,8 @@ def test_out_of_reach_is_said_in_every_result(tmp_path: Path, capsys: pytest.Cap
     assert table[3].split(",")[table[0].split(",").index("distance_mm")] != ""
     view = load_run(tmp_path)
     assert view.targets is not None
+    figure = run_figure(view)
+    assert figure.axes[1].get_ylabel() == "distance left [mm]"
     assert 1e3 * view.targets.distance == pytest.approx([step["distance_mm"] for step in document["steps"]])
     assert (tmp_path / "figure.png").stat().st_size > 10_000
 

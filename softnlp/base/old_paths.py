@@ -77,6 +77,7 @@ _RENAMED = {old: now for now, modules in _MERGED.items() for old in modules.spli
 _FOLDERS = {"workspace": "sweep", "plots": "figures", "mesh": "figures.mesh", "evaluation": "studies"}
 # Names that left a module which is still there.
 _NAMES = {
+    "section": dict.fromkeys(("deform", "reference_area"), "model.round_chambers"),
     "loadcase": {"Equation": "nlp.case"},
     "quantities": {"Quantity": "base.quantity", "quantity": "base.quantity"},
     "workspace.run": {"run_sweep": "scenario.workspace"},

@@ -73,7 +73,7 @@ class BatchSolver:
         self._shooting = shooting
         self._target = target
         self._intervals = intervals
-        self._chambers = functions.model.robot.chambers
+        self._chambers = functions.model.chambers
 
     def solve(self, batch: Batch, features: Array) -> Shot:
         """Solve every pose, on a grid that meets the target; poses that did not converge keep a large residual.

@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from softnlp.batch.poses import row_type
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.numerics import Numerics
-from softnlp.model.quantities import Model, contact_quantities, quantities
+from softnlp.model.quantities import LOADS, Model, contact_quantities, quantities
 from softnlp.model.rod import Loads
 
 Array = NDArray[np.float64]
 
 CHUNK = 1024
-LOADS = ("tip_force", "tip_moment", "gravity")
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +62,7 @@ class Plan:
     @property
     def row_type(self) -> np.dtype[Any]:
         """The type of a row of the result."""
-        return row_type(self.model.robot.chambers, wall=self.contact is not None)
+        return row_type(self.model.chambers, wall=self.contact is not None)
 
     @cached_property
     def nominal(self) -> dict[str, Array]:

@@ -65,16 +65,15 @@ def _tensile(asked: Scenario, folder: Path | None, json: bool) -> int:
         figure = partial(tensile_figure, fit, task.name, task.before)
         write_results(to, asked, {"identified.json": document, **tables}, {"figure": figure})
 
+    for problem in fit.problems:  # first: what follows of such a fit means nothing
+        complain(f"{asked.path}: [tensile] {problem}")
     show(folder, json, write, lambda: document, lambda: _say_tensile(task, fit))
-    for problem in fit.problems:
-        complain(f"{asked.path.name}: [tensile] {problem}")
     return SOME_UNSOLVED if fit.problems else SOLVED
 
 
 def _say_tensile(task: TensileTask, fit: TensileFit) -> None:
     """Print the constants of every law."""
-    low, high = next(iter(fit.fits.values())).fitted_stretch
-    say(f"{task.name}: {task.stretch.size} points, stretch {low:.4g} to {high:.4g}{task.left_out}")
+    say(f"{task.name}: {task.about}{task.left_out}")
     if task.before is not None:
         from softnlp.studies.tensile import tensile_misfit
 
@@ -160,11 +159,13 @@ def _say_robots(asked: Scenario, found: Identified) -> None:
         rows.append([key, *(f"{v:.6g}" for v in values), found.notes[name]])
     say_rows(["constant", "value", "standard_error", "start", "note"], rows)
     before, after = found.errors(False), found.errors()
+    misfits = ("rmse_before", "rmse_after", "mape_before_percent", "mape_after_percent")
     say_rows(
-        ["observable", "numbers", "rmse_before", "rmse_after", "mape_before_percent", "mape_after_percent", "sigma"],
+        ["observable", "unit", "numbers", *misfits, "sigma"],
         [
             [
                 OUTPUTS[key].key,
+                str(OUTPUTS[key].unit),
                 str(after[key].count),
                 *(f"{m[key].rmse / OUTPUTS[key].scale:.4g}" for m in (before, after)),
                 *(f"{m[key].mape:.3g}" for m in (before, after)),

@@ -75,7 +75,7 @@ class BlockedGrid:
         return slice(start, start + 3)
 
     def tip_forces(self, x: Array) -> Array:
-        """Return the scaled forces that the tip conditions add."""
+        """Return the scaled forces that the loads add."""
         return x[1 + self.state_size * len(self.case.transcribed.points) :]
 
     @property
@@ -159,13 +159,13 @@ class Blocked:
     free: Free
 
 
-def transferred(found: Blocked, grid: BlockedGrid, shape: Mapped) -> Array:
-    """Return the unknowns of a solution on another grid, see `between_nodes`."""
+def transferred(found: Blocked, case: LoadCase, shape: Mapped) -> Array:
+    """Return the unknowns of a solution as those of the same rod's case on another grid, see `between_nodes`."""
     x = found.solution.x
-    if found.grid is grid:
+    if found.grid.case is case:
         return x
-    states = between_nodes(shape, found.grid.nodes(x), found.constants, grid.case.transcribed.points)
-    return np.concatenate([x[:1], states[: grid.state_size].T.ravel(), found.grid.tip_forces(x)])
+    states = between_nodes(shape, found.grid.nodes(x), found.constants, case.transcribed.points)
+    return np.concatenate([x[:1], states[: found.grid.state_size].T.ravel(), found.grid.tip_forces(x)])
 
 
 def kept_grid(

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.model.numerics import Numerics
-from softnlp.model.rod import RodSection
 from softnlp.nlp.transcription import method_named
+from softnlp.statics.loadcase import unpack_section
 from softnlp.statics.pose_grid import next_size
 
 Array = NDArray[np.float64]
@@ -16,7 +16,6 @@ MOST_INTERVALS = 1810
 FIRST_INTERVALS = {"multiple-shooting": 10, "collocation": 5}
 _MOST_COLLOCATION = 320  # as many points; order 8 needs no more
 _TURN = 0.25  # largest angle [rad] of the unloaded arc within one RK4 interval of a first grid
-_LENGTH = len(RodSection._fields)  # where the constants of a load case hold the length of the stretched rod
 
 
 def most_intervals(transcription: str) -> int:
@@ -31,7 +30,8 @@ def first_intervals(transcription: str, constants: Array, moment: Array, arc_tar
     the error to meet at once: RK4 turns a circular arc of angle a by a (a / K)^4 / 120 too little, of which the tip's
     position shows about 0.6.
     """
-    section, length = RodSection(*constants[:_LENGTH]), float(constants[_LENGTH])
+    section = unpack_section(constants)
+    length = float(section.length)
     first = FIRST_INTERVALS[transcription]
     bent = section.pressure_moment_x / section.bending_x, section.pressure_moment_y / section.bending_y
     curl = 100 * float(np.sin(0.01 * length * np.hypot(*bent)))  # of the axis, R e3, over the first hundredth

@@ -11,18 +11,15 @@ from numpy.typing import NDArray
 
 from softnlp.model import rod
 from softnlp.model.quantities import Model
-from softnlp.model.robot import touching_stretch
-from softnlp.model.rod import Loads, RodSection
-from softnlp.model.section import deform
+from softnlp.model.rod import Loads
 from softnlp.nlp.transcription import RK4, rk_step
-from softnlp.statics.loadcase import unpack_section
-from softnlp.statics.step import Pose, SectionRadii, Shape
+from softnlp.statics.loadcase import RodFunctions, unpack_section
+from softnlp.statics.step import Pose, Shape
 
 Array = NDArray[np.float64]
 
 SHAPE_POINTS = 61
 _SUBSTEPS = 4
-_LENGTH = len(RodSection._fields)  # where the constants of a load case hold the length of the stretched rod
 # Of the bending angle's quadrature.
 _SAMPLES, _ZOOMS, _MOST_PARTS = 6, 12, 225
 _ENDS = (1 - np.cos(np.pi * np.arange(_SAMPLES) / (_SAMPLES - 1))) / 2  # Chebyshev points, 0 and 1 among them
@@ -34,18 +31,19 @@ _GAUSS = tuple(part / 2 + middle for part, middle in zip(np.polynomial.legendre.
 _TO_GAUSS = (np.vander(_GAUSS[0], _SAMPLES, increasing=True) @ _TO_POWERS).T  # from samples to its points
 
 
-def shape_function(field: ca.Function) -> ca.Function:
-    """Return (state, c, h) -> [state a step h further, strains (v, u), n, m], scaled, for the field of a load case.
+def shape_function(functions: RodFunctions) -> ca.Function:
+    """Return (state, c, h) -> [state a step h further, strains (v, u), n, m], scaled.
 
     n and m are the paper's, of the wall alone.
     """
+    field = functions.field
     x, c, h = ca.SX.sym("x", field.size1_in(0)), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("h")
     step = rk_step(field, RK4)
     end = x
     for _ in range(_SUBSTEPS):
         end = step(end, c, h / _SUBSTEPS)
     section = unpack_section(c)
-    every = ca.vertcat(end, *rod.strains(end, section), *rod.wall_resultants(end, section))
+    every = ca.vertcat(end, *functions.strains(end[: rod.STATE_SIZE], c), *rod.wall_resultants(end, section))
     return ca.Function("shape", [x, c, h], [every], {"cse": True})
 
 
@@ -73,7 +71,7 @@ def bending_angle(function: Mapped, nodes: Array, constants: Array) -> float:
     where that is smallest.
     """
     K = min(nodes.shape[1] - 1, _MOST_PARTS)
-    length = float(constants[_LENGTH])  # in L_0
+    length = float(unpack_section(constants).length)  # in L_0
     s = ((np.arange(K)[:, None] + _ENDS[:-1]) / K).ravel()
     u = between_nodes(function, nodes, constants, np.append(s, 1.0))[21:23]
     last = u[:, _SAMPLES - 1 :: _SAMPLES - 1]  # the right end of each interval is the left one of the next
@@ -130,20 +128,6 @@ def shape_of(values: Array, s: Array, length_unit: float, force_unit: float) -> 
     )
 
 
-def section_radii(model: Model, stretch: float) -> SectionRadii:
-    """Return the deformed radii at a stretch, for drawing."""
-    section = deform(
-        model.robot, model.material, [0.0] * model.robot.chamber_sets, stretch, model.coefficients, model.conventions
-    )
-    return SectionRadii(
-        outer=float(section.outer_radius),
-        lumen=float(section.lumen_radius),
-        chamber_circle=float(section.chamber_circle_radius),
-        chamber=float(section.chamber_radius),
-        bore=float(section.bore_radius),
-    )
-
-
 def stability(loads: Loads, is_minimum: bool | None) -> bool | None:
     """Return whether a pose is stable, undefined (None) under a dead tip moment: in space that has no potential."""
     return None if np.any(loads.tip_moment) else is_minimum
@@ -170,22 +154,14 @@ def pose_of(
         tilt=float(np.arctan2(np.hypot(axis[0], axis[1]), axis[2])),
         backbone_length=float(outputs["backbone_length"][0]),
         chamber_length=np.atleast_1d(outputs["chamber_lengths"]),
-        radii=section_radii(model, stretch),
+        radii=model.section.outline(model.numbers, stretch),
         shape=shape,
     )
 
 
 def pose_warnings(model: Model, pose: Pose) -> tuple[str, ...]:
     """Return what a designer should know of a solved pose: fitted range, touching chambers, stability, its body."""
-    found = []
-    low, high = model.material.fitted_stretch
-    if not low <= pose.stretch <= high:
-        found.append(
-            f"stretch {pose.stretch:.3f} is outside {low:g} to {high:g}, where {model.material.name} was fitted"
-        )
-    limit = touching_stretch(model.robot)
-    if pose.stretch > limit:
-        found.append(f"stretch {pose.stretch:.3f} is above {limit:.3f}, where neighbouring reinforced chambers touch")
+    found = model.section.warnings(pose.stretch)
     if np.min(pose.shape.shear_extension[:, 2]) <= 0:
         found.append("the load compresses the rod to nothing somewhere (v_z <= 0); the model does not hold there")
     if pose.stable is None:

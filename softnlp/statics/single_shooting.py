@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.model import rod
-from softnlp.model.rod import STATE_SIZE, RodSection
+from softnlp.model.quantities import LOADS
+from softnlp.model.rod import STATE_SIZE
 from softnlp.native.kernels import Kernels, Step
 from softnlp.native.shooting import Compiled, shooting
-from softnlp.statics.loadcase import RodFunctions, unpack_section
+from softnlp.statics.loadcase import RodFunctions, unpack_section, whole_weight
 from softnlp.statics.reduced import MOMENT, POSITION, ROTATION, STATE, base_state, function, reduced_rod
 from softnlp.statics.stretches import Stretches, stretch_maps
 
@@ -31,31 +32,23 @@ _DIVERGED = 1e3
 _RICHARDSON = 16 / 15  # a fourth-order method's error over its change from halving every step
 _SUBSTEPS = 4  # between nodes
 _MOST_CURVES = 4
-_LOADS = ("tip_force", "tip_moment", "gravity")
-_WEIGHT = slice(RodSection._fields.index("load_x"), len(RodSection._fields))
-_LENGTH = len(RodSection._fields)  # where the constants hold the length of the stretched rod
+
 _BASE = base_state(np.zeros((3, 1)))[:, 0]
 
 
 @dataclass(frozen=True, eq=False)
 class AtStretch:
-    """A rod at its stretch: constants c of the load case, scaled imbalance of the stretch, units (L_0, EI / L_0^2)."""
+    """A rod at its stretch: constants c of the load case, scaled imbalance of the stretch, units (L_0, EI / L_0^2).
+
+    arc_tip : (3,) of the circular arc without loads, scaled.
+    """
 
     stretch: float
     constants: Array
     imbalance: float
     length_unit: float
     force_unit: float
-
-    @property
-    def arc_tip(self) -> Array:
-        """The tip (3,) of the circular arc without loads, scaled; see `softnlp.model.rod.arc_state`."""
-        c, L = RodSection(*self.constants[:_LENGTH]), self.constants[_LENGTH]
-        turn = L * np.array([c.pressure_moment_x / c.bending_x, c.pressure_moment_y / c.bending_y])
-        half = float(np.hypot(*turn)) / 2
-        sideways = np.sinc(half / np.pi) ** 2 / 2  # (1 - cos) / angle^2
-        tip: Array = L * np.array([sideways * turn[1], -sideways * turn[0], np.sinc(2 * half / np.pi)])
-        return tip
+    arc_tip: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,17 +83,17 @@ class SingleShooting:
 
     def dead_loads(self, column: Array) -> Array:
         """Return tip force, tip moment and gravity (9,) in a column of every quantity [SI]."""
-        return np.concatenate([column[self._where[name]] for name in _LOADS])
+        return np.concatenate([column[self._where[name]] for name in LOADS])
 
     def loads(self, column: Array, at: AtStretch) -> tuple[Array, Array]:
         """Return the scaled tip force and moment (3,)."""
-        force, moment = (column[self._where[name]] for name in _LOADS[:2])
+        force, moment = (column[self._where[name]] for name in LOADS[:2])
         return force / at.force_unit, moment / (at.force_unit * at.length_unit)
 
     def at_stretch(self, column: Array) -> AtStretch | None:
         """Return the rod at the stretch of a column of every quantity [SI]; None where that is not plain to see."""
         others = column.copy()
-        for name in ("pressure", *_LOADS):
+        for name in ("pressure", *LOADS):
             others[self._where[name]] = 0.0
         key = others.tobytes()
         curve = self._curves.pop(key, None) or Stretches(self._functions, self._code, shared=True)
@@ -111,7 +104,8 @@ class SingleShooting:
         if not known[0]:
             return None
         found = self._code.apply("section", np.append(column, stretch)[:, None])[:, 0]
-        return AtStretch(float(stretch[0]), found[:-3], *(float(v) for v in found[-3:]))
+        imbalance, length_unit, force_unit = (float(v) for v in found[-6:-3])
+        return AtStretch(float(stretch[0]), found[:-6], imbalance, length_unit, force_unit, found[-3:])
 
     def shoot(self, at: AtStretch, force: Array, moment: Array, intervals: int, start: Array) -> Shot | None:
         """Return the pose on a grid that Newton's method reaches from a base moment (3,); scaled loads (3,)."""
@@ -137,8 +131,7 @@ class SingleShooting:
         s = np.arange(intervals + 1) / intervals
         nodes = np.empty((STATE_SIZE, intervals + 1))
         nodes[:12], nodes[15:] = path[:, :12].T, path[:, MOMENT].T
-        weight = at.constants[_LENGTH] * at.constants[_WEIGHT]
-        nodes[12:15] = force[:, None] + weight[:, None] * (1 - s)
+        nodes[12:15] = force[:, None] + whole_weight(at.constants)[:, None] * (1 - s)
         ends = self._stepped(nodes[:, :-1], at.constants, 1 / intervals)
         fine = self._code.run_one("value", 2 * intervals, data, state[:STATE])
         change = fine - reached[:STATE] + np.linalg.solve(J, moment - fine[MOMENT]) @ tangents
@@ -188,7 +181,11 @@ def single_shooting(functions: RodFunctions) -> SingleShooting | None:
     along = [functions.field(with_integrals[:size], c), functions.lengths(with_integrals[:size], c)]
     state = ca.SX.sym("x", size + nc)
     section = unpack_section(state[size:])
-    strains = ca.vertcat(*rod.strains(state[:size], section), *rod.wall_resultants(state[:size], section))
+    strains = ca.vertcat(*functions.strains(state[:size], state[size:]), *rod.wall_resultants(state[:size], section))
+    maps = stretch_maps(functions)
+    given = ca.SX.sym("given", maps["section"].size1_in(0))
+    arc = functions.arc(given[:-1], given[-1], 1.0)
+    maps["section"] = function("section", [given], ca.vertcat(maps["section"](given), arc[:3]))
     kernels = Kernels(
         {
             "directions": reduced.directions,
@@ -196,7 +193,7 @@ def single_shooting(functions: RodFunctions) -> SingleShooting | None:
             "interval": Step(function("interval", [with_integrals, data, s], h * ca.vertcat(*along))),
             "between": Step(function("between", [x, data, s], h * functions.field(x, c))),
         },
-        {"strains": function("strains", [state], strains), **stretch_maps(functions)},
+        {"strains": function("strains", [state], strains), **maps},
         traced=("directions",),
     )
     code = shooting(kernels)

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from softnlp.base.status import Status
 from softnlp.model.numerics import Numerics, Transcribing
-from softnlp.model.quantities import Model
+from softnlp.model.quantities import LOADS, Model
 from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.nlp.solver import Solution, discretisation_correction
-from softnlp.statics.attempts import LOADS, Attempt, Goal, Neighbour, Work, attempts, from_near
+from softnlp.statics.attempts import Attempt, Goal, Neighbour, Work, attempts, from_near
 from softnlp.statics.branch import BranchPoint, stretch_on_branch
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.compiled import RodEquations, rod_equations
@@ -46,7 +46,7 @@ class PoseSolver:
     """Solves poses of one model; compiled grids are kept between poses, so a sequence pays for each once.
 
     model : robot, silicone, coefficients, conventions, all numbers. unloaded_accuracy : estimate to aim for, times 3,
-    where no load acts, if it is below that of the numerics. by_machine : whether poses may come from machine code.
+    where no load acts, if it is below that of the numerics.
     """
 
     def __init__(
@@ -56,10 +56,8 @@ class PoseSolver:
         *,
         unloaded_accuracy: float = UNLOADED_ACCURACY * 3,
         equations: RodEquations | None = None,
-        by_machine: bool = True,
     ) -> None:
         self.numerics = numerics
-        self._by_machine = by_machine
         self._unloaded_accuracy = unloaded_accuracy
         self.equations = equations or rod_equations(model)
         self._set_model(model)
@@ -171,9 +169,9 @@ class PoseSolver:
     def _proposed(self, column: Array, loads: Loads, near: Solved | None) -> Solved | None:
         """Return the pose that single shooting finds in machine code, where that is compiled and certain of it."""
         numerics = self.numerics
-        if not self._by_machine or numerics.transcription != "multiple-shooting" or numerics.engine == "ipopt":
+        if numerics.transcription != "multiple-shooting" or numerics.engine == "ipopt":
             return None
-        single = self.equations.single_shooting()
+        single = self.equations.single_shooting() if self.model.section.by_sum else None
         if single is None:
             return None
         nodes = None if near is None else near.nodes
@@ -230,7 +228,7 @@ class PoseSolver:
     ) -> int:
         """Return a first grid at a stretch, see `softnlp.statics.grid_size`. transcription : as of `grid`."""
         constants, _, units = (np.asarray(part).ravel() for part in self.functions.section(column, stretch))
-        after = self.model.robot.chamber_sets + 3  # the pressures and the tip force
+        after = self.model.sets + 3  # the pressures and the tip force
         moment = column[after : after + 3] / np.prod(units)
         return first_intervals(transcription or self.numerics.transcription, constants, moment, arc_target)
 

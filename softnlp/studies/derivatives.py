@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from softnlp.base.columns import DEG, OUTPUTS
 from softnlp.base.errors import InputError, nearest
 from softnlp.base.quantity import Quantity
-from softnlp.model.rod import RodSection
+from softnlp.model.section import RodSection
 from softnlp.nlp.implicit import ImplicitDerivatives
 from softnlp.nlp.problem import CompiledProblem
 from softnlp.nlp.solver import Engine, Solution
