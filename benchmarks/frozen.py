@@ -93,17 +93,23 @@ def differences(old: Any, new: Any, close: float) -> list[str]:
     largest: dict[str, float] = {}
     for key, v in before.values():
         if isinstance(v, float) and math.isfinite(v):
-            largest[key] = max(largest.get(key, 0.0), abs(v))
+            largest[_scale(key)] = max(largest.get(_scale(key), 0.0), abs(v))
     found = [f"{path}: only in one" for path in sorted(set(before) ^ set(after))]
     for path, (key, a) in before.items():
         b = after.get(path, (key, a))[1]
         if isinstance(a, int | float) and isinstance(b, int | float) and not isinstance(a, bool):
-            allowed = max(close * max(abs(a), largest.get(key, 0.0)), errors.get(path, 0.0))
+            allowed = max(close * max(abs(a), largest.get(_scale(key), 0.0)), errors.get(path, 0.0))
             if not (abs(a - b) <= allowed or (math.isnan(a) and math.isnan(b))):
                 found.append(f"{path}: {a!r} -> {b!r}")
         elif a != b:
             found.append(f"{path}: {a!r} -> {b!r}")
     return found
+
+
+def _scale(key: str) -> str:
+    """Return whose size a number is held against: a displacement against the robot, whose digits it is made of."""
+    made_of = {"tip_displacement_mm": "tip_position_mm", "distance_mm": "tip_position_mm"}
+    return {**made_of, "direction_error_deg": "bending_angle_deg"}.get(key, key)
 
 
 def _standard_errors(document: Any) -> dict[str, float]:

@@ -29,7 +29,7 @@ from scipy.optimize import minimize
 from softnlp import BAR, Loads, Numerics, Status, material, robot
 from softnlp.model.quantities import Model
 from softnlp.statics.solver import PoseSolver, Solved
-from softnlp.studies.inverse_solver import InverseSolver
+from softnlp.studies.inverse_solver import InverseKinematics
 from softnlp.studies.targets import InverseTask, Target
 
 Array = NDArray[np.float64]
@@ -82,25 +82,25 @@ def random_tips(forward: PoseSolver, loads: Loads, count: int) -> Array:
     return np.array(tips)
 
 
-def solver_for(model: Model, loads: Loads) -> InverseSolver:
+def solver_for(model: Model, loads: Loads) -> InverseKinematics:
     """Return a solver for positions within the bounds."""
     sets = model.robot.chamber_sets
     task = InverseTask((), np.zeros(sets), np.full(sets, HIGHEST), float(model.robot.length))
-    return InverseSolver(model, Numerics(), loads, task, "newton")
+    return InverseKinematics(model, Numerics(), loads, task, "newton")
 
 
-def answered(model: Model, loads: Loads, targets: Array) -> tuple[InverseSolver, list[float], list[Any]]:
+def answered(model: Model, loads: Loads, targets: Array) -> tuple[InverseKinematics, list[float], list[Any]]:
     """Solve every target on its own, no one begun from the last; the first includes the table of starts."""
     solver = solver_for(model, loads)
     seconds, steps = [], []
     for target in targets:
         began = time.perf_counter()
-        steps.append(solver.solve(Target(target, None), None)[0])
+        steps.append(solver.nearest(Target(target, None), None)[0])
         seconds.append(time.perf_counter() - began)
     return solver, seconds, steps
 
 
-def out_of_reach(solver: InverseSolver, forward: PoseSolver, loads: Loads, length: float) -> None:
+def out_of_reach(solver: InverseKinematics, forward: PoseSolver, loads: Loads, length: float) -> None:
     """Compare the distances left with a dense search."""
     levels = np.linspace(0, HIGHEST, 12)
     pressures = [np.array(P) for P in product(levels, repeat=3)]
@@ -110,7 +110,7 @@ def out_of_reach(solver: InverseSolver, forward: PoseSolver, loads: Loads, lengt
         tips.append(tip_at(forward, loads, P, near)[0])
     dense = np.array(tips)
     for target in np.array(FAR) * length / 0.06:
-        step = solver.solve(Target(target, None), None)[0]
+        step = solver.nearest(Target(target, None), None)[0]
         distances = np.linalg.norm(dense - target, axis=1)
         best, left = pressures[int(np.nanargmin(distances))], float(np.nanmin(distances))
         width = (levels[1] - levels[0]) / 2
@@ -139,12 +139,12 @@ def against_nelder_mead(model: Model, forward: PoseSolver, loads: Loads, targets
     """Time both on the same targets, in turns; `usual` is our mean over all targets [s], the table built once."""
     length = float(model.robot.length)
     solver = solver_for(model, loads)
-    solver.solve(Target(targets[0], None), None)  # compiled, as the forward solver is; the table below is built anew
-    solver.forget_table()
+    solver.nearest(Target(targets[0], None), None)  # compiled, as the forward solver is
+    solver = solver_for(model, loads)  # its table of starts is built anew
     ratios, ours, theirs, solves = [], [], [], []
     for target in targets:
         began = time.perf_counter()
-        solver.solve(Target(target, None), None)
+        solver.nearest(Target(target, None), None)
         middle = time.perf_counter()
         searched = nelder_mead(partial(tip_at, forward, loads), target, length)
         ended = time.perf_counter()

@@ -24,13 +24,12 @@ from scipy.optimize import least_squares
 
 from benchmarks.paper_method import Array
 from softnlp.model.numerics import Numerics
-from softnlp.model.quantities import Model
+from softnlp.model.quantities import LOADS, Model
 from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.nlp.continuation import Path, follow, straight_path
 from softnlp.nlp.linear import SparseSolver
 from softnlp.nlp.solver import Engine, Solution, violation
 from softnlp.nlp.transcription import RK4, rk_step
-from softnlp.statics.attempts import LOADS
 from softnlp.statics.branch import stretch_on_branch
 from softnlp.statics.pose_grid import Grid, pose_distance
 from softnlp.statics.solver import PoseSolver
@@ -202,9 +201,7 @@ class Methods:
         start = ca.Function("start", [base, stretch, p], [state, c, units])
         x0, constants, u = start(b, s, q)
         nodes = every(x0, ca.repmat(constants, 1, K), ca.DM.ones(1, K) / K)
-        load = self.grid.problem
-        force, moment = (_part(load, name, q) for name in ("tip_force", "tip_moment"))
-        tip = functions.tip(nodes[:, -1], constants, force / u[1], moment / (u[0] * u[1]), ca.MX(0, 1), ca.MX(0, 1), u)
+        tip = functions.tip(nodes[:, -1], constants, ca.MX(0, 1), functions.tip_numbers(q), u)
         shoot = ca.Function("shoot", [b, s, q], [ca.horzcat(x0, nodes), tip])
         return shoot, ca.Function("slope", [b, s, q], [ca.jacobian(tip, b)])
 
@@ -215,16 +212,6 @@ class Methods:
     def _filled(self, base: Array, stretch: float, p: Array, iterations: int, words: str) -> Found:
         nodes, _ = self._shot(base, stretch, p)
         return Found(self.grid, np.concatenate([[stretch], nodes.T.ravel()]), iterations, words)
-
-
-def _part(problem: Any, name: str, p: ca.MX) -> ca.MX:
-    """Return the entries of one fixed quantity in the column p."""
-    start = 0
-    for q in problem.fixed:
-        if q.name == name:
-            return p[start : start + q.size]
-        start += q.size
-    raise KeyError(name)
 
 
 def base_of(x: Array) -> Array:

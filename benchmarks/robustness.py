@@ -28,7 +28,7 @@ from softnlp.model.materials import Material, load_materials
 from softnlp.model.quantities import Model, quantities
 from softnlp.model.robot import ROBOTS, Robot
 from softnlp.model.rod import Loads
-from softnlp.model.section import deform
+from softnlp.model.round_chambers import deform
 from softnlp.statics.branch import branch_function, stretch_on_branch
 from softnlp.statics.step import Step
 from softnlp.studies.forward import forward

@@ -12,7 +12,7 @@ from benchmarks.paper_method import Array, Rod
 from softnlp.base.status import Status
 from softnlp.model.quantities import Model, quantities
 from softnlp.model.rod import Loads
-from softnlp.model.section import deform
+from softnlp.model.round_chambers import deform
 from softnlp.statics.branch import branch_function, stretch_on_branch
 
 NO_LOADS = Loads()

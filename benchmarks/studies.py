@@ -29,7 +29,7 @@ from softnlp.model.quantities import Model
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.wall import standing_wall
-from softnlp.studies.inverse_solver import InverseSolver
+from softnlp.studies.inverse_solver import InverseKinematics
 from softnlp.studies.targets import Target
 
 REFERENCE = Numerics(intervals=160)
@@ -212,10 +212,8 @@ def inverse_kinematics() -> Task:
     rods = Rods(model)
 
     def ours() -> Callable[[], Array]:
-        solver = inverse.solver_for(model, loads)
-
         def solve() -> Array:
-            solver.forget_table()  # so that its table of starts is in the time
+            solver = inverse.solver_for(model, loads)  # so that its table of starts is in the time
             return np.array([found_pressure(solver, target) for target in targets])
 
         return solve
@@ -243,9 +241,9 @@ def inverse_kinematics() -> Task:
     return Task("inverse kinematics", "target", "farthest pose from its target, of L_0", entries, judge)
 
 
-def found_pressure(solver: InverseSolver, target: Array) -> Array:
+def found_pressure(solver: InverseKinematics, target: Array) -> Array:
     """Return the pressure that our inverse kinematics finds."""
-    step, _ = solver.solve(Target(target, None), None)
+    step, _ = solver.nearest(Target(target, None), None)
     if step.pose is None:
         raise RuntimeError(step.message)
     return step.pressure

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from softnlp.model.conventions import Conventions as Conventions
     from softnlp.model.laws import formula_law as formula_law
     from softnlp.model.laws import function_law as function_law
+    from softnlp.model.load import Load as Load
     from softnlp.model.materials import Material as Material
     from softnlp.model.materials import load_materials as load_materials
     from softnlp.model.materials import material as material
@@ -46,6 +47,9 @@ if TYPE_CHECKING:
     from softnlp.model.robot import Robot as Robot
     from softnlp.model.robot import robot as robot
     from softnlp.model.rod import Loads as Loads
+    from softnlp.model.section import Section as Section
+    from softnlp.model.section import SectionRadii as SectionRadii
+    from softnlp.model.section import SectionState as SectionState
     from softnlp.nlp.problem import Constraint as Constraint
     from softnlp.nlp.transcription import Collocation as Collocation
     from softnlp.nlp.transcription import MultipleShooting as MultipleShooting
@@ -103,10 +107,12 @@ _HOMES = {
     "model.contact_settings": ("Closure", "ClosureWeights", "ContactSettings"),
     "model.conventions": ("AS_PRINTED", "COEFFICIENT_SETS", "REPRODUCTION", "Coefficients", "Conventions"),
     "model.laws": ("formula_law", "function_law"),
+    "model.load": ("Load",),
     "model.materials": ("Material", "load_materials", "material"),
     "model.numerics": ("Numerics",),
     "model.robot": ("ROBOTS", "Robot", "robot"),
     "model.rod": ("Loads",),
+    "model.section": ("Section", "SectionRadii", "SectionState"),
     "nlp.problem": ("Constraint",),
     "nlp.transcription": ("Collocation", "MultipleShooting"),
     "results": ("save", "to_dataset", "to_json"),

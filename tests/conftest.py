@@ -26,6 +26,7 @@ settings.register_profile(
 # A mutant has to be found by the tests of its own module, test_<module>.py, and not by a solve somewhere above it.
 MATERIALS = ("test_material_lines.py", "test_formula.py", "test_materials.py")
 TESTS_OF = dict.fromkeys(("formula", "laws", "material_reading", "materials"), MATERIALS)
+TESTS_OF["round_chambers"] = ("test_section.py",)
 LONG = "test_units_only_change_the_numbers"
 
 # Files of five seconds and more, tests that take long among them, in the order of what they take.
@@ -33,10 +34,10 @@ LONGEST = (
     *("app_studies", "app_browser", "engine", "identify", "workspace_lane", "cli", "docs", "solver", "inverse"),
     *("sweep", "blocked_force", "forward", "sensitivity", "sweep_processes", "witness_blocked", "design"),
     *("shipped_blocked", "results", "shipped_scenarios", "plots", "workspace_docs", "compare_figures"),
-    *("inverse_solver", "app_workspace", "pages", "view", "tensile", "paper", "problem", "app_session"),
+    *("varying", "inverse_solver", "app_workspace", "pages", "view", "tensile", "paper", "problem", "app_session"),
     *("app_material", "app_robot", "app_blocked", "compare", "scenario", "blocked_paths", "blocked_problem"),
     *("user_text", "netcdf", "stability", "workspace_document", "app_inverse", "processes", "random_poses"),
-    *("fuzz", "app_sequence", "app_identify", "paper_method", "witness", "figures", "branch"),
+    *("fuzz", "app_sequence", "app_identify", "paper_method", "witness", "figures", "branch", "loads"),
 )
 
 

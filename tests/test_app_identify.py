@@ -85,6 +85,9 @@ async def _robots() -> None:
         await drop(user, "measurements.drop", "../angles.csv", measured().encode())
         assert session.document.table("measurements") == {"file": "angles.csv", "free": ["k_e", "k_b"]}
         assert session.problem is None
+        enter(user, "identify.kind", "tensile")  # a look
+        assert session.document.table("measurements") == {"file": "angles.csv", "free": ["k_e", "k_b"]}
+        enter(user, "identify.kind", "measurements")
         # bounds that exclude the start are moved to; the constants that made the file come back
         enter(user, "measurements.bounds.k_b.1", 1.2)
         assert session.document.get("measurements", "bounds") == {"k_b": [0.0, 1.2]}
@@ -150,6 +153,22 @@ async def _tensile() -> None:
 
 def test_a_tensile_test_gives_a_silicone() -> None:
     done(_tensile())
+
+
+async def _one_kind_at_a_time() -> None:
+    async with opened(identify_tab, "identify") as (user, stage):
+        session = stage.session
+        await drop(user, "measurements.drop", "angles.csv", measured().encode())
+        enter(user, "identify.kind", "tensile")
+        await drop(user, "tensile.drop", "tensile.csv", (FILES / "tensile.csv").read_bytes())
+        for kind, other in (("tensile", "measurements"), ("measurements", "tensile")) * 2:
+            enter(user, "identify.kind", kind)
+            assert (bool(session.table(kind)), bool(session.table(other))) == (True, False)
+            assert session.problem is None
+
+
+def test_data_of_the_kind_that_is_not_chosen_are_put_aside() -> None:
+    done(_one_kind_at_a_time())
 
 
 async def _named_traces() -> None:

@@ -19,6 +19,7 @@ from nicegui import ui
 
 from softnlp import forward
 from softnlp.app.asking import scenario_with
+from softnlp.app.document import START
 from softnlp.app.parts import MOST_MARKS, csv_text, line, number_text
 from softnlp.app.tabs.sequence import rows_of_text, rows_text, sequence_tab, source_of
 from softnlp.base.errors import InputError
@@ -97,8 +98,10 @@ async def _visit() -> None:
         assert session.pressure == pytest.approx(np.array([0.3, 0.3, 0]) * BAR)
         session.show_step(3)
         assert field(user, "sequence.step").value == 4
+        assert field(user, "sequence.shown").text == "Step 4 of 5"
         session.set_pressure(np.array([0.7, 0.0, 0.0]) * BAR)  # a pose of its own is no step
         assert field(user, "sequence.step").value == 4
+        assert field(user, "sequence.shown").text == "5 steps"
         # steps that fail are named, and their numbers are not there
         session.change_all("stiffening", {"elongation": 0.0, "bending": 0.0})
         enter(user, "pressure.ramp.to_bar", 60.0)
@@ -143,3 +146,23 @@ async def _drop(user: object, content: bytes) -> None:
 
 def test_a_sequence_on_the_page() -> None:
     done(_visit())
+
+
+async def _open() -> None:
+    text = START.replace("[[0.8, 0.0, 0.0]]", "[[0, 0, 0], [0.4, 0, 0], [0.8, 0, 0], [0.8, 0, 0], [0.8, 0.8, 0]]")
+    async with opened(sequence_tab, "forward", text) as (user, stage):
+        shown, session = field(user, "sequence.shown"), stage.session
+        for _ in range(2):  # opened, and after a run
+            assert shown.text == "Step 5 of 5"
+            assert field(user, "sequence.step").value == 5
+            assert session.pressure == pytest.approx(np.array([0.8, 0.8, 0]) * BAR)
+            await ran(user, "sequence", "5 of 5 steps solved")
+        enter(user, "sequence.step", 4)  # one of two alike
+        assert shown.text == "Step 4 of 5"
+        session.open(text.replace("[0.4, 0, 0], ", ""), "shorter.toml")
+        assert shown.text == "Step 4 of 4"
+        assert session.follows_file
+
+
+def test_the_step_named_is_the_pose_shown() -> None:
+    done(_open())

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,13 +14,18 @@ import pytest
 pytest.importorskip("tomlkit", reason="the extra gui is not installed")
 
 from app_stage import done, enter, field, opened
+from nicegui import ui
 
+from softnlp.app.asking import scenario_with
+from softnlp.app.controls import button
+from softnlp.app.files import save, saved
 from softnlp.app.panels.equations import loads_panel
 from softnlp.app.panels.results import certificate_words, step_lines
-from softnlp.app.session import LARGEST_FILE, Session
+from softnlp.app.session import LARGEST_FILE, Session, Stage
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR
 from softnlp.results import to_json
+from softnlp.scenario.check import SCHEMAS
 from softnlp.scenario.read import load_scenario
 from softnlp.scenario.run import run_scenario
 
@@ -48,12 +55,12 @@ def test_a_live_pose_is_the_step_of_the_saved_scenario(session: Session, study: 
     for bar in (0.2, 0.5, 0.9):  # a slider on its way: each pose starts from the last
         session.set_pressure(np.array([bar * BAR, 0.0, 0.0]))
         shown = live_step(session)
-    saved = to_json(run_scenario(session.asked()))["steps"][-1]
-    assert saved["pressure_bar"] == shown["pressure_bar"] == [0.9, 0.0, 0.0]
+    alone = to_json(run_scenario(session.asked()))["steps"][-1]
+    assert alone["pressure_bar"] == shown["pressure_bar"] == [0.9, 0.0, 0.0]
     for key in ("tip_position_mm", "bending_angle_deg", "backbone_length_mm", "chamber_length_mm", "stretch"):
-        np.testing.assert_allclose(shown[key], saved[key], rtol=2e-6, atol=1e-4)
+        np.testing.assert_allclose(shown[key], alone[key], rtol=2e-6, atol=1e-4)
     if study == "blocked-force":
-        assert shown["blocked_force_N"] == pytest.approx(saved["blocked_force_N"], rel=1e-6)
+        assert shown["blocked_force_N"] == pytest.approx(alone["blocked_force_N"], rel=1e-6)
 
 
 def test_the_loads_say_how_the_robot_is_held() -> None:
@@ -137,6 +144,52 @@ def test_a_shipped_scenario_opens_with_its_files(session: Session, file: Path) -
     assert again.text() == session.text()
     assert np.array_equal(again.asked().pressures, asked.pressures)
     again.close()
+
+
+@pytest.mark.parametrize("looked", [study for study in SCHEMAS if study not in ("design", "blocked-force")])
+@pytest.mark.parametrize(
+    "file", ["D25L60_loaded_tip.toml", "inverse/circle.toml", "identify/tensile.toml", "workspace/D25L60_grid.toml"]
+)
+def test_a_look_at_a_study_leaves_the_file_as_it_is(session: Session, file: str, looked: str) -> None:
+    session.open_path(SCENARIOS / file)
+    before = session.text()
+    session.choose(looked)
+    assert (session.text(), session.file_name) == (before, Path(file).name)
+    assert session.asked().study == session.opened_study
+    again = Session()
+    again.recall(session.kept(), session.kept_files())
+    assert (tomllib.loads(again.text()), again.document.study) == (tomllib.loads(before), looked)
+    again.close()
+
+
+def test_a_study_that_was_changed_or_run_is_that_of_the_file_which_has_a_name_of_its_own(session: Session) -> None:
+    session.open_path(SCENARIOS / "D25L60_loaded_tip.toml")
+    session.choose("inverse")
+    session.change("robot", "length_mm", 55.0)  # which the opened study has too
+    assert (session.study, session.left_out()) == ("forward", [])
+    session.change("target", "tip_position_mm", [[-15.0, 0.0, 60.0]])
+    assert (session.asked().study, session.left_out()) == ("inverse", ["pressure"])
+    assert saved(session)[0] == "D25L60_loaded_tip_inverse.toml"
+    again = Session()
+    again.recall(session.kept(), session.kept_files())
+    assert saved(again)[0] == saved(session)[0]
+    assert tomllib.loads(again.text()) == tomllib.loads(session.text())
+    again.close()
+    session.choose("workspace")
+    assert session.asked().study == "inverse"
+    session.choose("blocked-force")
+    assert session.asked().study == "inverse"
+    session.choose("workspace")
+    scenario_with(session, "workspace")
+    assert session.asked().study == "workspace"
+    session.choose("forward")
+    assert (session.asked().study, saved(session)[0]) == ("forward", "D25L60_loaded_tip.toml")
+    session.choose("blocked-force")  # the page shows its numbers
+    assert (session.asked().study, saved(session)[0]) == ("blocked-force", "D25L60_loaded_tip_blocked-force.toml")
+    session.choose("inverse")
+    assert session.asked().study == "inverse"
+    session.choose("identify")
+    assert session.asked().study == "inverse"
 
 
 def test_an_opened_scenario_keeps_its_pressures_until_a_slider_moves(session: Session) -> None:
@@ -250,3 +303,46 @@ def test_a_load_leaves_the_free_shape_as_a_ghost(session: Session) -> None:
     pose = run.steps[0].pose
     assert pose is not None
     np.testing.assert_allclose(pose.tip_position - ghost.tip_position, pose.tip_displacement, atol=1e-9)
+
+
+async def _saves() -> None:
+    text = (SCENARIOS / "D25L60_loaded_tip.toml").read_text()
+    given: list[tuple[str, str]] = []
+
+    def page(stage: Stage) -> None:
+        button("Save", None, "save", lambda: save(stage.session))
+
+    async with opened(page, "identify", text) as (user, stage):  # identification has no data yet
+        session = stage.session
+        assert session.problem is not None
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(ui.download, "content", lambda content, name: given.append((name, content.decode())))
+            user.find(marker="save").click()
+            await user.should_see("saved scenario.toml: study forward")
+            assert given == [("scenario.toml", text)]
+            session.choose("forward")
+            session.change("robot", "length_mm", -1.0)
+            user.find(marker="save").click()
+            await user.should_see("not saved: [robot] length_mm")
+            (red,) = user.find(ui.notification).elements
+            # "Close" can be read on red
+            assert red.props["options"]["actions"] == [{"label": "Close", "color": "white"}]
+            taken: list[bool] = []
+            patch.setattr(ui.notification, "dismiss", lambda self: taken.append(True))
+            session.change("robot", "length_mm", 60.0)
+            user.find(marker="save").click()
+            await asyncio.sleep(0.1)
+        assert len(given) == 2
+        assert taken == [True]
+
+
+def test_save_gives_the_file_that_was_opened_and_takes_back_an_earlier_refusal() -> None:
+    done(_saves())
+
+
+def test_what_a_warning_says_stands_in_no_other_line(session: Session) -> None:
+    session.open_path(SCENARIOS / "D25L60_loaded_tip.toml")
+    assert session.scenario is not None
+    run, _ = session.live.pose(session.scenario, session.pressure)
+    assert any("stability is undefined" in warning for warning in run.steps[0].warnings)
+    assert "stab" not in certificate_words(run)

@@ -33,7 +33,7 @@ from softnlp import (
 from softnlp.base.status import Status
 from softnlp.model.contact_settings import ClosureWeights, ContactSettings
 from softnlp.model.quantities import Model
-from softnlp.model.tip import tip_conditions
+from softnlp.model.tip import TipContact
 from softnlp.nlp.problem import compile_problem
 from softnlp.nlp.transcription import MultipleShooting
 from softnlp.statics.condensed import CondensedSolver
@@ -397,7 +397,7 @@ def test_a_preloading_wall_and_loads_at_rest_are_reached() -> None:
 
 
 def test_the_condensed_equations_are_the_whole_ones() -> None:
-    functions = rod_functions(Model(D25L60, ECOFLEX), tip_conditions("rigid"))
+    functions = rod_functions(Model(D25L60, ECOFLEX), (TipContact("rigid"),))
     method = MultipleShooting(4)
     declared = functions.declared()
     problem = compile_problem(list(declared.values()), [load_case("blocked", functions, declared, method)])

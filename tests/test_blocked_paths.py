@@ -19,6 +19,7 @@ from softnlp.model.contact_settings import ClosureWeights, ContactSettings
 from softnlp.model.quantities import Model
 from softnlp.nlp.solver import Solution
 from softnlp.statics import blocked, weighted
+from softnlp.statics import joint as joint_problems
 from softnlp.statics.blocked import BlockedSolver, _Ended
 from softnlp.statics.blocked_grid import Blocked, BlockedGrid
 from softnlp.statics.blocked_step import solved_step
@@ -376,34 +377,6 @@ def test_by_collocation_a_minimum_needs_square_solutions_and_steps_enough(monkey
 # --- the pressure of a force -----------------------------------------------------------------------------------------
 
 
-def test_the_bracket_is_closed_by_the_illinois_method() -> None:
-    """On a convex curve the plain secant keeps one end; from both sides the root is met to the accuracy."""
-    asked: list[float] = []
-
-    def curve(P: float, near: Any) -> tuple[Step, None, float]:
-        asked.append(P)
-        return Step(P * FIRST, Status.SOLVED, ""), None, P**5
-
-    P, step, solved = force_inversion._bracketed(curve, (0.0, 0.0), (2.0, 32.0), 5.0, None, 1e-10)
-    assert pytest.approx(5**0.2, rel=1e-10) == P
-    assert step.pressure[0] == P
-    assert solved is None
-    assert len(asked) < 15
-    assert max(np.sign(np.diff(asked))) == -min(np.sign(np.diff(asked)))  # from both sides
-
-
-def test_a_force_that_jumps_leaves_the_bracket_after_its_last_step() -> None:
-    calls: list[float] = []
-
-    def jumps(P: float, near: Any) -> tuple[Step, None, float]:
-        calls.append(P)
-        return Step(P * FIRST, Status.SOLVED, ""), None, 0.0 if P < 1 / 3 else 1.0
-
-    P, *_ = force_inversion._bracketed(jumps, (0.0, 0.0), (1.0, 1.0), 0.6, None, 1e-3)
-    assert len(calls) == 30
-    assert pytest.approx(1 / 3, abs=1e-3) == P
-
-
 def test_a_branch_that_ends_before_the_force_says_how() -> None:
     pressures, step = pressure_for_force(D25, OGDEN, [0], 100.0, highest=600 * BAR, numerics=COARSE)
     assert step.status is Status.UNSTABLE_MATERIAL
@@ -417,8 +390,8 @@ def test_a_pressure_gives_its_force_also_where_both_shapes_are_not_solved_at_onc
 ) -> None:
     contact = ContactSettings(closure=closure, weights=WEIGHTS)  # type: ignore[arg-type]
     if joint == "fails":
-        real = force_inversion.joint_engine
-        monkeypatch.setattr(force_inversion, "joint_engine", lambda *a, **k: Instead(real(*a, **k), fails))
+        real = joint_problems.joint_engine
+        monkeypatch.setattr(joint_problems, "joint_engine", lambda *a, **k: Instead(real(*a, **k), fails))
     if joint == "off the branch":
         plain, near = BlockedSolver.solve, list[float]()
         monkeypatch.setattr(force_inversion, "_jointly", lambda *a: near.append(1.02 * a[3]) or near[-1])

@@ -14,10 +14,10 @@ from softnlp.nlp.solver import Engine
 from softnlp.nlp.transcription import MultipleShooting
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.joint import joint_problem
 from softnlp.statics.loadcase import load_case
 from softnlp.statics.step import Step
 from softnlp.statics.wall import Wall
-from softnlp.studies.force_inversion import joint_problem
 
 ECOFLEX = material("Ecoflex 00-50")
 WALL = Wall(np.zeros(3), np.array([1.0, 0.0, 0.0]))
@@ -56,7 +56,7 @@ def test_both_shapes_in_one_problem_give_the_same_force(name: str, closure: str)
     K = 40  # the free lengths are those of the grid here and exact there
     solver = solver_of(name, K, ContactSettings(closure=closure))  # type: ignore[arg-type]
     near, (step, found) = solved(solver, 0.85)[1], solved(solver, 0.9)
-    problem = joint_problem(solver, K, free_pressure=False)
+    problem = joint_problem(solver, K, free_pressure=False).compiled
     assert [case.name for case in problem.cases] == ["free", "blocked"]
     assert "contact.free_lengths" not in {q.name for q in problem.fixed}
     values = solver.values(found.situation, found.pressed, np.zeros(0))
@@ -77,7 +77,7 @@ def test_weighted_is_the_minimum_of_an_objective(weights: tuple[float, float, fl
     step, found = solved(solver, 0.5)
     declared = solver.functions.declared()
     case = load_case("blocked", solver.functions, declared, MultipleShooting(10))
-    taken = ca.vertcat(*(q.symbol for name, q in declared.items() if name.startswith("contact.")))
+    taken = solver.functions.tip_column(declared)
     units = ca.vertcat(case.length_unit, case.force_unit)
     tip = case.transcribed.nodes[:, -1]
     e_L = solver.functions.contact(tip, case.constants, case.symbols[2], taken, units)[1] * case.length_unit

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-import queue
 import re
 import threading
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import chdir
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -34,9 +35,11 @@ from softnlp import (
     robot,
 )
 from softnlp.cli import main
+from softnlp.figures.design import design_figure
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import AS_PRINTED
 from softnlp.model.quantities import Model
+from softnlp.results.design import held_back
 from softnlp.scenario.design import (
     ActuationTable,
     LimitsTable,
@@ -54,8 +57,7 @@ from softnlp.studies import design as design_module
 from softnlp.studies.design import Design
 from softnlp.studies.design_candidate import Candidate
 from softnlp.studies.design_evaluate import Evaluator, broken_rules, unmet
-from softnlp.studies.design_optimise import Optimiser, spread
-from softnlp.studies.design_problem import FOLD
+from softnlp.studies.design_optimise import Optimiser
 from softnlp.studies.design_task import OUTPUTS, Setting
 
 FOLDER = Path(__file__).parents[1] / "scenarios" / "design"
@@ -142,10 +144,12 @@ def forced() -> tuple[DesignTask, Optimiser]:
 def test_the_derivatives_of_the_program_are_those_of_differences() -> None:
     _, optimiser = forced()
     begun = optimiser.evaluator.full(Model(D25, SOFT), 0.6 * BAR)
-    posed = optimiser.problem(15, optimiser._plane(begun))
-    x, p, _ = optimiser.start(begun, posed)
-    assert float(posed.guard(x, p)) > 10 * FOLD  # the wall's reaction has not brought it near a fold
-    solver = posed.solver
+    posed = optimiser.problem(begun, 15)
+    start = posed.start(begun)
+    x, p, guard = start.x, start.p, posed.problem.constraints[-1]
+    assert (guard.name, guard.in_hessian) == ("fold of the blocked shape", False)
+    assert float(posed.problem.residual(x, p)[-1]) > 10 * guard.lower  # the wall's reaction has not brought it near one
+    solver = start.engine._solver
     jac, hess, grad = (solver.get_function(name) for name in ("nlp_jac_g", "nlp_hess_l", "nlp_grad_f"))
     g, J = (np.asarray(part) for part in jac(x, p))
     lam = np.random.default_rng(3).normal(size=g.size)
@@ -317,25 +321,35 @@ def test_processes_find_what_one_finds() -> None:
     assert [c.material.name for c in one.candidates] == [c.material.name for c in two.candidates]
 
 
-def test_a_process_sends_each_candidate_as_it_is_done_and_stops_between_two(monkeypatch: pytest.MonkeyPatch) -> None:
-    # a whole chunk at once would keep who presses Ctrl-C waiting for all of it
-    sent: queue.Queue[Candidate] = queue.Queue()
-    stop = threading.Event()
-    monkeypatch.setattr(design_module._Worker, "found", sent, raising=False)
-    monkeypatch.setattr(design_module._Worker, "stop", stop, raising=False)
-    task = DesignTask({"material": [SOFT, material("Dragon Skin 10"), material("Ecoflex 00-30")]}, 1.0 * BAR,
-                      maximise="bending_angle")  # fmt: skip
-    whole = design_module.Workshop.candidate
+def test_candidates_come_one_by_one_and_none_is_begun_after_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who presses Ctrl-C waits for the candidates that are being evaluated alone."""
+    begun: list[int] = []
+    seen, one = threading.Event(), design(D25, SOFT, numbers_task(1)).candidates[0]
 
     def candidate(self: Any, number: int, combination: Any) -> Candidate:
-        if number == 2:
-            stop.set()
-        return whole(self, number, combination)
+        begun.append(number)
+        if number > 1:
+            seen.wait()
+        return replace(one, number=number)
 
-    monkeypatch.setattr(design_module.Workshop, "candidate", candidate)
-    setting = design(D25, SOFT, replace(task, choices={"material": [SOFT]})).setting
-    design_module._chunk(setting, task, list(enumerate(task.combinations(), start=1)))
-    assert [sent.get_nowait().number for _ in range(sent.qsize())] == [1, 2]
+    def pool(workers: int, begin: Any, *given: Any) -> ThreadPoolExecutor:
+        begin(*given)
+        return ThreadPoolExecutor(1)
+
+    def stop(count: int, done: Candidate) -> None:
+        assert (count, done.number) == (1, 1)
+        threading.Timer(0.2, seen.set).start()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(design_module.CandidateEvaluator, "candidate", candidate)
+    monkeypatch.setattr(design_module, "worker_pool", pool)
+    with pytest.raises(KeyboardInterrupt):
+        design(D25, SOFT, numbers_task(6), workers=2, progress=stop)
+    assert begun == [1, 2]
+
+
+def numbers_task(count: int) -> DesignTask:
+    return DesignTask({"chamber_diameter": list(np.linspace(4e-3, 4.5e-3, count))}, 1.0 * BAR, maximise="stretch")
 
 
 def test_a_search_finds_the_best_of_few(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -359,17 +373,6 @@ def test_a_search_without_optuna_is_refused(monkeypatch: pytest.MonkeyPatch) -> 
     task = DesignTask({"material": [SOFT, material("Dragon Skin 10")]}, 1.0 * BAR, maximise="bending_angle")
     with pytest.raises(InputError, match=r"pip install 'softnlp\[design\]'"):
         design(D25, SOFT, task)
-
-
-def test_starts_are_spread_in_their_box() -> None:
-    box = [Range(1.0, 2.0), Range(-3.0, 5.0), Range(0.0, 0.1)]
-    points = spread(box, 256)
-    unit = (points - [r.lower for r in box]) / [r.upper - r.lower for r in box]
-    assert np.all((unit >= 0) & (unit < 1))
-    np.testing.assert_allclose(unit[0], 0.5)
-    counts, _ = np.histogramdd(unit, bins=(4, 4, 4), range=[(0, 1)] * 3)
-    assert counts.min() >= 1
-    assert counts.max() <= 9
 
 
 @pytest.mark.parametrize(
@@ -569,6 +572,20 @@ def test_a_broken_scenario_is_one_line(name: str, tmp_path: Path, capsys: pytest
     assert captured.err.startswith(f"softnlp: {path}: ")
     for word in words:
         assert word in captured.err
+
+
+def test_what_holds_the_best_back_stands_beneath_the_bars_of_its_figure() -> None:
+    found = design(D25, SOFT, angle_task(("chamber_diameter",), starts=1))
+    figure = design_figure(found)
+    figure.canvas.draw()
+    assert found.best is not None
+    lines = [text for text in figure.texts if text.get_text() in {"held back by", *held_back(found, found.best)}]
+    assert len(lines) == 1 + len(found.best.active) > 1
+    below = min(axes.get_tightbbox().y0 for axes in figure.axes[:1])
+    boxes = [text.get_window_extent() for text in lines]
+    assert max(box.y1 for box in boxes) < below
+    assert min(box.y0 for box in boxes) > 0
+    assert all(upper.y0 > lower.y1 for upper, lower in pairwise(boxes))
 
 
 def test_every_key_of_a_design_is_documented() -> None:

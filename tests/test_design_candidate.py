@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,11 +17,13 @@ from softnlp import (
     DesignTask,
     InputError,
     Loads,
+    Numerics,
     PressureSteps,
     Range,
     at_least,
     at_most,
     design,
+    function_law,
     material,
     robot,
 )
@@ -29,12 +31,14 @@ from softnlp.base.status import Status
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.materials import Material
 from softnlp.model.quantities import Model
+from softnlp.nlp.search import in_steps
+from softnlp.nlp.solver import Engine
 from softnlp.studies import design_optimise, design_problem
 from softnlp.studies.design import searched
-from softnlp.studies.design_candidate import Candidate, Workshop
+from softnlp.studies.design_candidate import Candidate, CandidateEvaluator
 from softnlp.studies.design_evaluate import Evaluation, Evaluator, chamber_gaps, unmet
-from softnlp.studies.design_optimise import Optimiser, Optimum
-from softnlp.studies.design_problem import DesignProblem
+from softnlp.studies.design_optimise import Optimiser
+from softnlp.studies.design_problem import Optimum
 from softnlp.studies.design_task import Setting
 
 D25, SOFT = robot("D25L60"), material("Ecoflex 00-50")
@@ -193,7 +197,7 @@ def test_a_requirement_missed_at_every_pressure_is_found_without_a_program(monke
     assert found.status == "infeasible"
     assert found.reasons[0].startswith("no pressure meets everything; nearest is bending_angle_deg: ")
     assert found.choices["pressure"] == BAR  # where it bends most
-    nowhere = Workshop(Setting(D25, OGDEN), replace(task, pressure=Range(99 * TOO_MUCH, 100 * TOO_MUCH)))
+    nowhere = CandidateEvaluator(Setting(D25, OGDEN), replace(task, pressure=Range(99 * TOO_MUCH, 100 * TOO_MUCH)))
     monkeypatch.undo()
     assert nowhere.candidate(1, {}).reasons == ("no start has an equilibrium",)
 
@@ -212,7 +216,7 @@ def test_dimensions_are_optimised_at_the_lowest_step_that_meets_everything() -> 
 def test_sets_that_interleave_are_not_optimised() -> None:
     apart = replace(D25, chamber_angle=150 * DEGREE)
     setting = Setting(apart, SOFT)
-    found = Workshop(setting, bending(BAR)).candidate(1, {})
+    found = CandidateEvaluator(setting, bending(BAR)).candidate(1, {})
     assert found.status == "infeasible"
     assert found.reasons == ("sets that interleave cannot be optimised; choose a smaller chamber_angle",)
 
@@ -295,11 +299,13 @@ def test_the_slow_way_ends_at_the_same_optimum() -> None:
     made = Optimiser(Evaluator(Setting(D25, SOFT), far, MODEL))
     for begin in (2.2, 4.4):
         start = made.evaluator.free(Model(replace(D25, chamber_diameter=begin * MILLIMETRE), SOFT), BAR)
-        at_once, slow = made.optimise(start, 15), made._stepwise(start, 15)
-        assert at_once.holds
-        assert slow.holds
+        posed = made.problem(start, 15)
+        (at_once,) = made.optima([start], 15)
+        slow = posed.optimum(in_steps(posed.start(start), design_problem.HOLDS))
+        assert at_once.solution.optimal
+        assert slow.solution.optimal
         assert slow.objective == pytest.approx(at_once.objective, rel=1e-7)
-        assert (slow.values["chamber_diameter"] > 1.2 * begin * MILLIMETRE) == (begin < 3)
+        assert (slow.dimensions["chamber_diameter"] > 1.2 * begin * MILLIMETRE) == (begin < 3)
 
 
 class Fails:
@@ -329,8 +335,8 @@ def test_a_solver_that_gives_up_is_a_failed_candidate(
     word: str, raises: bool, reason: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Every start meets what is asked, but no start was led anywhere: that is no answer."""
-    monkeypatch.setattr(DesignProblem, "solver", Fails(word, raises=raises))
-    found = the_only(bending(BAR))
+    monkeypatch.setattr(Engine, "_solver", Fails(word, raises=raises))
+    found = the_only(bending(BAR), numerics=Numerics(engine="newton"))
     assert found.status == "failed"
     assert found.reasons == (reason,)
     assert not found.outputs
@@ -385,15 +391,15 @@ def test_a_small_difference_is_looked_at_on_finer_grids(fails: bool, monkeypatch
     start = made.evaluator.free(MODEL, BAR)
     intervals = made._intervals(start)
     tried: list[int] = []
-    optimise, lost = Optimiser.optimise, Optimum(np.zeros(1), {}, np.nan, np.inf, (), 0, "lost")
+    optima = Optimiser.optima
 
-    def watched(self: Optimiser, begun: Evaluation, size: int) -> Optimum:
+    def watched(self: Optimiser, begun: Sequence[Evaluation], size: int) -> list[Optimum]:
         tried.append(size)
-        return lost if fails and size > intervals else optimise(self, begun, size)
+        found = optima(self, begun, size)
+        lost = fails and size > intervals
+        return [replace(o, solution=replace(o.solution, residual=np.inf)) if lost else o for o in found]
 
-    monkeypatch.setattr(Optimiser, "optimise", watched)
-    if fails:
-        monkeypatch.setattr(Optimiser, "_stepwise", lambda *_: lost)
+    monkeypatch.setattr(Optimiser, "optima", watched)
     found = made.best(MODEL, BAR)
     assert found.reasons == ()
     assert found.agreeing == found.starts == 2
@@ -410,10 +416,10 @@ def test_the_first_guess_of_a_shape_that_only_touches_is_the_arc() -> None:
     begun = made.evaluator.full(MODEL, 0.0)
     assert begun.blocked is None
     assert begun.outputs["blocked_force"] == 0.0
-    blocked = made.problem(15, made._plane(begun)).problem.cases[-1]
-    guess = made._guess(blocked, begun, made.evaluator.poses.column(made.evaluator.poses.values(np.zeros(3), Loads())))
-    size = made.evaluator.functions.state_size
-    s = blocked.transcribed.points
+    posed = made.problem(begun, 15)
+    blocked = posed.cases[-1]
+    size, s = blocked.functions.state_size, blocked.transcribed.points
+    guess = posed.start(begun).x[-sum(symbol.numel() for symbol in blocked.symbols) :]
     states = guess[1 : 1 + size * s.size].reshape(s.size, size)
     assert guess[0] == 1.0
     np.testing.assert_allclose(states[:, :3], np.outer(s, [0, 0, 1]), atol=1e-14)
@@ -449,7 +455,7 @@ def test_what_is_not_feasible_is_worse_for_a_search_than_all_before(sign: int, m
     widths = [3.0 * MILLIMETRE, 4.0 * MILLIMETRE, 7.5 * MILLIMETRE]  # the last does not fit into the wall
     asked = {"maximise": "bending_angle"} if sign > 0 else {"maximise": None, "minimise": "bending_angle"}
     task = bending(BAR, choices={"chamber_diameter": widths}, requirements={}, trials=4, **asked)
-    found: Iterator[Candidate] = searched(Workshop(Setting(D25, SOFT), task))
+    found: Iterator[Candidate] = searched(CandidateEvaluator(Setting(D25, SOFT), task))
     statuses = [c.status for c in found]
     assert statuses == ["infeasible", "feasible", "feasible"]  # the fourth was met before
     assert told.values[3] == told.values[1]
@@ -499,6 +505,20 @@ def test_the_largest_bend_of_an_arc_is_short_of_a_whole_turn() -> None:
     assert candidate.is_feasible
     assert candidate.objective == pytest.approx(0.999 * 2 * np.pi, rel=1e-6)
     assert [limit.name for limit in candidate.active] == ["self_intersection"]
+
+
+def test_laws_of_one_name_are_told_apart() -> None:
+    """What is compiled for the stress of one is of no use for the other."""
+
+    def rubber(power: int) -> Material:
+        law = function_law("mine", lambda stretch, c: c * (stretch - stretch**-power), ["c"])
+        return Material("mine", law, {"c": 0.03})
+
+    task = bending(0.3 * BAR, choices={"material": [rubber(2), rubber(3)]})
+    soft, stiff = design(D25, SOFT, task).candidates
+    assert soft.is_feasible
+    assert stiff.is_feasible
+    assert soft.objective > 1.2 * stiff.objective
 
 
 def test_a_candidate_that_starts_behind_the_wall_says_so() -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import QUICK, plan
 
 from softnlp import (
     BAR,
@@ -263,6 +264,15 @@ def test_a_sweep_is_audited_and_ipopt_sweeps_alike(tmp_path: Path) -> None:
         np.testing.assert_allclose(found[engine].tip_position, found["newton"].tip_position, atol=1e-6 * D25.length)
 
 
+def test_as_many_poses_are_audited_as_promised_however_they_are_cut_into_chunks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(auditing, "EVERY", 9)
+    summary = run_sweep(plan("[workspace]\nlevels = 3\nto_bar = 1.2\n" + QUICK, chunk=4), tmp_path / "out")
+    assert (summary.done, summary.failed) == (27, 0)
+    assert summary.audit.audited == 3
+
+
 def test_poses_that_ipopt_does_not_confirm_are_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -349,13 +359,13 @@ def test_identified_constants_are_those_of_the_whole_program(loads: Loads) -> No
 
 def test_constants_that_ipopt_can_better_are_disputed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(identify_nlp, "_OF_ERROR", 0.0)
-    real = Engine.solve
+    real = Engine.closed
 
     def elsewhere(self: Engine, *given: Any, **more: Any) -> Any:
         found = real(self, *given, **more)
         return replace(found, x=found.x + (1e-3 if self.problem.free else 0.0))
 
-    monkeypatch.setattr(Engine, "solve", elsewhere)
+    monkeypatch.setattr(Engine, "closed", elsewhere)
     result = identify(measured(), ECOFLEX, ["k_b", "k_c"], contact=PRESSED, numerics=Numerics(intervals=3))
     assert result.status is Status.DISPUTED
     assert np.all(np.isnan(result.constants))

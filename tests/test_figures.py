@@ -22,7 +22,7 @@ from softnlp import (
     material,
     robot,
 )
-from softnlp.model.section import deform
+from softnlp.model.round_chambers import deform
 
 
 def numbers(table: str, row: str) -> list[float]:

@@ -31,7 +31,7 @@ from softnlp.model.materials import Material
 from softnlp.model.numerics import Numerics
 from softnlp.model.robot import ROBOTS, Robot
 from softnlp.model.rod import Loads
-from softnlp.statics import solver as statics
+from softnlp.statics import grid_size
 from softnlp.statics.step import Pose, Step
 from softnlp.studies.forward import forward
 
@@ -388,7 +388,7 @@ def test_the_finest_grid_either_meets_the_accuracy_or_gives_no_pose(
     robot, pressure, loads = ROBOTS["D25L60"], [0.9e5, 0.2e5, 0.0], Loads(tip_force=(0.02, 0.05, 0.0))
     error = solve(robot, ECOFLEX_50, pressure, loads=loads, numerics=Numerics(intervals=10)).discretisation_error
     assert error is not None
-    monkeypatch.setattr(statics, "MOST_INTERVALS", 10)
+    monkeypatch.setattr(grid_size, "MOST_INTERVALS", 10)
     accuracy = error * (1.5 if enough else 0.1)
     step = forward(robot, ECOFLEX_50, pressure, loads=loads, numerics=Numerics(accuracy=accuracy)).steps[0]
     if enough:

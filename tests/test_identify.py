@@ -654,8 +654,11 @@ def test_open_constants_and_grown_errors_are_said_everywhere(
     assert any(line.startswith("k_e") and line.endswith("not determined") for line in shown.splitlines())
     assert ", not determined" in (tmp_path / "o" / "identified.toml").read_text()
     found = run_robots(load_scenario(path))
-    assert identified_figure(found, "x").texts
-    assert any("k_e = 0.2028 (not determined)" in text.get_text() for text in identified_figure(found, "x").texts)
+    figure = identified_figure(found, "x")
+    assert figure.axes[0].get_title() == f"rmse {before:.3g} deg before (grey), {after:.3g} deg after"
+    (observable,) = (line.split() for line in shown.splitlines() if line.startswith("bending_angle_deg"))
+    assert observable[1] == "deg"
+    assert any("k_e = 0.2028 (not determined)" in text.get_text() for text in figure.texts)
 
 
 def test_an_end_that_is_worse_than_the_start_is_no_minimum(monkeypatch: pytest.MonkeyPatch) -> None:

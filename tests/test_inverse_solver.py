@@ -14,17 +14,15 @@ from softnlp import BAR, Coefficients, Loads, Numerics, Status, inverse, materia
 from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.nlp import bounded
-from softnlp.nlp.bounded import Limits, Measured, least_norm, nearest
+from softnlp.nlp.bounded import Limits
+from softnlp.nlp.reduced import Point, Reduced
 from softnlp.nlp.solver import Solution
 from softnlp.statics.branch import stretch_on_branch
-from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
-from softnlp.studies import inverse_solver
-from softnlp.studies.derivatives import PoseDerivatives
-from softnlp.studies.inverse_nlp import InverseProblem, inverse_problem, pressure_of
-from softnlp.studies.inverse_solver import InverseSolver, Reached
-from softnlp.studies.targets import Aim, ArcMap, GridMap, InverseTask, Target, TipPoint, aim_of
+from softnlp.studies.inverse_problem import Program, Tips
+from softnlp.studies.inverse_solver import InverseKinematics, Reached
+from softnlp.studies.targets import Aim, InverseTask, Target, aim_of
 
 Array = NDArray[np.float64]
 
@@ -43,14 +41,22 @@ def poses_of(body: Robot) -> PoseSolver:
     return PoseSolver(Model(body, SILICONE), GRID)
 
 
-def solver_of(method: str = "newton", loads: Loads | None = None, highest: Any = HIGHEST) -> InverseSolver:
+def solver_of(method: str = "newton", loads: Loads | None = None, highest: Any = HIGHEST) -> InverseKinematics:
     task = InverseTask((), np.zeros(3), np.broadcast_to(highest, 3).astype(float), float(LENGTH))
-    return InverseSolver(Model(D25, SILICONE), SEARCH, loads or Loads(), task, method)  # type: ignore[arg-type]
+    return InverseKinematics(Model(D25, SILICONE), SEARCH, loads or Loads(), task, method)  # type: ignore[arg-type]
 
 
 @cache
-def unloaded() -> InverseSolver:
+def unloaded() -> InverseKinematics:
     return solver_of()
+
+
+def at_arc(tips: Tips, aim: Aim, z: Array) -> tuple[Program, Point]:
+    """Return the program of a target and the tip at pressures [bar] that the arc leads to."""
+    program = tips.program(aim)
+    point = program.at(z)
+    assert point is not None
+    return program, point
 
 
 def at(x: float, y: float, z: float) -> Target:
@@ -77,28 +83,20 @@ def test_the_program_and_the_search_find_the_same_pressures(
     body: Robot, target: Target, limits: Limits, meets: bool
 ) -> None:
     """IPOPT on all unknowns of the rod, and the search in the pressures alone, from the same pose of the same grid."""
-    poses = poses_of(body)
     aim = Aim(target, float(body.length), 0.5)
-    tips = GridMap(PoseDerivatives(poses), 2, LOADED)
-    begin = limits.clip(np.full(limits.lower.size, 0.3))
-    point = tips.at(begin * BAR, None)
-    assert point is not None
-
-    def measure(z: Array, near: Measured) -> Measured | None:
-        found = tips.at(z * BAR, near.memo)
-        return None if found is None else aim.conditioned(found) if meets else aim.measured(found)
-
-    end, _, _ = nearest(measure, aim.conditioned(point) if meets else aim.measured(point), limits)
+    tips = Tips(poses_of(body), LOADED, limits, GRID, 2)
+    program, begin = at_arc(tips, aim, limits.clip(np.full(limits.lower.size, 0.3)))
+    end, _ = program.searched(begin)
     if meets:
         assert np.linalg.norm(end.r) < 1e-9
         met = end
-        end, _, _ = least_norm(measure, end, limits)
-        assert np.linalg.norm(end.z) <= np.linalg.norm(met.z) + 1e-9
-    problem = inverse_problem(poses, 2, aim, limits, meets=meets)
-    solution = problem.solve(poses, LOADED, aim, end.memo.pressure * 0.9 + begin * BAR * 0.1, end.memo.x)
+        program = tips.program(aim, meets=True)
+        end, _ = program.searched(program.again(end))
+        assert np.linalg.norm(end.theta) <= np.linalg.norm(met.theta) + 1e-9
+    solution = program.engine().solve(program.p, np.concatenate([end.theta * 0.9 + begin.theta * 0.1, end.states]))
     assert solution.holds(GRID.tolerance)
-    z = pressure_of(problem, solution, limits) / BAR
-    assert z == pytest.approx(end.z, abs=2e-5)
+    z = limits.clip(solution.x[: end.theta.size])
+    assert z == pytest.approx(end.theta, abs=2e-5)
     assert (z >= limits.lower).all()
     assert (z <= limits.upper).all()
     assert z.sum() <= limits.largest_sum
@@ -110,12 +108,12 @@ def test_an_answer_says_whether_nothing_nearby_is_better(monkeypatch: pytest.Mon
     """A direction leaves three sets a choice, out of reach there is a nearest tip, and a place leaves nothing."""
     far = at(0.06, 0.03, 0.09)
     for target, optimal in ((Target(None, TOWARDS), True), (far, True), (at(0.012, -0.004, 0.072), None)):
-        step, _ = unloaded().solve(target, None)
+        step, _ = unloaded().nearest(target, None)
         assert step.aimed is not None
         assert step.aimed.optimal is optimal
         assert not [words for words in step.warnings if "not optimal" in words]
     monkeypatch.setattr(bounded, "_STEPS", 1)
-    step, _ = unloaded().solve(far, None)
+    step, _ = unloaded().nearest(far, None)
     assert step.aimed is not None
     assert step.aimed.optimal is False
     assert [words for words in step.warnings if words.startswith("feasible, not optimal")]
@@ -123,8 +121,8 @@ def test_an_answer_says_whether_nothing_nearby_is_better(monkeypatch: pytest.Mon
 
 def test_a_run_by_the_program_is_that_of_the_search() -> None:
     asked = at(0.012, -0.004, 0.072)
-    by_search, _ = unloaded().solve(asked, None)
-    by_program, _ = solver_of("nlp").solve(asked, None)
+    by_search, _ = unloaded().nearest(asked, None)
+    by_program, _ = solver_of("nlp").nearest(asked, None)
     assert by_search.status is by_program.status is Status.SOLVED
     assert by_program.pressure == pytest.approx(by_search.pressure, abs=1)  # of 1e5 Pa
     assert by_program.aimed is not None
@@ -138,20 +136,22 @@ def test_where_the_grid_has_no_better_one_the_answer_of_the_arcs_stands(
 ) -> None:
     """What is said of it is its own misfit on the grid, not that of the search on arcs."""
 
-    def fails(self: InverseProblem, poses: PoseSolver, loads: Loads, aim: Aim, pressure: Array, x: Array) -> Solution:
-        return Solution(x, np.zeros(0), float("inf"), 300, "Maximum_Iterations_Exceeded")
+    class Fails:
+        @staticmethod
+        def solve(p: Array, x: Array) -> Solution:
+            return Solution(x, p, float("inf"), 300, "Maximum_Iterations_Exceeded")
 
     if lost == "program":
-        monkeypatch.setattr(InverseProblem, "solve", fails)
+        monkeypatch.setattr(Program, "engine", lambda *_: Fails)
     else:
-        monkeypatch.setattr(GridMap, "of", lambda *_: None)
+        monkeypatch.setattr(Tips, "moved", lambda *_: np.full(55, np.nan))
     solver = solver_of("nlp" if lost == "program" else "newton")
     asked = np.array([0.012, -0.004, 0.072])
-    step, reached = solver.solve(Target(asked, None), None)
+    step, reached = solver.nearest(Target(asked, None), None)
     assert reached is not None
-    arc = ArcMap(solver.poses).at(step.pressure, None)
-    assert arc is not None
-    assert arc.state[:3] * LENGTH == pytest.approx(asked, abs=1e-6 * LENGTH)
+    aim = aim_of(solver.task, Target(asked, None), float(LENGTH))
+    arc = at_arc(solver._arcs, aim, step.pressure / BAR)[1]
+    assert arc.r == pytest.approx(np.zeros(3), abs=1e-6)
     assert step.pose is not None
     assert step.aimed is not None
     assert step.aimed.distance == pytest.approx(np.linalg.norm(step.pose.tip_position - asked), rel=1e-9)
@@ -197,21 +197,21 @@ def test_no_stable_pose_is_nearer_than_that_at_the_edge_of_stability() -> None:
 def test_a_jump_is_said_also_where_the_last_pressure_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     """The search cannot begin where the last one ended; then nothing continues it, whatever it finds first."""
     solver = solver_of()
-    first, last = solver.solve(Target(np.array([0.012, -0.004, 0.072]), None), None)
+    first, last = solver.nearest(Target(np.array([0.012, -0.004, 0.072]), None), None)
     assert first.pose is not None
     assert last is not None
     far = Target(np.array([-0.04, 0.0, 0.06]), None)
-    alone, _ = solver.solve(far, None)
+    alone, _ = solver.nearest(far, None)
     assert not any("jump" in text for text in alone.warnings)
-    followed, _ = solver.solve(far, last)
+    followed, _ = solver.nearest(far, last)
     assert not any("jump" in text for text in followed.warnings)
-    place = ArcMap.at
+    place = Reduced.at
 
-    def lost(self: ArcMap, pressure: Array, near: TipPoint | None) -> TipPoint | None:
-        return None if pressure is last.pressure else place(self, pressure, near)
+    def lost(self: Reduced, z: Array, p: Array, near: Point | Array | None = None) -> Point | None:
+        return None if z == pytest.approx(last.pressure / BAR, abs=1e-12) else place(self, z, p, near)
 
-    monkeypatch.setattr(ArcMap, "at", lost)
-    step, _ = solver.solve(far, last)
+    monkeypatch.setattr(Reduced, "at", lost)
+    step, _ = solver.nearest(far, last)
     assert step.pressure == pytest.approx(alone.pressure, abs=1)
     assert np.abs(step.pressure - last.pressure).max() > 0.3 * HIGHEST
     (said,) = [text for text in step.warnings if "jump" in text]
@@ -236,7 +236,7 @@ def test_a_stable_pose_far_off_does_not_hide_a_nearer_one() -> None:
 class Fenced:
     """Stands in for the judge of poses: the misfit grows from a corner that is not stable; z [bar] by its pressures."""
 
-    def __init__(self, solver: InverseSolver, like: Reached, stable_from: float) -> None:
+    def __init__(self, solver: InverseKinematics, like: Reached, stable_from: float) -> None:
         self.asked: list[Array] = []
         self._limits, self._like, self._stable_from = solver.limits, like, stable_from
 
@@ -250,11 +250,10 @@ class Fenced:
         return replace(self._like, pressure=pressure, cost=float(np.linalg.norm(z + np.array([0.0, 0.1, 0.2]))))
 
 
-def reached_at(solver: InverseSolver, z: Array) -> tuple[Aim, Reached]:
+def reached_at(solver: InverseKinematics, z: Array) -> tuple[Aim, Reached]:
     target = at(0.0, 0.0, 0.06)
     aim = aim_of(solver.task, target, float(LENGTH))
-    step, solved = solver.poses.solve(z * BAR, Loads())
-    judged = solver._judged(aim, z * BAR, step, solved)
+    judged = solver._at(aim, z * BAR)
     assert isinstance(judged, Reached)
     return aim, judged
 
@@ -275,7 +274,7 @@ def test_the_search_among_stable_poses_ends_at_the_fence(begun: bool, monkeypatc
     """The least cost on the plane where stability ends: no pose that it asks for is stable and nearer."""
     solver = unloaded()
     aim, like = reached_at(solver, np.full(3, 0.5))
-    solver.solve(at(0.012, -0.004, 0.072), None)  # which tabulates the tips
+    solver.nearest(at(0.012, -0.004, 0.072), None)  # which tabulates the tips
     judge = Fenced(solver, like, 0.4)
     monkeypatch.setattr(solver, "_at", judge)
     start = judge(aim, np.array([0.9, 0.2, 0.4]) * BAR) if begun else None
@@ -298,7 +297,7 @@ def test_the_search_among_stable_poses_ends_at_the_fence(begun: bool, monkeypatc
 def test_where_no_pose_of_the_table_is_stable_there_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     solver = unloaded()
     aim, like = reached_at(solver, np.full(3, 0.5))
-    solver.solve(at(0.012, -0.004, 0.072), None)
+    solver.nearest(at(0.012, -0.004, 0.072), None)
     judge = Fenced(solver, like, 99.0)
     monkeypatch.setattr(solver, "_at", judge)
     assert solver._searched(aim, None) is None
@@ -321,18 +320,18 @@ def test_an_answer_is_refined_while_it_comes_nearer(
 ) -> None:
     solver = unloaded()
     aim, like = reached_at(solver, np.full(3, 0.5))
-    found = next(solver._candidates(aim, None))
-    found = replace(found, point=replace(found.point, r=np.zeros(3)))
+    found = next(solver._ends(aim, None))
+    found = replace(found, cost=0.0)
     judged: list[Array] = []
 
-    def judge(aim: Aim, pressure: Array, step: Step, solved: Solved | None) -> Reached | Step:
+    def judge(aim: Aim, pressure: Array) -> Reached | Step:
         cost = costs[len(judged)]
         judged.append(pressure)
         if cost is None:
             return Step(pressure, Status.DIVERGED, "lost")
         return replace(like, pressure=pressure, cost=cost)
 
-    monkeypatch.setattr(solver, "_judged", judge)
+    monkeypatch.setattr(solver, "_at", judge)
     monkeypatch.setattr(solver, "_refined", lambda *_: np.full(3, 0.5 + 0.01 * len(judged)) * BAR)
     answer = solver._finished(aim, found)
     assert len(judged) == rounds
@@ -349,7 +348,7 @@ def test_a_pose_that_is_lost_is_no_answer_and_no_number(monkeypatch: pytest.Monk
     solver = solver_of(highest=0.0)
     lost = Step(np.zeros(3), Status.DIVERGED, "lost on the way")
     monkeypatch.setattr(solver.poses, "solve", lambda pressure, loads: (lost, None))
-    step, reached = solver.solve(at(0.0, 0.0, 0.06), None)
+    step, reached = solver.nearest(at(0.0, 0.0, 0.06), None)
     assert reached is None
     assert step.status is Status.DIVERGED
     assert step.message == "lost on the way"
@@ -364,11 +363,11 @@ def test_of_two_answers_the_nearer_one_is_taken() -> None:
     solver = unloaded()
     asked = np.array([0.0, 0.0, -0.03])
     aim = aim_of(solver.task, Target(asked, None), float(LENGTH))
-    ends = [solver._finished(aim, found) for found in solver._candidates(aim, None)]
+    ends = [solver._finished(aim, found) for found in solver._ends(aim, None)]
     costs = [end.cost for end in ends if isinstance(end, Reached)]
     assert len(costs) > 1
     assert costs.index(min(costs)) < len(costs) - 1
-    step, reached = solver.solve(Target(asked, None), None)
+    step, reached = solver.nearest(Target(asked, None), None)
     assert step.status is Status.OUT_OF_REACH
     assert reached is not None
     assert reached.cost == pytest.approx(min(costs), rel=1e-3)
@@ -381,16 +380,16 @@ def test_a_lost_start_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None
     pose = poses.solve(wanted, LOADED)[0].pose
     assert pose is not None
     solver = solver_of(loads=LOADED, highest=[HIGHEST, 0.0, 0.0])
-    place, lost = GridMap.at, []
+    place, lost = Reduced.at, []
 
-    def at_first_lost(self: GridMap, pressure: Array, near: TipPoint | None) -> TipPoint | None:
-        if near is None and not lost:
-            lost.append(pressure)
+    def at_first_lost(self: Reduced, z: Array, p: Array, near: Point | Array | None = None) -> Point | None:
+        if near is None and self.held.problem.nlp["x"].numel() > 1 and not lost:
+            lost.append(z * BAR)
             return None
-        return place(self, pressure, near)
+        return place(self, z, p, near)
 
-    monkeypatch.setattr(GridMap, "at", at_first_lost)
-    step, _ = solver.solve(Target(pose.tip_position, None), None)
+    monkeypatch.setattr(Reduced, "at", at_first_lost)
+    step, _ = solver.nearest(Target(pose.tip_position, None), None)
     assert abs(lost[0][0] - wanted[0]) < 0.2 * BAR
     assert step.status is Status.SOLVED
     assert step.pressure == pytest.approx(wanted, abs=10)
@@ -399,20 +398,20 @@ def test_a_lost_start_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None
 def test_smaller_pressures_that_leave_the_target_are_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     """A search for the least pressures that gives way on the target is put aside: the target comes first."""
 
-    def gives_way(measure: Any, start: Measured, limits: Limits, *_: Any) -> tuple[Measured, None, int]:
-        return replace(start, z=np.zeros(3), r=start.r + 1e-3), None, 1
+    def gives_way(self: Reduced, p: Array, start: Point, limits: Limits, *_: Any) -> tuple[Point, Array]:
+        far = self.at(np.zeros(3), p, np.ones(1))
+        assert far is not None
+        return far, np.zeros((3, 3))
 
     solver = solver_of()
     aim = Aim(Target(None, TOWARDS), float(LENGTH), 1.0)
-    start = solver._coarse.at(np.array([0.9, 0.1, 0.3]) * BAR, None)
-    assert start is not None
-    monkeypatch.setattr(inverse_solver, "least_norm", gives_way)
-    found = solver._search(aim, start, continues=False)
+    monkeypatch.setattr(Reduced, "minimum_norm", gives_way)
+    found = solver._search(aim, (np.array([0.9, 0.1, 0.3]), None, False))
+    assert found is not None
     assert found.met
-    met = solver._coarse.at(found.point.z * BAR, None)
-    assert met is not None
-    assert met.state[9:12] == pytest.approx(TOWARDS, abs=1e-6)
-    assert np.linalg.norm(found.point.z) > 0.1
+    met = at_arc(solver._arcs, aim, found.point.theta)[1]
+    assert met.r == pytest.approx(np.zeros(3), abs=1e-6)
+    assert np.linalg.norm(found.point.theta) > 0.1
 
 
 WEAK = Model(D25, material("Ecoflex 00-20", "yeoh"), Coefficients(elongation=0.0))
@@ -424,14 +423,13 @@ def test_beyond_the_last_equilibrium_there_is_no_tip() -> None:
     beyond = np.full(3, 9.0) * BAR
     branch = stretch_on_branch(poses.branch, poses.column({"pressure": beyond}), beyond)
     assert branch.status in (Status.NO_EQUILIBRIUM, Status.UNSTABLE_MATERIAL)
-    last = 0.99 * branch.fraction * beyond
-    arcs, grid = ArcMap(poses), GridMap(PoseDerivatives(poses), 2, STANDING)
-    near = arcs.at(last, None)
-    assert near is not None
-    assert arcs.at(beyond, None) is None
-    assert arcs.at(beyond, near) is None
-    assert grid.at(last, None) is not None
-    assert grid.at(beyond, None) is None
+    last = 0.99 * branch.fraction * beyond / BAR
+    aim = Aim(Target(np.zeros(3), None), float(D25.length), 1.0)
+    for tips in (Tips(poses, Loads(), WIDE, GRID, None), Tips(poses, STANDING, WIDE, GRID, 2)):
+        program, near = at_arc(tips, aim, last)
+        assert program.at(beyond / BAR) is None
+        if tips.intervals is None:
+            assert program.at(beyond / BAR, near) is None
     task = InverseTask((), np.zeros(3), np.full(3, 9.0) * BAR, 0.06)
-    solver = InverseSolver(WEAK, GRID, Loads(), task, "newton")
+    solver = InverseKinematics(WEAK, GRID, Loads(), task, "newton")
     assert solver.limits.largest_sum == pytest.approx(branch.fraction * 27.0, rel=1e-5)

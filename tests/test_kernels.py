@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softnlp.batch.grids import grid_level, whole_groups
-from softnlp.batch.interpreted import Interpreted
-from softnlp.batch.ir import LIBRARY, llvm_text
-from softnlp.batch.jit import can_compile, compiled
-from softnlp.batch.kernels import WIDTH, Kernels, Step
 from softnlp.batch.predictor import predicted
-from softnlp.batch.shooting import Compiled, shooting
+from softnlp.native.interpreted import Interpreted
+from softnlp.native.ir import LIBRARY, llvm_text
+from softnlp.native.jit import can_compile, compiled
+from softnlp.native.kernels import WIDTH, Kernels, Step
+from softnlp.native.shooting import Compiled, shooting
 
 needs_compiler = pytest.mark.skipif(not can_compile(), reason="no llvmlite")
 

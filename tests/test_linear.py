@@ -17,10 +17,10 @@ from softnlp.nlp.solver import Engine
 from softnlp.nlp.transcription import MultipleShooting, method_named
 from softnlp.statics.compiled import rod_equations
 from softnlp.statics.condensed import StretchSolver, linear_solver
+from softnlp.statics.joint import joint_problem
 from softnlp.statics.kept import blocked_solver
 from softnlp.statics.loadcase import load_case
 from softnlp.statics.unloaded import unloaded_case
-from softnlp.studies.force_inversion import joint_problem
 
 MODEL = Model(robot("D25L60"), material("Ecoflex 00-50"), Coefficients())
 EQUATIONS = rod_equations(MODEL)
@@ -80,7 +80,7 @@ def test_cases_behind_a_border_give_the_numbers_of_one_factorisation(arc_first: 
 @pytest.mark.parametrize("free_pressure", [False, True])
 def test_a_case_that_takes_what_another_one_found_is_solved_after_it(free_pressure: bool) -> None:
     solver = blocked_solver(MODEL, Numerics(intervals=5), ContactSettings(closure="compliant"))
-    problem = joint_problem(solver, 5, free_pressure=free_pressure)
+    problem = joint_problem(solver, 5, free_pressure=free_pressure).compiled
     rng = np.random.default_rng(1)
     column = np.concatenate([np.ravel(q.nominal) for q in EQUATIONS.declared.values()])
     arc = np.asarray(solver.functions.arc(column, 1.1, np.linspace(0, 1, 6)[None, :])).T

@@ -17,18 +17,20 @@ from witness_section import Section as WitnessSection
 from softnlp.base.quantity import Quantity
 from softnlp.model import rod
 from softnlp.model.conventions import AS_PRINTED, Coefficients
+from softnlp.model.load import Load
 from softnlp.model.quantities import Model, force_unit
 from softnlp.model.robot import ROBOTS
-from softnlp.model.section import deform, stretch_balance
-from softnlp.model.tip import DEAD_LOADS, tip_conditions
+from softnlp.model.round_chambers import deform
+from softnlp.model.section import RodSection
+from softnlp.model.tip import TipContact
 from softnlp.nlp.transcription import Collocation, MultipleShooting
 from softnlp.statics.loadcase import LoadCase, RodFunctions, load_case, rod_functions, unpack_section
 
-CONDITIONS = {
-    "dead": DEAD_LOADS,
-    "compliant": tip_conditions("compliant"),
-    "rigid": tip_conditions("rigid"),
-    "held": tip_conditions("rigid", wall=False),
+CONDITIONS: dict[str, tuple[Load, ...]] = {
+    "dead": (),
+    "compliant": (TipContact("compliant"),),
+    "rigid": (TipContact("rigid"),),
+    "held": (TipContact("rigid", wall=False),),
 }
 
 
@@ -61,11 +63,12 @@ def cased(seed: int, conditions: str = "dead", design: Design | None = None) -> 
 def scaled_constants(case: Case) -> np.ndarray:
     """Return c from the witness's section, in the units of the case."""
     w, L_0, F_0 = case.design.section, case.L_0, case.F_0
-    f_e = float(np.asarray(case.values["material.density"])[0]) * w.A * case.values["gravity"]
+    line_density = float(np.asarray(case.values["material.density"])[0]) * w.A
     return np.array(
         [
             w.GA / F_0, w.EA / F_0, *(EI / F_0 / L_0**2 for EI in w.EI), w.GJ / F_0 / L_0**2, w.F_P / F_0,
-            *(w.M_P[:2] / F_0 / L_0), *(f_e * L_0 / F_0), w.stretch, *(w.d / L_0).ravel(),
+            *(w.M_P[:2] / F_0 / L_0), line_density * L_0 / F_0, w.stretch, *case.values["gravity"],
+            *(w.d / L_0).ravel(),
             w.E_t * np.pi * w.r_co**2 / F_0,
         ]
     )  # fmt: skip
@@ -85,8 +88,8 @@ def test_the_constants_are_the_witness_s_section_in_the_units_of_the_robot(seed:
     assert float(balance) == pytest.approx(0.0, abs=1e-7 * case.design.section.F_P / case.F_0)
     further = float(case.functions.section(case.column, 1.1 * case.design.section.stretch)[1])
     assert further * case.F_0 > 1e-2 * case.design.section.F_P
-    assert unpack_section(plain(c))._fields == rod.RodSection._fields
-    assert list(unpack_section(plain(c))) == list(plain(c)[:11])
+    assert unpack_section(plain(c))._fields == RodSection._fields
+    assert list(unpack_section(plain(c))) == list(plain(c)[:10])
 
 
 def test_the_section_follows_the_model_s_coefficients_and_readings() -> None:
@@ -100,9 +103,10 @@ def test_the_section_follows_the_model_s_coefficients_and_readings() -> None:
     F_0 = float(force_unit(model))
     assert plain(c)[1] * F_0 == pytest.approx(float(made.axial_stiffness), rel=1e-12)
     assert plain(c)[3] * F_0 * robot.length**2 == pytest.approx(float(made.bending_stiffness[1]), rel=1e-12)
-    expected = float(stretch_balance(made, coefficients, AS_PRINTED))
+    expected = float(made.imbalance)
     assert float(balance) * F_0 == pytest.approx(expected, rel=1e-12)
-    assert expected != pytest.approx(float(stretch_balance(made, coefficients)), rel=1e-3)
+    other = deform(robot, model.material, values["pressure"], 1.2, coefficients)
+    assert expected != pytest.approx(float(other.imbalance), rel=1e-3)
 
 
 def random_state(seed: int, section: WitnessSection) -> tuple[np.ndarray, np.ndarray]:
@@ -131,7 +135,7 @@ def test_field_and_lengths_are_rates_by_s_over_L(conditions: str) -> None:
         )
         x, theirs = random_state(seed, problem)
         c = scaled_constants(case)
-        expected = c[11] * witness._field(problem, c[8:11], theirs, True)[:, 0]
+        expected = c[9] * witness._field(problem, c[8] * c[10:13], theirs, True)[:, 0]
         dR = expected[3:12].reshape(3, 3)
         expected[12:15] -= problem.F_P * dR[:, 2]
         expected[15:18] -= dR @ problem.M_P
@@ -247,7 +251,7 @@ def test_the_equations_name_every_row_once_with_its_unit(conditions: str, method
         expected[f"continuity of {block}"] = (unit, K * size)
         if stages:
             expected[f"collocation of {block}"] = (unit, K * stages * size)
-    expected |= dict.fromkeys(case.functions.conditions.equations, ("m", 1))
+    expected |= {name: (unit, 1) for load in case.functions.loads for name, unit in load.equations.items()}
     assert {name: (units[name], sizes[name]) for name in names} == expected
 
 
@@ -328,9 +332,9 @@ def test_what_is_declared_is_what_is_taken(conditions: str) -> None:
     functions = cased(5, conditions).functions
     taken = [name for name in functions.declared() if name.startswith("contact.")]
     assert bool(taken) == (conditions != "dead")
-    assert functions.tip_unknowns == len(CONDITIONS[conditions].unknowns)
+    assert functions.tip_unknowns == sum(len(load.unknowns) for load in CONDITIONS[conditions])
     assert functions.tip.size1_out(0) == 6 + functions.tip_unknowns
-    assert functions.tip.size1_in(5) == sum(functions.declared()[name].size for name in taken)
+    assert functions.tip.size1_in(3) == 6 + sum(functions.declared()[name].size for name in taken)
     assert functions.contact.n_out() == (3 if taken else 0)
 
 
@@ -341,7 +345,7 @@ def test_what_is_judged_of_a_contact_is_reaction_length_error_and_gap() -> None:
     x = plain(case.functions.arc(case.column, sec.stretch, 1.0))
     x[18:] = short / L_0
     x[0] += 2e-3 / L_0
-    a = np.concatenate([value for name, value in case.values.items() if name.startswith("contact.")])
+    a = case.functions.tip_numbers(np.concatenate(list(case.values.values())))
     T, e_L, e_h = case.functions.contact(x, scaled_constants(case), [0.0], a, [L_0, F_0])
     pressed = sec.PA > 0
     expected = np.where(pressed, 1.45 * sec.E_t * np.pi * sec.r_co**2 * 0.1, 0.0)

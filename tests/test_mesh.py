@@ -274,6 +274,6 @@ def test_the_document_s_examples_run(
     assert len(examples) == 2
     for example in examples:
         example.evaluate()
-    assert {"bent.stl", "cast.stl", "mould.glb"} <= {path.name for path in tmp_path.iterdir()}
+    assert {"bent.stl", "cast.stl", "mould.glb"} <= {path.name for path in (tmp_path / "results").iterdir()}
     shown = document.read_text().split("```text\n")[1].split("```")[0]
     assert shown in capsys.readouterr().out

@@ -44,7 +44,7 @@ def test_names_that_left_their_module_are_found_where_they_were() -> None:
     assert run_sweep is softnlp.run_sweep
     assert WORKSPACE_FILE == "workspace.nc"
     assert quantity("x", "1", 2.0).nominal == 2.0
-    assert (Model.__module__, Quantity.__module__) == ("softnlp.model.quantities", "softnlp.base.quantity")
+    assert (Model.__module__, Quantity.__module__) == ("softnlp.model.model", "softnlp.base.quantity")
     assert load_scenario is softnlp.load_scenario
 
 

@@ -13,7 +13,9 @@ from typing import Any
 import pytest
 
 import softnlp
+from docs.tools.pages import blocks, saved
 from softnlp import load_materials, load_scenario
+from softnlp.base.columns import OUTPUTS
 from softnlp.cli import main
 from softnlp.scenario.read import scenario_from_text
 
@@ -28,32 +30,22 @@ PAGES = [
 ]
 SCRIPTS = sorted((DOCS / "figures").glob("[!_]*.py"))
 LONGEST_EXTENSION = 30
-_BLOCK = re.compile(r"^```(?P<language>\w+)\n(?P<code>.*?)^```$", re.MULTILINE | re.DOTALL)
-_SAVE_AS = re.compile(r"Save this as `([\w.]+)`[^`]*$")
 
 
-def blocks(page: str) -> list[tuple[str, str, str]]:
-    """Return (what stands before it, language, code) of each block of a page."""
-    text = (DOCS / f"{page}.md").read_text()
-    found, end = [], 0
-    for match in _BLOCK.finditer(text):
-        found.append((text[end : match.start()], match["language"], match["code"]))
-        end = match.end()
-    return found
-
-
-def read_toml(before: str, code: str, saved: list[Path]) -> None:
-    """Save a file that the page says to save, add tables to the last one, or check a scenario as it stands."""
-    if name := _SAVE_AS.search(before):
-        saved.append(Path(name[1]))
-        saved[-1].write_text(code)
-    elif "study" not in tomllib.loads(code):
-        saved[-1].write_text(saved[-1].read_text() + "\n" + code)
-    else:
-        study = tomllib.loads(code)["study"]
-        folder = ROOT / "scenarios" / ("identify" if study == "identify" else "")
-        assert scenario_from_text(code, folder / "page.toml").study == study
+def read_toml(name: str, code: str, saved: list[Path]) -> None:
+    """Save a file that the page says to save, or add tables to the last one; what that makes can be read."""
+    data = tomllib.loads(code)
+    if "file" in data.get("material", {}):  # for a scenario beside what the last one leaves
+        assert main(["run", str(saved[-1])]) == 0
+        rest = 'study = "forward"\nrobot = { name = "D25L60" }\npressure = { sequence_bar = [[1, 0, 0]] }\n'
+        assert scenario_from_text(rest + code, Path("results") / saved[-1].stem / "x.toml").material.name == "Batch 7"
         return
+    if name:
+        saved.append(Path(name))
+        saved[-1].write_text(code)
+    else:
+        assert "study" not in data, "a scenario is saved under a name"
+        saved[-1].write_text(saved[-1].read_text() + "\n" + code)
     if "study" in tomllib.loads(saved[-1].read_text()):
         assert load_scenario(saved[-1]).step_count > 0
     else:
@@ -69,9 +61,9 @@ def test_a_page_does_what_it_shows(
     Path("scenarios").symlink_to(ROOT / "scenarios")
     names: dict[str, Any] = {}
     saved: list[Path] = []
-    for before, language, code in blocks(page):
+    for name, language, code in blocks(page):
         if language == "toml":
-            read_toml(before, code, saved)
+            read_toml(name, code, saved)
         elif language == "bash":
             for line in code.splitlines():
                 if line.startswith("softnlp "):
@@ -81,6 +73,8 @@ def test_a_page_does_what_it_shows(
         else:
             assert language == "text", f"{page}: a block of {language} is not run"
     assert "nan" not in capsys.readouterr().out
+    left = {path.name for path in tmp_path.iterdir()} - {"scenarios", "results"} - set(map(str, saved))
+    assert not left, "what a page leaves goes under results/, which git ignores"
 
 
 def test_the_error_that_the_tutorial_shows_is_what_is_said(
@@ -94,27 +88,79 @@ def test_the_error_that_the_tutorial_shows_is_what_is_said(
     assert capsys.readouterr().err == shown
 
 
+def test_a_newcomer_adds_each_thing_as_one_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The blocks of CONTRIBUTING: those that begin with a file's name are saved, the others run and import them."""
+    monkeypatch.syspath_prepend(tmp_path)
+    before, names, files = dict(OUTPUTS), dict[str, Any](), []
+    try:
+        for _, language, code in blocks("../CONTRIBUTING"):
+            if language == "python" and (name := re.match(r"# (\w+)\.py\n", code)):
+                (tmp_path / f"{name[1]}.py").write_text(code)
+                files.append(name[1])
+            elif language == "python":
+                exec(compile(code, "CONTRIBUTING.md", "exec"), names)
+    finally:
+        OUTPUTS.clear()
+        OUTPUTS.update(before)
+        for file in files:
+            sys.modules.pop(file, None)
+    assert files == ["sharpest_bend", "follower", "leaf_spring"]
+
+
 def test_every_extension_is_short() -> None:
-    for before, language, code in blocks("extending"):
-        assert len(code.splitlines()) < LONGEST_EXTENSION, before
+    for _, language, code in blocks("extending"):
+        assert len(code.splitlines()) < LONGEST_EXTENSION, code
         assert language in ("python", "toml")
     headings = re.findall(r"^## (.+)$", (DOCS / "extending.md").read_text(), re.MULTILINE)
-    assert headings == ["A material", "A law", "A robot", "A closure", "A study"]
+    assert headings == ["A material", "A law", "A robot", "A closure", "A load", "A section", "A study"]
 
 
-def test_the_scenario_of_a_how_to_is_the_one_that_its_figure_runs() -> None:
-    """What the page shows differs from the shipped file at most in its title and comments, unless it says otherwise."""
-    shipped = {
-        "forward": "D25L60_two_sets.toml",
-        "loaded": "D25L60_loaded_tip.toml",
-        "blocked-force": "blocked/D25L60.toml",
-        "design": "design/D25L60_dimensions.toml",
-        "identify": "identify/measured_angles.toml",
-    }
-    for page, name in shipped.items():
-        shown = tomllib.loads([code for _, language, code in blocks(f"how-to/{page}") if language == "toml"][-1])
-        real = tomllib.loads((ROOT / "scenarios" / name).read_text())
-        assert {**shown, "title": ""} == {**real, "title": ""}, page
+@pytest.mark.parametrize("page", [page for page in PAGES if saved(page)])
+def test_what_a_page_shows_is_printed_by_the_file_above_it(page: str) -> None:
+    """The scripts of its output run its own files, each of them, and no other scenario."""
+    text = (DOCS / f"{page}.md").read_text()
+    ran = set()
+    for script in re.findall(r"figures/(\w+)\.py\)", text):
+        code = (DOCS / "figures" / f"{script}.py").read_text()
+        commands = re.findall(r'"softnlp (?:run|identify|design|inverse|sweep) ([^" ]+)', code)
+        if commands:
+            assert f'page="{page}"' in code, script
+            ran |= set(commands)
+    if page != "extending":
+        assert ran == {name for name, code in saved(page).items() if "study" in tomllib.loads(code)}
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if page.startswith("how-to/")])
+def test_a_scenario_of_a_how_to_runs_from_where_the_reader_stands(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("scenarios").symlink_to(ROOT / "scenarios")
+    for name, code in saved(page).items():
+        Path(name).write_text(code)
+        assert load_scenario(name).step_count > 0
+
+
+def test_output_that_is_printed_and_drawn_is_that_of_the_page_s_file() -> None:
+    from docs.figures import run_inverse, run_loaded
+
+    assert run_loaded.text().startswith("```text\n$ softnlp run loaded.toml\n")
+    assert run_loaded.text().count(" solved ") == 5
+    assert run_loaded.figure().read_bytes().startswith(b"\x89PNG")
+    assert run_inverse.text().startswith("```text\n$ softnlp inverse targets.toml\n")
+    assert run_inverse.text().count(" solved ") == 3
+
+
+def test_what_is_installed_is_this_checkout_and_an_extra_keeps_it_editable() -> None:
+    """The package is on no index, and an extra without -e would put a copy in the place of an editable checkout."""
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *DOCS.glob("*.md"), *(DOCS / "how-to").glob("*.md")]
+    said = [command for page in pages for command in re.findall(r"pip install ([^`\n&#]+)", page.read_text())]
+    asked = [command for command in said if "softnlp" in command or "." in command.split()]
+    extras = [command for command in said if "[" in command]
+    assert len(extras) >= 6
+    for command in extras:
+        assert re.fullmatch(r"""(-q )?-e (["'])\.\[[\w,]+\]\2""", command.strip()), command
+    assert not [command for command in asked if "softnlp" in command]
 
 
 def test_every_name_of_the_interface_is_on_its_page() -> None:

@@ -202,8 +202,13 @@ def test_a_range_of_stretch_is_cut_and_told(tmp_path: Path, capsys: pytest.Captu
     assert isinstance(task, TensileTask)
     assert task.stretch.min() == 1.1
     assert task.file_of_point.size == 37
+    assert document["data_stretch"] == [1.1, 2.0]
+    assert document["fitted_stretch"] == [1.0, 2.0]  # every law is exact at 1
     assert main(["identify", str(tmp_path / "t.toml"), "--out", str(tmp_path / "o")]) == 0
-    assert "37 points, stretch 1 to 2; 7 points outside stretch = [1.1, 2.0]" in capsys.readouterr().out
+    made = (tmp_path / "o" / "material.toml").read_text()
+    assert "fitted_stretch = [1.0, 2.0]\n" in made
+    assert '37 points, stretch 1.1 to 2"\n' in made
+    assert "37 points, stretch 1.1 to 2; 7 points outside stretch = [1.1, 2.0]" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -226,6 +231,31 @@ def test_a_range_that_leaves_too_little_is_one_line(
     assert len(errors.splitlines()) == 1
     assert "[tensile] stretch" in errors
     assert said in errors
+
+
+def test_a_law_with_an_open_constant_is_not_best_while_another_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    noise = 1e-6 * np.random.default_rng(4).standard_normal(X.size)  # [MPa]
+    _, document, _ = identified(tmp_path, capsys, "stretch,stress_MPa", (X, Y + noise))
+    closest = min(document["laws"], key=lambda law: law["rmse_MPa"])
+    assert False in closest["determined"].values()
+    assert document["best"] == "neo-hookean"
+    alone = fit_tensile(X, 1e6 * (Y + noise), "yeoh")
+    assert alone.best is not None  # the only one
+    assert alone.best.determined["C20"] is False
+
+
+def test_what_failed_is_said_first_with_the_path_as_typed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ("stretch,stress_MPa", (np.linspace(5, 200, 40), np.linspace(0, 0.1, 40)))
+    identified(tmp_path, capsys, *asked)
+    order: list[str] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("softnlp.cli.identify.complain", lambda text: order.append(f"error: {text}"))
+        patch.setattr("softnlp.cli.identify.say", order.append)
+        assert main(["identify", str(tmp_path / "t.toml"), "--out", str(tmp_path / "o")]) == 3
+    assert order[0].startswith(f"error: {tmp_path / 't.toml'}: [tensile] the largest stretch is 200")
+    assert "40 points, stretch 5 to 200" in order[1]
 
 
 def test_open_and_bounded_constants_are_named_in_document_table_and_files(

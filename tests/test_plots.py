@@ -28,7 +28,7 @@ from softnlp.model.conventions import Coefficients
 from softnlp.model.materials import Material, formula_law, material
 from softnlp.model.robot import ROBOTS, Robot, robot, violations
 from softnlp.model.rod import Loads
-from softnlp.model.section import deform
+from softnlp.model.round_chambers import deform
 from softnlp.results import Body, to_dataset, view_of_dataset, view_of_run
 from softnlp.statics.step import Run
 
@@ -215,6 +215,35 @@ def test_loads_are_arrows_along_them_with_their_size() -> None:
     assert {"F 0.1 N", "g"} <= set(texts(figure))
     assert not labelled(axes, "tip moment")
     assert not labelled(drawn(ramp_run(2)).axes[0], "gravity")
+
+
+@pytest.mark.parametrize("moment", [(0, 0, 2e-3), (0, 0, -2e-3), (2e-3, 0, 0), (0, 2e-3, 1e-3)], ids=str)
+def test_a_moment_turns_about_its_axis_and_is_no_force(moment: tuple[float, float, float]) -> None:
+    """Also where a force lies along it: by the right-hand rule the arrow advances, and the two texts stand apart."""
+    run = ramp_run(5, loads=Loads((0, 0, -0.08), moment, (0, 0, -9.80665)))
+    figure = drawn(run)
+    figure.canvas.draw()
+    axes: Any = figure.axes[0]
+    (turn,) = labelled(axes, "tip moment")
+    bend, *heads = (np.asarray(line) for line in turn._segments3d)
+    assert run.steps[-1].pose is not None
+    arms = bend - 1e3 * run.steps[-1].pose.tip_position
+    axis = np.array(moment) / np.linalg.norm(moment)
+    assert np.abs(arms @ axis).max() < 1e-9 * 60
+    radius = np.linalg.norm(arms, axis=1)
+    assert radius == pytest.approx(radius[0])
+    assert radius[0] > 12.5  # round the body
+    assert (np.cross(arms[:-1], arms[1:]) @ axis > 0).all()
+    assert all(np.allclose(head[1], bend[-1]) for head in heads)
+    loads = [t for t in axes.findobj(Text) if t.get_text()[:2] in ("F ", "M ")]
+    assert len(loads) == 2
+    places = projected(axes, np.array([t.get_position_3d() for t in loads]))  # type: ignore[attr-defined]
+    assert np.linalg.norm(places[0] - places[1]) > 20  # pixels
+    width, height = figure.canvas.get_width_height()
+    assert (places > 0).all()
+    assert (places < (width / 2, height)).all()
+    letters = [t for t in axes.texts if t.get_text() in "xyz"]
+    assert all(t.get_path_effects() for t in letters)  # they are read on any colour
 
 
 def test_a_run_that_failed_everywhere_shows_no_shape() -> None:

@@ -39,7 +39,7 @@ from softnlp import (
     solve,
 )
 from softnlp.figures import sparsity_figure
-from softnlp.nlp.reduced import Reduced
+from softnlp.nlp.reduced import Reduced, held_states
 from softnlp.statics.condensed import linear_solver
 
 D25, SOFT = robot("D25L60"), material("Ecoflex 00-50")
@@ -246,7 +246,7 @@ def test_multipliers_tell_what_a_bound_costs() -> None:
 def test_slopes_of_the_reduced_problem_are_its_differences() -> None:
     answer = examples()["stiff_enough"](SHOOTING, "newton")
     posed = answer.problem
-    reduced = Reduced(posed.compiled, linear_solver)
+    reduced = Reduced(posed.compiled, held_states(posed.compiled, linear_solver))
     x, p = answer.solution.x, answer.solution.p
     theta = x[:3] + np.array([0.0, 0.1, 0.05])  # away from its bounds
     here = reduced.at(theta, p, x)

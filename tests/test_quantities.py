@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from math import inf, pi
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -27,7 +28,7 @@ from softnlp.model.quantities import (
     with_symbols,
 )
 from softnlp.model.robot import ROBOTS
-from softnlp.model.section import deform
+from softnlp.model.round_chambers import deform
 from softnlp.model.tip import Given
 
 COEFFICIENTS = Coefficients(0.3, 1.1, 0.97, 1.02, 0.2, 1.4)
@@ -137,13 +138,13 @@ def test_the_model_with_its_own_values_is_the_model() -> None:
 def test_a_section_of_symbols_is_the_section_of_its_numbers() -> None:
     seen = []
 
-    def build(model: Model, pressures: object, gravity: object, stretch: object) -> list:
-        seen.append((model, pressures, gravity))
-        made = deform(model.robot, model.material, pressures, stretch, model.coefficients, model.conventions)
-        return [made.axial_stiffness, ca.vertcat(*made.bending_stiffness), gravity]
+    def build(numbers: Mapping[str, Any], stretch: object) -> list:
+        seen.append(numbers)
+        made = MODEL.section.at(numbers, numbers["pressure"], stretch)
+        return [made.axial_stiffness, ca.vertcat(*made.bending_stiffness), numbers["gravity"]]
 
-    function = section_function(MODEL, build)
-    assert isinstance(seen[0][1], ca.SX)
+    function = section_function(quantities(MODEL), build)
+    assert isinstance(seen[0]["pressure"], ca.SX)
     assert function.size_in(0) == (sum(q.size for q in quantities(MODEL).values()), 1)
     values = {name: q.nominal.copy() for name, q in quantities(MODEL).items()}
     values["pressure"][:], values["gravity"][:] = [6e4, 3e4, 1e4], [1.0, 2.0, 3.0]

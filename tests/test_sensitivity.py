@@ -22,7 +22,7 @@ from softnlp.cli import main
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import Coefficients
 from softnlp.model.quantities import Model, quantities
-from softnlp.model.section import deform
+from softnlp.model.round_chambers import deform
 from softnlp.nlp.implicit import ImplicitDerivatives
 from softnlp.nlp.problem import compile_problem
 from softnlp.statics.blocked import BlockedSolver

@@ -23,12 +23,13 @@ from sweeps import GRID, HEAD, QUICK, MadeUpSolver, in_child, made_up, plan, rea
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # benchmarks/ is not installed
 
-from softnlp.base.errors import InputError
+from softnlp.base.errors import InputError, reworded
 from softnlp.base.status import Status
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.batch.plan import Plan
 from softnlp.batch.poses import Block
 from softnlp.cli import main
+from softnlp.cli.sweep import _OPTIONS
 from softnlp.model.rod import Loads
 from softnlp.scenario.read import load_scenario
 from softnlp.scenario.workspace import run_sweep
@@ -120,6 +121,22 @@ def test_dask_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"install softnlp\[cluster\]"), pool.cluster_executor("tcp://x:1"):
         pass
+
+
+def test_advice_and_keys_are_told_as_the_options_of_the_command() -> None:
+    for error, told in (
+        (
+            InputError("it is so; resume=True continues it", key="executor"),
+            "--cluster: it is so; --resume continues it",
+        ),
+        (
+            SweepError("the executor lost its workers; resume=True goes on"),
+            "the executor lost its workers; --resume goes on",
+        ),
+    ):
+        with pytest.raises(type(error)) as caught, reworded(_OPTIONS):
+            raise error
+        assert str(caught.value) == told
 
 
 # --- what the file holds ---
@@ -428,7 +445,7 @@ def test_the_command_sweeps_refuses_and_goes_on(tmp_path: Path, cli: Cli) -> Non
     status, told, error = cli("sweep", path, "--out", out)
     assert (status, told) == (2, "")
     assert error.count("\n") == 1
-    assert "--resume" in error
+    assert "are solved); --resume continues it, another --out leaves it alone, or remove this file" in error
 
     stamps = {p.name: p.stat().st_mtime_ns for p in out.iterdir() if p.name != JOURNAL_FILE}
     status, told, error = cli("sweep", path, "--out", out, "--resume")

@@ -11,6 +11,7 @@ import pytest
 
 from softnlp import InputError, Numerics, fit_tensile, formula_law, load_materials, material
 from softnlp.cli import main
+from softnlp.figures import tensile_figure
 from softnlp.model.laws import LAWS
 from softnlp.scenario.read import load_scenario, scenario_from_text
 from softnlp.studies.law_curve import LawCurve
@@ -163,6 +164,16 @@ def test_what_is_no_tensile_test_is_refused(stretch: Any, stress: Any, said: str
         fit_tensile(stretch, stress, "mooney-rivlin")
     with pytest.raises(InputError, match="mooney-rivlin"):
         fit_tensile([1.0, 2.0], [0.0, 1.0], "mooney-rivlim")
+
+
+@pytest.mark.parametrize(("noise", "unit"), [(0.0, "Pa"), (0.01, "Pa"), (500.0, "kPa")])
+def test_residuals_are_drawn_in_a_unit_that_needs_no_power_of_ten(noise: float, unit: str) -> None:
+    stress = 30e3 * (STRETCH - STRETCH**-2) + noise * np.random.default_rng(2).standard_normal(STRETCH.size)
+    figure = tensile_figure(fit_tensile(STRETCH, stress, ["neo-hookean", "yeoh"]), "Batch 7")
+    figure.canvas.draw()
+    axes = figure.axes[1]
+    assert axes.get_ylabel() == f"law - data [{unit}]"
+    assert axes.yaxis.get_offset_text().get_text() == ""
 
 
 # --- scenarios --------------------------------------------------------------------------------------------------------

@@ -12,18 +12,10 @@ from designs import random_design
 from scipy.spatial.transform import Rotation
 
 from softnlp.base.errors import InputError
-from softnlp.model.rod import RodSection
-from softnlp.model.tip import (
-    DEAD_LOADS,
-    AtTip,
-    Closure,
-    Given,
-    TipConditions,
-    contact_point,
-    gap,
-    length_error,
-    tip_conditions,
-)
+from softnlp.model.dead_tip import DeadTip
+from softnlp.model.rod import tip_balance
+from softnlp.model.section import RodSection
+from softnlp.model.tip import AtTip, Closure, Given, TipContact, contact_point, gap, length_error
 
 CLOSURES = ("free", "weighted", "compliant", "rigid")
 E3 = np.array([0.0, 0.0, 1.0])
@@ -71,7 +63,7 @@ def drawn(seed: int) -> tuple[Drawn, RodSection]:
         *rng.normal(size=(5, 3)),
         *rng.uniform(0.1, 1.0, 4),
     )
-    return case, RodSection(sec.GA, sec.EA, *sec.EI, sec.GJ, sec.F_P, *sec.M_P[:2], 0.0, 0.0, 0.0)
+    return case, RodSection(sec.GA, sec.EA, *sec.EI, sec.GJ, sec.F_P, *sec.M_P[:2], 0.0, sec.L)
 
 
 def at_tip(case: Drawn, section: RodSection, unknowns: Any) -> AtTip:
@@ -89,6 +81,12 @@ def at_tip(case: Drawn, section: RodSection, unknowns: Any) -> AtTip:
 
 def column(value: Any) -> np.ndarray:
     return np.asarray(ca.DM(value)).ravel()
+
+
+def residual(contact: TipContact, at: AtTip) -> np.ndarray:
+    """Return the balances at the tip under dead loads and contact, and what the contact asks for beside them."""
+    force, moment = contact.tip(at)
+    return column(ca.vertcat(tip_balance(at.state, at.force + force, at.moment + moment), *contact.rows(at)))
 
 
 def balances(case: Drawn, T: np.ndarray, F_b: float) -> np.ndarray:
@@ -114,7 +112,7 @@ def reactions(case: Drawn, closure: str, T: float) -> np.ndarray:
 @pytest.mark.parametrize("wall", [True, False], ids=["wall", "no wall"])
 @pytest.mark.parametrize("closure", CLOSURES)
 def test_the_conditions_are_the_sums_over_chambers(closure: str, wall: bool) -> None:
-    conditions = tip_conditions(closure, wall=wall)
+    conditions = TipContact(closure, wall=wall)
     for seed in range(12):
         case, section = drawn(seed)
         F_b, T = 0.7, 0.4
@@ -126,19 +124,21 @@ def test_the_conditions_are_the_sums_over_chambers(closure: str, wall: bool) -> 
             expected.append(case.normal @ (tip - case.point) - case.left_h)
         if closure == "rigid":  # some chamber is pressurised in every one of these
             expected.append(sum((case.free - case.lengths)[case.PA > 0]))
-        np.testing.assert_allclose(column(conditions.residual(at)), expected, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(residual(conditions, at), expected, rtol=1e-12, atol=1e-12)
         np.testing.assert_allclose(column(conditions.reaction(at)), reactions(case, closure, T), rtol=1e-13)
 
 
 @pytest.mark.parametrize("wall", [True, False], ids=["wall", "no wall"])
 @pytest.mark.parametrize("closure", CLOSURES)
 def test_there_are_as_many_equations_as_forces_to_find(closure: str, wall: bool) -> None:
-    conditions = tip_conditions(closure, wall=wall)
-    assert conditions.unknowns == ("wall force",) * wall + ("chamber reaction",) * (closure == "rigid")
-    assert conditions.equations == ("contact gap",) * wall + ("chamber length",) * (closure == "rigid")
-    assert conditions.has_contact is True
+    conditions = TipContact(closure, wall=wall)
+    assert tuple(conditions.unknowns) == ("wall force",) * wall + ("chamber reaction",) * (closure == "rigid")
+    assert tuple(conditions.equations) == ("contact gap",) * wall + ("chamber length",) * (closure == "rigid")
+    assert {*conditions.unknowns.values()} <= {"N"}
+    assert {*conditions.equations.values()} <= {"m"}
+    assert conditions.needs_lengths is True
     case, section = drawn(1)
-    rows = column(conditions.residual(at_tip(case, section, [0.3] * len(conditions.unknowns))))
+    rows = residual(conditions, at_tip(case, section, [0.3] * len(conditions.unknowns)))
     assert rows.size == 6 + len(conditions.unknowns)
 
 
@@ -147,8 +147,8 @@ def test_rigid_chambers_without_pressure_have_no_reaction(T: float) -> None:
     # e_L is an empty sum then, and T = 0 takes its place, which keeps the system square and regular
     case, section = drawn(3)
     at = at_tip(case._replace(PA=0 * case.PA, pressed=0 * case.pressed), section, [0.5, T])
-    conditions = tip_conditions("rigid")
-    assert column(conditions.residual(at))[-1] == T
+    conditions = TipContact("rigid")
+    assert residual(conditions, at)[-1] == T
     np.testing.assert_array_equal(column(conditions.reaction(at)), 0.0)
 
 
@@ -157,7 +157,7 @@ def test_one_pressed_chamber_is_enough_for_the_length_equation() -> None:
     alone = np.zeros_like(case.pressed)
     alone[0] = 1.0
     at = at_tip(case._replace(pressed=alone), section, [0.5, 9.0])
-    assert column(tip_conditions("rigid").residual(at))[-1] == pytest.approx(case.free[0] - case.lengths[0], rel=1e-13)
+    assert residual(TipContact("rigid"), at)[-1] == pytest.approx(case.free[0] - case.lengths[0], rel=1e-13)
     assert column(length_error(at))[0] == pytest.approx(case.free[0] - case.lengths[0], rel=1e-13)
 
 
@@ -179,28 +179,31 @@ def test_the_gap_is_the_signed_distance_of_the_cap_from_the_wall() -> None:
 def test_what_a_closure_leaves_is_what_the_balances_lack() -> None:
     case, section = drawn(5)
     still = case._replace(left_n=np.zeros(3), left_m=np.zeros(3), left_h=0.0)
-    conditions = tip_conditions("weighted")
-    rows = column(conditions.residual(at_tip(still, section, [0.2])))
+    conditions = TipContact("weighted")
+    rows = residual(conditions, at_tip(still, section, [0.2]))
     exact = still._replace(left_n=rows[:3], left_m=rows[3:6], left_h=rows[6])
-    np.testing.assert_allclose(column(conditions.residual(at_tip(exact, section, [0.2]))), 0.0, atol=1e-12)
+    np.testing.assert_allclose(residual(conditions, at_tip(exact, section, [0.2])), 0.0, atol=1e-12)
 
 
-def test_dead_loads_need_neither_wall_nor_chambers() -> None:
-    assert (DEAD_LOADS.unknowns, DEAD_LOADS.equations, DEAD_LOADS.has_contact) == ((), (), False)
+def test_dead_loads_are_force_and_moment_alone() -> None:
     case, section = drawn(6)
-    bare = at_tip(case, section, [])._replace(given=None, lengths=None, chamber_stiffness=None, unknowns=None)
+    dead = DeadTip()
+    assert (dict(dead.unknowns), dict(dead.equations), dead.needs_lengths, list(dead.rows(None))) == ({}, {}, False, [])
+    given = dead.named({"tip_force": case.force, "tip_moment": case.moment})
+    bare = at_tip(case, section, [])._replace(given=given, lengths=None, chamber_stiffness=None, unknowns=None)
     still = case._replace(left_n=np.zeros(3), left_m=np.zeros(3))
-    np.testing.assert_allclose(column(DEAD_LOADS.residual(bare)), balances(still, 0 * case.PA, 0.0), rtol=1e-12)
-    np.testing.assert_array_equal(column(DEAD_LOADS.reaction(bare)), np.zeros(len(case.PA)))
+    rows = column(tip_balance(bare.state, *(ca.DM(v) for v in dead.tip(bare))))
+    np.testing.assert_allclose(rows, balances(still, 0 * case.PA, 0.0), rtol=1e-12)
+    assert dead.along(None) is None
 
 
 def test_the_free_closure_with_a_force_is_the_dead_load_of_that_force() -> None:
     case, section = drawn(7)
     still = case._replace(left_n=np.zeros(3), left_m=np.zeros(3), cap=0.0)
-    pushed = column(tip_conditions("free").residual(at_tip(still, section, [0.9])))[:6]
+    pushed = residual(TipContact("free"), at_tip(still, section, [0.9]))[:6]
     dead = at_tip(still._replace(force=case.force + 0.9 * case.normal), section, [])
-    conditions: TipConditions = tip_conditions("free", wall=False)
-    np.testing.assert_allclose(pushed, column(conditions.residual(dead)), atol=1e-13)
+    conditions = TipContact("free", wall=False)
+    np.testing.assert_allclose(pushed, residual(conditions, dead), atol=1e-13)
 
 
 @pytest.mark.parametrize("made", [list, tuple, lambda entries: ca.vertcat(*entries)], ids=["list", "tuple", "column"])
@@ -212,8 +215,8 @@ def test_a_closure_of_ones_own_is_taken_as_a_built_in_one(made: Any) -> None:
         lambda at: made([pressed * at.unknowns[-1] for pressed in case.pressed]),
         lambda at: made([length_error(at)]),
     )
-    conditions, same = tip_conditions(own), tip_conditions("rigid")
-    np.testing.assert_array_equal(column(conditions.residual(at)), column(same.residual(at)))
+    conditions, same = TipContact(own), TipContact("rigid")
+    np.testing.assert_array_equal(residual(conditions, at), residual(same, at))
     np.testing.assert_array_equal(column(conditions.reaction(at)), column(same.reaction(at)))
 
 
@@ -228,5 +231,5 @@ def test_a_closure_that_returns_too_many_entries_is_refused() -> None:
         (equation, "equation of closure 'two': expected 1 entries, got 2"),
     ):
         with pytest.raises(InputError, match=f"^closure: {text}$") as refused:
-            tip_conditions(closure).residual(at)
+            residual(TipContact(closure), at)
         assert refused.value.key == "closure"

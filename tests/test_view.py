@@ -8,6 +8,7 @@ import json
 import re
 import shutil
 from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -80,6 +81,7 @@ def test_loads_are_arrows_with_their_size() -> None:
         assert arrow.label == f"F {np.linalg.norm(force):.3g} N"
         assert (moment.label, gravity.label) == ("M 20 N mm", "g 9.81 m/s²")
         assert gravity.vector == pytest.approx([0, 0, -size])
+        assert np.linalg.norm(moment.vector) >= 1.7 * 1e3 * body.radii.outer  # it goes round the body
 
 
 def test_a_robot_that_hangs_is_shown_with_its_base_on_top() -> None:
@@ -211,6 +213,23 @@ def test_the_document_s_example_runs() -> None:
         assert hasattr(view, call) or call in {"frame_of", "RobotView", "run", "handler", "picture"}, call
 
 
+# The text of each label that is seen, and its box on the screen without the margin of its halo.
+LABELS = """
+(() => {
+  const { labels, camera, element } = %s;
+  const [width, height] = [element.clientWidth, element.clientHeight];
+  const seen = (node) => node === null || (node.visible && seen(node.parent));
+  return [...labels].filter((label) => seen(label.sprite)).map(({ sprite, canvas, key }) => {
+    const place = sprite.getWorldPosition(camera.position.clone()).project(camera);
+    const [w, h] = [canvas.width / 3, canvas.height / 3];
+    const left = ((place.x + 1) / 2) * width - sprite.center.x * w;
+    const top = ((1 - place.y) / 2) * height - (1 - sprite.center.y) * h;
+    return [key.split("|")[0], left + 4, top + 4, left + w - 4, top + h - 4];
+  });
+})()
+"""
+
+
 @pytest.fixture(scope="module")
 def server() -> Iterator[str]:
     """Serve a page with a view; yield its address."""
@@ -277,6 +296,13 @@ def test_a_browser_draws_it_in_place_and_asks_nobody_else(server: str, tmp_path:
         page.click("#load")
         drawn(page, 3)
         assert page.evaluate(f"{STAGE}.ghost.group.visible && {STAGE}.marks.wall.visible && {STAGE}.marks.cap.visible")
+        boxes = page.evaluate(LABELS % STAGE)
+        assert {"F 0.447 N", "M 10 N mm", "wall 0.71 N", "x", "y", "z"} <= {box[0] for box in boxes}
+        assert not [
+            (a[0], b[0])
+            for a, b in combinations(boxes, 2)
+            if a[1] < b[3] and b[1] < a[3] and a[2] < b[4] and b[2] < a[4]
+        ]
         page.click("#round")
         page.wait_for_function("document.querySelector('#said').innerText !== ''", timeout=60_000)
         median = page.inner_text("#said").split()[1]

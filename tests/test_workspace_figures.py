@@ -85,6 +85,9 @@ def test_no_texts_meet_and_none_is_cut(space: Workspace) -> None:
     assert len(boxes) > 30
     width, height = figure.canvas.get_width_height()
     assert [name for name, b in boxes if b.x0 < 0 or b.y0 < 0 or b.x1 > width or b.y1 > height] == []
+    xy, _, yz, bar = (axes.get_window_extent() for axes in figure.axes[1:5])
+    assert xy.x1 < bar.x0 < bar.x1 <= yz.x1 + 1  # beside xy, beneath yz: no quarter is empty
+    assert xy.y0 < bar.y0 < bar.y1 < yz.y0
     meet = [(a, b) for (a, box), (b, other) in combinations(boxes, 2) if box.overlaps(other)]
     assert meet == []
 

@@ -10,23 +10,24 @@ import pytest
 
 from softnlp import BAR, Loads, Numerics, material, robot
 from softnlp.base.status import Status
-from softnlp.batch import newton, stretches
+from softnlp.batch import newton
 from softnlp.batch.alone import Alone
 from softnlp.batch.chunk import ChunkSolver
 from softnlp.batch.contact_newton import PATH, BlockedShot, ContactBatch, Stage
 from softnlp.batch.grids import MOST_INTERVALS
-from softnlp.batch.jit import can_compile
 from softnlp.batch.newton import Batch, BatchSolver, Shot
 from softnlp.batch.plan import Plan, cells
 from softnlp.batch.pose_lane import PoseLane
 from softnlp.batch.poses import STATUSES, Lane, Rows
-from softnlp.batch.reduced import reduced_rod
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import COEFFICIENT_SETS, Coefficients
 from softnlp.model.quantities import Model
-from softnlp.model.tip import tip_conditions
+from softnlp.model.tip import TipContact
+from softnlp.native.jit import can_compile
+from softnlp.statics import stretches
 from softnlp.statics.branch import branch_function, stretch_on_branch
 from softnlp.statics.loadcase import rod_functions
+from softnlp.statics.reduced import reduced_rod
 from softnlp.statics.solver import PoseSolver
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.forward import forward
@@ -118,7 +119,7 @@ def test_reduced_nodes_solve_the_multiple_shooting_equations() -> None:
         state = np.concatenate([np.zeros(3), np.eye(3).ravel(), found.shot.base[:, k]])
         nodes = []
         for j in range(16):
-            n = data[-6:-3] + c[11] * c[8:11] * (1 - j / 15)
+            n = data[-6:-3] + c[9] * c[8] * c[10:13] * (1 - j / 15)
             nodes.append(np.concatenate([state[:12], n, state[12:]]))
             state = np.asarray(step(np.concatenate([state, data, [j / 15, 1 / 15]]))).ravel()
         x = np.concatenate([[found.sections.stretch[k]], *nodes])
@@ -381,7 +382,7 @@ def test_poses_that_refinement_does_not_bring_to_the_target_keep_their_error(mon
 def test_blocked_poses_that_refinement_does_not_bring_to_the_target_keep_their_error(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    functions = rod_functions(Model(robot("D25L60"), material("Ecoflex 00-50")), tip_conditions("compliant"))
+    functions = rod_functions(Model(robot("D25L60"), material("Ecoflex 00-50")), (TipContact("compliant"),))
     batch = ContactBatch(functions, None, None)  # type: ignore[arg-type]
     asked: list[int] = []
 
@@ -395,7 +396,7 @@ def test_blocked_poses_that_refinement_does_not_bring_to_the_target_keep_their_e
 
     monkeypatch.setattr(ContactBatch, "_shoot", shoot)
     n, held = 3, np.array([True, True, False])
-    stage = Stage(*(np.zeros((2, n)) for _ in range(5)))
+    stage = Stage(*(np.zeros((2, n)) for _ in range(3)))
     shot, good = batch._refined(stage, np.zeros((7, n)), held, np.ones(n), np.full(n, 4), 1e-4, 21)
     assert len(asked) == 6  # the first grid and five finer ones
     assert asked == sorted(set(asked))
@@ -407,13 +408,13 @@ def test_blocked_poses_that_refinement_does_not_bring_to_the_target_keep_their_e
 
 def test_blocked_poses_that_are_lost_are_not_followed_further(monkeypatch: pytest.MonkeyPatch) -> None:
     """The one that makes contact first is lost at once; the path goes on where the other makes contact."""
-    functions = rod_functions(Model(robot("D25L60"), material("Ecoflex 00-50")), tip_conditions("compliant"))
+    functions = rod_functions(Model(robot("D25L60"), material("Ecoflex 00-50")), (TipContact("compliant"),))
     batch = ContactBatch(functions, None, None)  # type: ignore[arg-type]
     followed: list[tuple[int, list[int]]] = []
 
     def stage_at(j: int, on: np.ndarray) -> Stage:
         followed.append((j, on.tolist()))
-        return Stage(np.zeros((20, on.size)), *(np.zeros((3, on.size)) for _ in range(3)), np.ones((2, on.size)))
+        return Stage(np.zeros((20, on.size)), np.zeros((3, on.size)), np.ones((2, on.size)))
 
     def shoot(
         self: ContactBatch, stage: Stage, guess: np.ndarray, grids: np.ndarray, tolerance: float, *, judge: bool

@@ -9,6 +9,7 @@ import sys
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -391,3 +392,16 @@ def test_a_wall_goes_into_the_plan() -> None:
     assert (plan.contact.offset, plan.contact.closure) == (-0.002, "free")
     assert planned(GRID).contact is None
     assert "blocked_force" in (plan.row_type.names or ())
+
+
+def test_the_order_does_not_depend_on_how_a_machine_partitions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Equal values may fall on either side of a partition, which differs between processors."""
+    values = np.array(list(itertools.product(np.linspace(0, 1, 6), repeat=3)))
+    order = cells(values, 20)
+
+    def another(keys: Any, cut: int) -> Any:
+        parted = np.argsort(-keys, kind="stable")[::-1]
+        return np.concatenate([parted[:cut][::-1], parted[cut:][::-1]])
+
+    monkeypatch.setattr(np, "argpartition", another)
+    assert np.array_equal(order, cells(values, 20))

@@ -7,12 +7,14 @@ import csv
 import io
 import shlex
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import chdir, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
+from docs.tools.pages import saved
 from softnlp import BAR, load_scenario, run_scenario
 from softnlp.cli import main
 from softnlp.figures import run_figure
@@ -69,20 +71,14 @@ def figure_of(scenario: str, change: Callable[[Any], Any] = lambda asked: asked)
 
 @dataclass(frozen=True)
 class Done:
-    """What a command printed, and the folder in which it ran."""
+    """What commands printed, as a reader sees it, and the folder in which they ran."""
 
-    line: str
-    printed: str
+    block: str
     folder: Path
 
-    @property
-    def block(self) -> str:
-        """The command and what it printed, as a reader sees it."""
-        return f"```text\n$ {self.line}\n{self.printed.rstrip()}\n```"
 
-
-def command(*lines: str) -> Done:
-    """Run commands as a person would at the top of the repository; what is kept is of the last one.
+def command(*lines: str, files: Mapping[str, str] = MappingProxyType({})) -> Done:
+    """Run commands as a person would at the top of the repository, beside files with these contents.
 
     Raises
     ------
@@ -93,11 +89,23 @@ def command(*lines: str) -> Done:
     atexit.register(holder.cleanup)
     folder = Path(holder.name)
     (folder / "scenarios").symlink_to(SCENARIOS)
-    said = io.StringIO()
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    shown = []
     for line in lines:
         said = io.StringIO()
         with chdir(folder), redirect_stdout(said):
             status = main(shlex.split(line)[1:])
         if status:
             raise RuntimeError(f"{line}: status {status}")
-    return Done(lines[-1], said.getvalue(), folder)
+        shown += [f"$ {line}", said.getvalue().rstrip()]
+    return Done("\n".join(["```text", *shown, "```"]), folder)
+
+
+def as_shown(*lines: str, drawn: str, page: str = "") -> tuple[Callable[[], str], Callable[[], Path]]:
+    """Run commands and return `text` and `figure` of a script: what they print, and a file that they draw.
+
+    page : whose files, as the reader saves them, the commands run.
+    """
+    done = command(*lines, files=saved(page) if page else {})
+    return lambda: done.block, lambda: done.folder / drawn

@@ -7,7 +7,7 @@ import numpy as np
 from docs.figures._shared import markdown
 from softnlp import REPRODUCTION, Coefficients, Loads, Numerics, material, robot
 from softnlp.model.quantities import Model
-from softnlp.model.section import deform
+from softnlp.model.round_chambers import deform
 from softnlp.statics.solver import PoseSolver
 
 GRAVITY = 9.80665

@@ -1,15 +1,9 @@
-"""The tutorial's first run: as it is printed and drawn."""
+"""The tutorial's first run."""
 
-from docs.figures._shared import command
+from docs.figures._shared import as_shown
 
-DONE = command("softnlp run scenarios/D25L60_one_set.toml")
-
-
-def text() -> str:
-    """Return what the command prints, under the name of the tutorial's file."""
-    return DONE.block.replace("scenarios/D25L60_one_set.toml", "my_robot.toml").replace("D25L60_one_set", "my_robot")
-
-
-def figure():
-    """Return what it draws."""
-    return DONE.folder / "results" / "D25L60_one_set" / "figure.png"
+text, figure = as_shown(
+    "softnlp run my_robot.toml",
+    drawn="results/my_robot/figure.png",
+    page="tutorial",
+)

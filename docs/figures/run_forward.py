@@ -1,15 +1,9 @@
 """A robot with two sets under pressure."""
 
-from docs.figures._shared import command
+from docs.figures._shared import as_shown
 
-DONE = command("softnlp run scenarios/D25L60_two_sets.toml")
-
-
-def text() -> str:
-    """Return what the command prints."""
-    return DONE.block
-
-
-def figure():
-    """Return what it draws."""
-    return DONE.folder / "results/D25L60_two_sets/figure.png"
+text, figure = as_shown(
+    "softnlp run two_sets.toml",
+    drawn="results/two_sets/figure.png",
+    page="how-to/forward",
+)

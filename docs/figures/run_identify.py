@@ -1,15 +1,9 @@
 """Coefficients from eight measured angles."""
 
-from docs.figures._shared import command
+from docs.figures._shared import as_shown
 
-DONE = command("softnlp identify scenarios/identify/measured_angles.toml")
-
-
-def text() -> str:
-    """Return what the command prints."""
-    return DONE.block
-
-
-def figure():
-    """Return what it draws."""
-    return DONE.folder / "results/measured_angles/figure.png"
+text, figure = as_shown(
+    "softnlp identify angles.toml",
+    drawn="results/angles/figure.png",
+    page="how-to/identify",
+)

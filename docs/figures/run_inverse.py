@@ -1,15 +1,9 @@
-"""The pressures that lead the tip around a circle."""
+"""The pressures that lead the tip to three points."""
 
-from docs.figures._shared import command
+from docs.figures._shared import as_shown
 
-DONE = command("softnlp inverse scenarios/inverse/circle.toml")
-
-
-def text() -> str:
-    """Return what the command prints."""
-    return DONE.block
-
-
-def figure():
-    """Return what it draws."""
-    return DONE.folder / "results/circle/figure.png"
+text, figure = as_shown(
+    "softnlp inverse targets.toml",
+    drawn="results/targets/figure.png",
+    page="how-to/inverse",
+)

@@ -1,15 +1,9 @@
 """A robot that carries a weight, and its own."""
 
-from docs.figures._shared import command
+from docs.figures._shared import as_shown
 
-DONE = command("softnlp run scenarios/D25L60_loaded_tip.toml")
-
-
-def text() -> str:
-    """Return what the command prints."""
-    return DONE.block
-
-
-def figure():
-    """Return what it draws."""
-    return DONE.folder / "results/D25L60_loaded_tip/figure.png"
+text, figure = as_shown(
+    "softnlp run loaded.toml",
+    drawn="results/loaded/figure.png",
+    page="how-to/loaded",
+)

@@ -1,15 +1,9 @@
 """Every law fitted to a tensile test."""
 
-from docs.figures._shared import command
+from docs.figures._shared import as_shown
 
-DONE = command("softnlp identify scenarios/identify/tensile.toml")
-
-
-def text() -> str:
-    """Return what the command prints."""
-    return DONE.block
-
-
-def figure():
-    """Return what it draws."""
-    return DONE.folder / "results/tensile/figure.png"
+text, figure = as_shown(
+    "softnlp identify tensile.toml",
+    drawn="results/tensile/figure.png",
+    page="how-to/identify",
+)

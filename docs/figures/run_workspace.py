@@ -1,17 +1,10 @@
-"""A workspace, measured and drawn."""
+"""A workspace, solved, measured and drawn."""
 
-from docs.figures._shared import command
+from docs.figures._shared import as_shown
 
-DONE = command(
-    "softnlp sweep scenarios/workspace/D25L60_grid.toml --out results/grid", "softnlp workspace results/grid"
+text, figure = as_shown(
+    "softnlp sweep grid.toml",
+    "softnlp workspace results/grid",
+    drawn="results/grid/workspace.png",
+    page="how-to/workspace",
 )
-
-
-def text() -> str:
-    """Return what the command prints."""
-    return DONE.block
-
-
-def figure():
-    """Return what it draws."""
-    return DONE.folder / "results/grid/workspace.png"

@@ -6,7 +6,7 @@ import numpy as np
 
 from docs.figures._shared import markdown
 from softnlp import REPRODUCTION, ROBOTS, Coefficients, material
-from softnlp.model.section import deform
+from softnlp.model.round_chambers import deform
 
 STRETCHES = (1.2, 1.4, 1.6, 2.0)
 

@@ -12,7 +12,7 @@ from scipy.optimize import brentq, least_squares
 
 from docs.figures._shared import PUBLISHED, Simulated, markdown
 from softnlp import BAR, DEGREE, REPRODUCTION, Coefficients, Conventions, Material, material, robot
-from softnlp.model.section import deform, stretch_balance
+from softnlp.model.round_chambers import deform
 
 LAPAROSCOPE = robot("laparoscope-6")
 
@@ -60,7 +60,7 @@ def section_function(case: Simulated, reading: Reading) -> ca.Function:
     phi = (r_0 - r_ci) / (r_co - r_ci) if reading.undeformed_bore else 0.0
     coefficients = Coefficients(elongation=k_e, bending=k_b, bore_fraction=phi)
     found = deform(LAPAROSCOPE, silicone, [case.pressure * BAR, 0.0, 0.0], stretch, coefficients, reading.conventions)
-    balance = stretch_balance(found, coefficients, reading.conventions)
+    balance = found.imbalance
     return ca.Function(
         "section", [stretch, k_e, k_b], [ca.vertcat(balance, *found.pressure_moment, *found.bending_stiffness)]
     )

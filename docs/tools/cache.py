@@ -16,7 +16,7 @@ FOLDER = ROOT / ".cache" / "docs"
 @cache
 def package_hash() -> str:
     """Return a hash of what any figure may depend on: the package, its materials, the scenarios, the benchmarks."""
-    found = [ROOT / "materials.toml", *(ROOT / "docs" / "figures").glob("_*.py")]
+    found = [ROOT / "materials.toml", ROOT / "docs" / "tools" / "pages.py", *(ROOT / "docs" / "figures").glob("_*.py")]
     found += [p for folder in ("softnlp", "scenarios", "benchmarks") for p in (ROOT / folder).rglob("*")]
     return hash_of(p for p in found if p.suffix in (".py", ".toml", ".csv"))
 

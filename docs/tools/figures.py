@@ -20,7 +20,8 @@ _LINK = re.compile(r"^\[(?P<text>[^\]]+)\]\((?P<up>(?:\.\./)*)figures/(?P<name>\
 
 
 def _folder(script: Path) -> Path:
-    return cache.kept(f"figures/{script.stem}", [script])
+    pages = [cache.ROOT / "docs" / f"{page}.md" for page in re.findall(r'page="([^"]+)"', script.read_text())]
+    return cache.kept(f"figures/{script.stem}", [script, *pages])
 
 
 def make_one(script: Path, kept: Path) -> None:

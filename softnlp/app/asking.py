@@ -56,7 +56,9 @@ class Progress:
 
 
 def scenario_with(session: Session, study: str, tables: Tables | None = None) -> Scenario:
-    """Return the scenario of a study as the document has it, with whole tables replaced (None: left out).
+    """Return the scenario of a study as the document has it, with whole tables replaced (None: left out), for a run.
+
+    The study on the screen becomes that of the file.
 
     Raises
     ------
@@ -67,7 +69,10 @@ def scenario_with(session: Session, study: str, tables: Tables | None = None) ->
     document.study = study
     for name, values in (tables or {}).items():
         document.replace(name, values)
-    return scenario_from_text(document.text(study), session.folder / session.name)
+    asked = scenario_from_text(document.text(study), session.folder / session.name)
+    if study == session.document.study:
+        session.use()
+    return asked
 
 
 def few_enough(asked: Scenario, most: int, what: str, command: str, table: str | None = None) -> None:

@@ -7,7 +7,7 @@ from functools import cache
 from math import isfinite
 from typing import Any, TypeVar, get_args
 
-from nicegui import ui
+from nicegui import ElementFilter, ui
 from nicegui.elements.mixins.value_element import ValueElement
 from pydantic.fields import FieldInfo
 
@@ -88,6 +88,19 @@ def plain_words(error: SoftnlpError) -> str:
     if isinstance(error, InputError):
         return str(type(error)(error.message, table=error.table, key=error.key))
     return str(error)
+
+
+def refuse(words: str) -> None:
+    """Say in place of an earlier refusal why something was not done; it stays until it is closed or things go well."""
+    dismiss_refusals()
+    close = [{"label": "Close", "color": "white"}]
+    ui.notification(words, type="negative", multi_line=True, timeout=None, actions=close)
+
+
+def dismiss_refusals() -> None:
+    """Take away what was refused before on this page."""
+    for refusal in ElementFilter(kind=ui.notification):
+        refusal.dismiss()
 
 
 def is_number(value: Any) -> bool:

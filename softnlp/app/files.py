@@ -10,6 +10,8 @@ from pathlib import Path
 
 from nicegui import events, ui
 
+from softnlp.app.controls import dismiss_refusals, plain_words, refuse
+from softnlp.app.document import Document
 from softnlp.app.parts import while_open
 from softnlp.app.session import LARGEST_FILE, Session
 from softnlp.base.errors import InputError, SoftnlpError
@@ -20,13 +22,12 @@ from softnlp.statics.step import Pose
 
 def saved(session: Session) -> tuple[str, bytes]:
     """Return the name and content of what a person saves: the scenario, zipped with the files that it names."""
-    text = session.text().encode()
-    stem = session.name.removesuffix(".toml") or "scenario"
-    files = session.document.files()
+    text, name = session.text(), session.file_name
+    files = Document(text).files()
     if not files:
-        return f"{stem}.toml", text
-    contents = {name: (session.folder / name).read_bytes() for name in files}
-    return f"{stem}.zip", zipped({f"{stem}.toml": text, **contents})
+        return name, text.encode()
+    contents = {file: (session.folder / file).read_bytes() for file in files}
+    return f"{name.removesuffix('.toml')}.zip", zipped({name: text.encode(), **contents})
 
 
 def zipped(files: Mapping[str, bytes | Path]) -> bytes:
@@ -40,15 +41,17 @@ def zipped(files: Mapping[str, bytes | Path]) -> bytes:
 
 def save(session: Session) -> None:
     """Offer the scenario on the screen as a download; what is wrong with it is said instead."""
-    if session.problem is not None:
-        _refuse(f"not saved: {session.problem}")
+    try:
+        session.asked()
+    except SoftnlpError as error:
+        refuse(f"not saved: {plain_words(error)}")
         return
+    dismiss_refusals()
     name, content = saved(session)
     ui.download.content(content, name)
-
-
-def _refuse(words: str) -> None:
-    ui.notify(words, type="negative", close_button="Close", timeout=0)
+    if session.study != session.opened_study or session.study != session.document.study:
+        without = "".join(f", without [{table}]" for table in session.left_out())
+        ui.notify(f"saved {name}: study {session.study}{without}")
 
 
 def open_dialog(session: Session) -> ui.dialog:
@@ -60,13 +63,14 @@ def open_dialog(session: Session) -> ui.dialog:
         try:
             open_files(session, [(file.name, await file.read()) for file in event.files])
         except SoftnlpError as error:
-            _refuse(f"not opened: {error}")
+            refuse(f"not opened: {error}")
             return
+        dismiss_refusals()
         dialog.close()
         ui.notify(f"opened {session.name}", type="positive")
 
     def refused() -> None:
-        ui.notify(f"not opened: expected .toml and .csv files of at most {LARGEST_FILE / 1e6:.0f} MB", type="negative")
+        refuse(f"not opened: expected .toml and .csv files of at most {LARGEST_FILE / 1e6:.0f} MB")
 
     with ui.dialog() as dialog, ui.card().classes("w-96"):
         ui.label("Open a scenario").classes("text-lg")

@@ -18,6 +18,7 @@ from softnlp.app.live import LivePoses
 from softnlp.base.errors import InputError
 from softnlp.base.reading import LARGEST_TOML, one_line, read_bytes, read_text, shown
 from softnlp.base.units import BAR
+from softnlp.scenario.check import SCHEMAS
 from softnlp.scenario.read import Scenario, load_scenario, placed, scenario_from_text
 
 if TYPE_CHECKING:
@@ -28,7 +29,13 @@ Listener = Callable[[], None]
 
 LARGEST_FILE = 5_000_000
 """Bytes of a file that is taken in."""
+_POSES = {"forward", "blocked-force"}  # studies of which the page shows the pose
 _MOST_KEPT = 2_000_000  # characters of files; a browser keeps some five million for a tab
+
+
+def _fields(study: str) -> tuple[str, ...]:
+    """Return the keys and tables that a scenario of a study may have."""
+    return tuple(SCHEMAS[study].model_fields) if study in SCHEMAS else ()
 
 
 def plain_name(name: str) -> str:
@@ -64,7 +71,7 @@ class Session:
         self._pressure_listeners: list[Listener] = []
         self.problem: InputError | None = None
         self.name = name
-        self.document = Document(text)
+        self._start(Document(text))
         self._sound = ""
         self.follows_file = True
         self.scenario = self._read()
@@ -95,12 +102,19 @@ class Session:
             raise placed(error, name) from None  # and not where it was tried
         for file, content in given.items():
             (self.folder / file).write_bytes(content)
-        self.document, self.problem, self._sound = document, None, document.text()
+        self._start(document)
+        self.problem, self._sound = None, document.text()
         self.scenario = replace(scenario, path=self.folder / name)
         self.name, self.follows_file = name, True
         self.pressure = self._last_pressure()
         self._tell(self._scenario_listeners)
         self._tell(self._pressure_listeners)
+
+    def _start(self, document: Document) -> None:
+        """Take over a document, as it was opened."""
+        self.document = document
+        self.opened_study = self._last_used = document.study
+        self._used = {document.study}
 
     def _try(self, document: Document, name: str, given: Mapping[str, bytes]) -> Scenario:
         """Return what a document says with files read away from those of the screen, which stay as they were."""
@@ -135,11 +149,13 @@ class Session:
 
     def change(self, table: str, key: str, value: object) -> None:
         """Set a key of the scenario, or take it out for None; what is wrong with it then is in `problem`."""
+        self._use_for(table)
         self.document.set(table, key, value)
         self.reread()
 
     def change_all(self, table: str, values: Mapping[str, object] | None) -> None:
         """Put these keys in place of a whole table's, or take it out for None."""
+        self._use_for(table)
         self.document.replace(table, values)
         self.reread()
 
@@ -169,9 +185,30 @@ class Session:
 
     def choose(self, study: str) -> None:
         """Turn to another study of the same robot."""
+        if study in self._used:
+            self._last_used = study
         if study != self.document.study:
             self.document.start(study)
             self.reread()
+
+    @property
+    def study(self) -> str:
+        """The study of the file that is saved: that on the screen, once the file was of it or it was run or changed.
+
+        One that a person only looks at leaves the file as it is, but for a pose at a wall: the page shows its numbers.
+        """
+        looked = self.document.study
+        return looked if looked in self._used or {looked, self._last_used} <= _POSES else self._last_used
+
+    def use(self) -> None:
+        """Make the study on the screen that of the file."""
+        self._last_used = self.document.study
+        self._used.add(self._last_used)
+
+    def _use_for(self, table: str) -> None:
+        """Make the study on the screen that of the file where a table changes that the file's study does not have."""
+        if table and table not in _fields(self.study):
+            self.use()
 
     def set_pressure(self, pressure: Array) -> None:
         """Show the pose at a pressure (sets,) [Pa]; from now on that is the one step of the scenario."""
@@ -192,16 +229,28 @@ class Session:
             self._tell(self._pressure_listeners)
 
     def text(self) -> str:
-        """Return the scenario file of what is on the screen."""
-        document = Document(self.document.text())
+        """Return the scenario file of what is on the screen, of `study`."""
+        document = Document(self.document.text(self.study))
         if self.follows_file or not document.table("pressure"):
             return document.text()
         document.replace("pressure", {"sequence_bar": [[float(f"{p / BAR:.12g}") for p in self.pressure]]})
         return document.text()
 
+    @property
+    def file_name(self) -> str:
+        """The name of the file of `text`: that of the opened file, and another one for another study."""
+        stem = self.name.removesuffix(".toml") or "scenario"
+        return f"{stem}.toml" if self.study == self.opened_study else f"{stem}_{self.study}.toml"
+
+    def left_out(self) -> list[str]:
+        """Return the tables of the opened file's study that the file of `text` does not have."""
+        written = Document(self.text())
+        return [name for name in _fields(self.opened_study) if self.table(name) and not written.table(name)]
+
     def kept(self) -> str:
         """Return all that is on the screen as text, for `recall`."""
-        kept = {"name": self.name, "source": self.document.source(), "study": self.document.study}
+        kept: dict[str, Any] = {"name": self.name, "source": self.document.source(), "study": self.document.study}
+        kept |= {"last_used": self._last_used, "used": sorted(self._used)}
         sound = None if self.problem is None else self._sound  # what the picture shows meanwhile
         return json.dumps(kept | {"sound": sound, "pressure": None if self.follows_file else self.pressure.tolist()})
 
@@ -219,6 +268,7 @@ class Session:
         try:
             kept = json.loads(text)
             name, source, study, pressure = (kept[key] for key in ("name", "source", "study", "pressure"))
+            used = {str(known) for known in kept.get("used", [])}
             contents = {str(key): b64decode(content) for key, content in json.loads(files).items()}
         except (ValueError, KeyError, TypeError, AttributeError):
             raise InputError("expected what a tab of this app had kept") from None
@@ -228,7 +278,9 @@ class Session:
             self.document = Document(str(source))
             self.document.study = str(study)
             self.reread()
+        self._used |= used & set(SCHEMAS)
         self.choose(str(study))
+        self._last_used = str(kept["last_used"]) if kept.get("last_used") in self._used else self._last_used
         if pressure is not None and len(pressure) == len(self.pressure):
             self.set_pressure(np.asarray(pressure, dtype=float))
 

@@ -1,12 +1,12 @@
 """Every number that comes out, once: name, unit, key, dimensions, meaning and labels.
 
-JSON, CSV, netCDF, tables, figures and the page read this list. A new number is a line here and an attribute of what a
-step holds.
+JSON, CSV, netCDF, tables, figures and the page read this list. A new number is a line here, of an attribute of what a
+step holds or of a function of the step.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -52,11 +52,11 @@ _AXES = ("axis", "row", "col")
 class Output:
     """A number that comes out.
 
-    name : in Python, where it is in SI. unit : that it is shown in. dims : names of its dimensions after `step`.
-    group : what it is a number of. of : the attribute of a step that holds it, by default that of its name in its
-    group. words : on an axis. short : heading of a column, one for each entry. title : of a row on the page, with {}
-    for an axis or a number. column : in files of measurements. others : what people call that column. pattern : of the
-    keys of entries. form, page : how it is written in a table and on the page.
+    name : in Python, where it is in SI. unit : that it is shown in. dims : names of its dimensions after `step`. group
+    : what it is a number of. of : the attribute of a step that holds it, by default that of its name in its group; or a
+    function of a step. words : on an axis. short : heading of a column, one for each entry. title : of a row on the
+    page, with {} for an axis or a number. column : in files of measurements. others : what people call that column.
+    pattern : of the keys of entries. form, page : how it is written in a table and on the page.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Output:
     meaning: str = ""
     dims: tuple[str, ...] = ()
     group: str = ""
-    of: str = ""
+    of: str | Callable[[Any], Any] = ""
     words: str = ""
     short: tuple[str, ...] = ()
     title: str = ""
@@ -94,10 +94,16 @@ class Output:
         """The size of the unit in SI."""
         return self.unit.scale
 
-    @property
-    def place(self) -> str:
-        """The attribute of a step that holds the number, with dots."""
-        return self.of or _PLACES.get(self.group, "") + self.name
+    def found(self, step: Any) -> Any:
+        """Return the number of a step in SI, None where it has none."""
+        if callable(self.of):
+            return self.of(step)
+        found = step
+        for name in (self.of or _PLACES.get(self.group, "") + self.name).split("."):
+            if found is None:
+                return None
+            found = found.get(name) if isinstance(found, dict) else getattr(found, name)
+        return found
 
     @property
     def label(self) -> str:

@@ -5,7 +5,7 @@ A solve that fails is not an exception: it is a step with a named `softnlp.base.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from difflib import get_close_matches
 
@@ -97,6 +97,24 @@ def located(*, source: str | None = None, table: str | None = None) -> Iterator[
         yield
     except InputError as error:
         raise error.located(source=source, table=table) from None
+
+
+@contextmanager
+def reworded(words: Mapping[str, str]) -> Iterator[None]:
+    """Say what an error from within advises, and its key, as another interface does: options in place of arguments."""
+
+    def told(text: str) -> str:
+        for here, there in words.items():
+            text = text.replace(here, there)
+        return text
+
+    try:
+        yield
+    except InputError as error:
+        key = None if error.key is None else words.get(f"{error.key}=", error.key)
+        raise type(error)(told(error.message), source=error.source, table=error.table, key=key) from None
+    except SoftnlpError as error:
+        raise type(error)(told(str(error))) from error.__cause__
 
 
 @contextmanager

@@ -6,10 +6,16 @@ import sys
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
-from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from importlib.abc import Loader, MetaPathFinder
+
+    class _Finder(MetaPathFinder, Loader): ...
+else:
+    _Finder = object  # importing `importlib.abc` takes a third of what importing this package does
 
 # Package of then, package of now, the modules that went from one to the other; then those of today that came of others.
 _MOVED = (
@@ -57,6 +63,7 @@ _MERGED = {
     "studies.design": "studies.design_search",
     "studies.fields": "results.targets",
     "studies.identified": "studies.free_constants",
+    "studies.inverse_problem": "studies.inverse_nlp",
     "studies.measurements": "studies.identify_task",
     "studies.predicted": "studies.predicted_force studies.predicted_pose studies.trial",
     "studies.targets": "studies.aiming studies.inverse_task studies.tip_map",
@@ -70,6 +77,7 @@ _RENAMED = {old: now for now, modules in _MERGED.items() for old in modules.spli
 _FOLDERS = {"workspace": "sweep", "plots": "figures", "mesh": "figures.mesh", "evaluation": "studies"}
 # Names that left a module which is still there.
 _NAMES = {
+    "section": dict.fromkeys(("deform", "reference_area"), "model.round_chambers"),
     "loadcase": {"Equation": "nlp.case"},
     "quantities": {"Quantity": "base.quantity", "quantity": "base.quantity"},
     "workspace.run": {"run_sweep": "scenario.workspace"},
@@ -87,7 +95,7 @@ def new_name(old: str) -> str | None:
     return f"{_FOLDERS[package]}.{module}" if package in _FOLDERS else None
 
 
-class _OldPaths(MetaPathFinder, Loader):
+class _OldPaths(_Finder):
     """Finds modules by their old names, before the finders that would load a file twice, under both names."""
 
     def find_spec(self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None) -> Any:
@@ -96,6 +104,9 @@ class _OldPaths(MetaPathFinder, Loader):
         if package != _PACKAGE or new_name(old) is None:
             return None
         return ModuleSpec(fullname, self, is_package=old in _FOLDERS)
+
+    def create_module(self, spec: ModuleSpec) -> None:
+        """Leave it to the interpreter."""
 
     def exec_module(self, module: ModuleType) -> None:
         """Put today's module, or what offers its names and those that left it, in the place of an old one."""

@@ -7,7 +7,8 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import connection, parent_process, spawn
 from multiprocessing.context import BaseContext, SpawnContext, SpawnProcess
@@ -29,6 +30,16 @@ def processors() -> int:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on Linux
         return os.cpu_count() or 1
+
+
+def worker_pool(workers: int, begin: Callable[..., object], *given: Any) -> ProcessPoolExecutor:
+    """Return a pool of processes that each begin with `begin(*given)` beside `begin_worker`."""
+    return ProcessPoolExecutor(workers, mp_context=process_context(), initializer=_begin, initargs=(begin, given))
+
+
+def _begin(begin: Callable[..., object], given: tuple[Any, ...]) -> None:
+    begin_worker()
+    begin(*given)
 
 
 def begin_worker() -> None:

@@ -30,7 +30,7 @@ class Quantity:
     scale
         Typical size, which makes the unknown of order one [SI].
     lower, upper
-        Bounds when free [SI].
+        Bounds when free, numbers or (size,) [SI].
     """
 
     name: str
@@ -38,8 +38,8 @@ class Quantity:
     symbol: ca.MX
     nominal: Array
     scale: float = 1.0
-    lower: float = -_INF
-    upper: float = _INF
+    lower: Any = -_INF
+    upper: Any = _INF
 
     @property
     def size(self) -> int:
@@ -48,7 +48,7 @@ class Quantity:
 
 
 def quantity(
-    name: str, unit: str, nominal: Any, *, scale: float = 1.0, lower: float = -_INF, upper: float = _INF
+    name: str, unit: str, nominal: Any, *, scale: float = 1.0, lower: Any = -_INF, upper: Any = _INF
 ) -> Quantity:
     """Declare a quantity.
 
@@ -63,7 +63,7 @@ def quantity(
     scale
         Typical size [SI].
     lower, upper
-        Bounds when free [SI].
+        Bounds when free, numbers or (size,) [SI].
 
     Returns
     -------

@@ -12,8 +12,10 @@ from softnlp.batch.plan import Plan
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model, with_symbols
 from softnlp.model.rod import Loads
+from softnlp.model.tip import TipContact
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.compiled import rod_equations
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
@@ -36,11 +38,19 @@ class Alone:
         model, pressure, loads = self._pose(column)
         plan = self.plan
         if plan.contact is None:
-            self._free = self._free or PoseSolver(plan.model, self._numerics)
+            self._free = self._free or self._solver()
             return self._free.with_model(model).solve(pressure, loads, near)
-        self._blocked = self._blocked or BlockedSolver(plan.model, self._numerics, plan.contact)
+        if self._blocked is None:
+            equations = rod_equations(plan.model, (TipContact(plan.contact.closure),), by_machine=False)
+            poses = self._solver(unloaded_accuracy=self._numerics.accuracy)
+            self._blocked = BlockedSolver(plan.model, self._numerics, plan.contact, poses=poses, equations=equations)
         # from zero pressure: the neighbours in a chunk are not on the way to each other
         return self._blocked.with_model(model).solve(pressure, loads, self.wall)
+
+    def _solver(self, **settings: float) -> PoseSolver:
+        """Return a solver whose numbers do not depend on what it has solved before."""
+        equations = rod_equations(self.plan.model, by_machine=False)
+        return PoseSolver(self.plan.model, self._numerics, equations=equations, **settings)
 
     def _pose(self, column: Array) -> tuple[Model, Array, Loads]:
         """Return the model, the pressures and the loads of one pose from every quantity."""

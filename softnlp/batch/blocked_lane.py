@@ -10,18 +10,19 @@ from numpy.typing import NDArray
 from softnlp.batch.arrays import joined, some, spread
 from softnlp.batch.bodies import self_intersecting
 from softnlp.batch.contact_newton import PATH, BlockedShot, ContactBatch, Stage
-from softnlp.batch.kernels import Kernels
-from softnlp.batch.plan import LOADS, Plan
+from softnlp.batch.plan import Plan
 from softnlp.batch.pose_lane import PoseLane, Poses, Sections, entries
-from softnlp.batch.reduced import POSITION
 from softnlp.batch.reduced_contact import reduced_contact
-from softnlp.batch.shooting import shooting
 from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.quantities import LOADS
 from softnlp.model.rod import Loads
-from softnlp.model.tip import tip_conditions
+from softnlp.model.tip import TipContact
+from softnlp.native.kernels import Kernels
+from softnlp.native.shooting import shooting
 from softnlp.statics.blocked import TOUCHING
 from softnlp.statics.blocked_step import PULL
-from softnlp.statics.loadcase import rod_functions
+from softnlp.statics.loadcase import rod_functions, unpack_section
+from softnlp.statics.reduced import POSITION
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.wall import Wall, standing_wall
 
@@ -58,7 +59,7 @@ class BlockedLane:
 
     def __init__(self, plan: Plan, contact: ContactSettings, wall: Wall, free: PoseLane) -> None:
         self._plan, self._contact, self._wall, self._free = plan, contact, wall, free
-        functions = rod_functions(plan.model, tip_conditions(contact.closure))
+        functions = rod_functions(plan.model, (TipContact(contact.closure),))
         reduced = reduced_contact(functions)
         kernels = Kernels(
             {
@@ -71,8 +72,8 @@ class BlockedLane:
         self._kernels = shooting(kernels)
         self._flat = ContactBatch(functions, self._kernels, wall.plane)
         self._spatial = ContactBatch(functions, self._kernels, None)
-        self._sets = plan.model.robot.chamber_sets
-        self._set_of_chamber = np.array(plan.model.robot.set_of_chamber)
+        self._sets = plan.model.sets
+        self._set_of_chamber = np.array(plan.model.section.set_of_chamber)
 
     def gaps(self, poses: Poses) -> Array:
         """Return how far each free contact point is in front of the wall [m]."""
@@ -105,20 +106,13 @@ class BlockedLane:
         for batch, members in ((self._flat, usable & flat), (self._spatial, usable & ~flat)):
             chosen = np.flatnonzero(members)
             if chosen.size:
-                force, moment = self._free.loads(own[:, chosen], some(free.sections, chosen))
 
-                def stage_at(
-                    j: int,
-                    on: NDArray[np.intp],
-                    chosen: NDArray[np.intp] = chosen,
-                    force: Array = force,
-                    moment: Array = moment,
-                ) -> Stage:
+                def stage_at(j: int, on: NDArray[np.intp], chosen: NDArray[np.intp] = chosen) -> Stage:
                     poses = chosen[on]
                     sections = some(path[j][0], poses)
                     given = self._given(own[:, poses], path[j][1][:, poses])
                     units = np.vstack([sections.length_unit, sections.force_unit])
-                    return Stage(sections.constants, force[:, on], moment[:, on], given, units)
+                    return Stage(sections.constants, given, units)
 
                 target = self._plan.numerics.accuracy / 3
                 found.append((chosen, *batch.follow(stage_at, first[chosen], target)))
@@ -202,12 +196,13 @@ class BlockedLane:
         return np.vstack([columns[entries(self._plan, name)] for name in LOADS])
 
     def _given(self, columns: Array, free_lengths: Array) -> Array:
-        """Return what the tip conditions take, SI, in the order of `softnlp.model.quantities.contact_quantities`."""
+        """Return what the loads take at the tip, SI: the dead ones, then as `contact_quantities` has it."""
         n = columns.shape[1]
         pressed = (columns[: self._sets] > 0)[self._set_of_chamber]
         coefficient = float(self._plan.model.coefficients.chamber_reaction)
         return np.vstack(
             [
+                self._loads_of(columns)[:6],
                 np.repeat(self._wall.point[:, None], n, axis=1),
                 np.repeat(self._wall.normal[:, None], n, axis=1),
                 np.full(n, self._contact.tip_cap),
@@ -223,14 +218,14 @@ class BlockedLane:
         n, plane = columns.shape[1], self._wall.plane
         if plane is None:
             return np.zeros(n, bool)
-        c = sections.constants
+        rod = unpack_section(sections.constants)
         up = np.array([0.0, 0.0, 1.0])
         along = np.cross(plane, up)
-        round_section = np.abs(c[2] - c[3]) <= 1e-9 * np.abs(c[2])
+        round_section = np.abs(rod.bending_x - rod.bending_y) <= 1e-9 * np.abs(rod.bending_x)
         if min(abs(plane[0]), abs(plane[1])) <= 1e-12:
             round_section = np.ones(n, bool)
         force, moment, gravity = np.split(self._loads_of(columns), 3)
-        pressing = np.vstack([c[6:8], np.zeros(n)])
+        pressing = np.vstack([rod.pressure_moment_x, rod.pressure_moment_y, np.zeros(n)])
 
         def absent(vectors: Array, direction: Array) -> Mask:
             limit: Mask = np.abs(direction @ vectors) <= 1e-9 * np.linalg.norm(vectors, axis=0)

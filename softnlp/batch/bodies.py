@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.batch.reduced import POSITION
-from softnlp.batch.shooting import Shooting
+from softnlp.native.shooting import Shooting
 from softnlp.statics.body import TURN, overlapping
+from softnlp.statics.reduced import POSITION
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -14,7 +14,7 @@ from softnlp.batch.blocked_lane import CLOSURES, BlockedLane, BlockedPoses
 from softnlp.batch.plan import Plan
 from softnlp.batch.pose_lane import PoseLane, Poses, entries
 from softnlp.batch.poses import STATUSES, Block, Lane, Rows, unsolved_rows
-from softnlp.batch.reduced import POSITION, ROTATION, STATE
+from softnlp.statics.reduced import POSITION, ROTATION, STATE
 from softnlp.statics.step import Step, stable_flag
 
 Array = NDArray[np.float64]

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from softnlp.batch.arrays import replaced, some
 from softnlp.batch.grids import MOST_INTERVALS, grid_level, whole_groups
-from softnlp.batch.kernels import WIDTH
-from softnlp.batch.reduced import MOMENT, POSITION, ROTATION, STATE
 from softnlp.batch.reduced_contact import UNKNOWN
-from softnlp.batch.shooting import Shooting
+from softnlp.native.kernels import WIDTH
+from softnlp.native.shooting import Shooting
 from softnlp.statics.condensed import plane_directions
-from softnlp.statics.loadcase import RodFunctions
+from softnlp.statics.loadcase import RodFunctions, whole_weight
+from softnlp.statics.reduced import MOMENT, POSITION, ROTATION, STATE
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -35,12 +35,10 @@ _RICHARDSON = 16 / 15
 class Stage:
     """Blocked poses at one part of their pressure, scaled units, (fields, poses).
 
-    constants : c. force, moment : dead loads. given : what the tip conditions take. units : length and force.
+    constants : c. given : what the loads take at the tip, the dead force first, SI. units : length and force.
     """
 
     constants: Array
-    force: Array
-    moment: Array
     given: Array
     units: Array
 
@@ -72,7 +70,7 @@ class ContactBatch:
 
     def __init__(self, functions: RodFunctions, shooting: Shooting, plane: Array | None) -> None:
         self._constants = functions.field.size1_in(1)
-        self._chambers = functions.model.robot.chambers
+        self._chambers = functions.model.chambers
         self._forces = functions.tip_unknowns
         self._rows = 6 + self._forces
         self._inside = np.eye(self._rows) if plane is None else plane_directions(plane, self._rows)[0]
@@ -126,8 +124,7 @@ class ContactBatch:
         """Return the first guess and the expected tip: without force where contact begins, else along the secant."""
         guess, tip = unknowns.copy(), tips.copy()
         new = done == 0
-        weight = stage.constants[11] * stage.constants[8:11]
-        guess[:3, new] = (stage.force + weight)[:, new]
+        guess[:3, new] = (stage.given[:3] / stage.units[1] + whole_weight(stage.constants))[:, new]
         guess[3:6, new] = 0.0
         guess[6:, new] = 0.0
         if before:
@@ -246,7 +243,7 @@ class ContactBatch:
 
     def _tip(self, reached: Array, data: Array, stage: Stage, y: Array) -> tuple[Array, Array]:
         """Return the tip residual (rows, poses) and its derivative by the unknowns (poses, rows, rows)."""
-        given = np.vstack([reached, data, stage.force, stage.moment, y, stage.given, stage.units])
+        given = np.vstack([reached, data, y, stage.given, stage.units])
         found = self._shooting.apply("contact_tip", given)
         slopes = found[self._rows :].reshape(self._rows, self._rows, -1)  # column, row, pose
         return found[: self._rows], slopes.transpose(2, 1, 0)

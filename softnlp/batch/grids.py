@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.batch.kernels import WIDTH
+from softnlp.native.kernels import WIDTH
 
 Array = NDArray[np.float64]
 

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from softnlp.batch.arrays import replaced, some
 from softnlp.batch.grids import MOST_INTERVALS, grid_level, whole_groups
-from softnlp.batch.kernels import WIDTH
 from softnlp.batch.predictor import predicted
-from softnlp.batch.reduced import MOMENT, POSITION, ROTATION, STATE
-from softnlp.batch.shooting import Shooting
 from softnlp.model.rod import STATE_SIZE
+from softnlp.native.kernels import WIDTH
+from softnlp.native.shooting import Shooting
 from softnlp.statics.loadcase import RodFunctions
+from softnlp.statics.reduced import MOMENT, POSITION, ROTATION, STATE, base_state
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -73,7 +73,7 @@ class BatchSolver:
         self._shooting = shooting
         self._target = target
         self._intervals = intervals
-        self._chambers = functions.model.robot.chambers
+        self._chambers = functions.model.chambers
 
     def solve(self, batch: Batch, features: Array) -> Shot:
         """Solve every pose, on a grid that meets the target; poses that did not converge keep a large residual.
@@ -186,17 +186,6 @@ class BatchSolver:
             intervals=np.repeat(counts, WIDTH),
             iterations=passes,
         )
-
-
-def base_state(base: Array) -> Array:
-    """Return the state at the base for M(0), with its derivatives by M(0)."""
-    state = np.zeros((4 * STATE + 1, base.shape[1]))
-    state[[3, 7, 11]] = 1.0
-    state[MOMENT] = base
-    for j in range(3):
-        state[STATE * (j + 1) + MOMENT.start + j] = 1.0
-    state[4 * STATE] = np.inf
-    return state
 
 
 def cross(a: Array, b: Array) -> Array:

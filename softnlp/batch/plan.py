@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from softnlp.batch.poses import row_type
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.numerics import Numerics
-from softnlp.model.quantities import Model, contact_quantities, quantities
+from softnlp.model.quantities import LOADS, Model, contact_quantities, quantities
 from softnlp.model.rod import Loads
 
 Array = NDArray[np.float64]
 
 CHUNK = 1024
-LOADS = ("tip_force", "tip_moment", "gravity")
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +62,7 @@ class Plan:
     @property
     def row_type(self) -> np.dtype[Any]:
         """The type of a row of the result."""
-        return row_type(self.model.robot.chambers, wall=self.contact is not None)
+        return row_type(self.model.chambers, wall=self.contact is not None)
 
     @cached_property
     def nominal(self) -> dict[str, Array]:
@@ -116,21 +115,27 @@ class Plan:
 def cells(values: Array, chunk: int) -> NDArray[np.int64]:
     """Return an order in which every chunk is a compact cell: tables are halved across their widest column.
 
-    values : (poses, columns); columns are compared by the part of their whole range that a cell spans.
+    values : (poses, columns); columns are compared by the part of their whole range that a cell spans. The order is
+    the same on every machine: equal values stand in the order of the poses, since those of a partition differ.
     """
     span = np.ptp(values, axis=0)
     columns = np.ascontiguousarray((values / np.where(span > 0, span, 1.0)).T[span > 0])
     if not len(columns):
         return np.arange(len(values), dtype=np.int64)
+    ranks = np.empty(columns.shape, np.int64)
+    for column, rank in zip(columns, ranks, strict=True):
+        rank[np.argsort(column, kind="stable")] = np.arange(len(values))
     done: list[NDArray[np.int64]] = []
-    waiting = [(np.arange(len(values), dtype=np.int64), columns)]
+    waiting = [np.arange(len(values), dtype=np.int64)]
     while waiting:
-        cell, own = waiting.pop()
+        cell = waiting.pop()
+        own = columns[:, cell]
         if cell.size <= chunk:
-            done.append(cell[np.lexsort(own[::-1])])
+            done.append(cell[np.lexsort((cell, *own[::-1]))])
             continue
         # a whole number of chunks on the left keeps every chunk but the last full
         cut = chunk * max(1, round(cell.size / chunk / 2))
-        parted = np.argpartition(own[int(np.argmax(np.ptp(own, axis=1)))], cut)
-        waiting += [(cell[part], own[:, part]) for part in (parted[cut:], parted[:cut])]
+        widest = int(np.argmax(np.ptp(own, axis=1)))
+        parted = np.argpartition(ranks[widest, cell], cut)
+        waiting += [cell[parted[cut:]], cell[parted[:cut]]]
     return np.concatenate(done)

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from softnlp.batch.arrays import some
 from softnlp.batch.bodies import self_intersecting
-from softnlp.batch.kernels import Kernels
-from softnlp.batch.newton import Batch, BatchSolver, Shot, base_state
-from softnlp.batch.plan import LOADS, Plan
-from softnlp.batch.reduced import STATE, reduced_rod
-from softnlp.batch.shooting import shooting
-from softnlp.batch.stretches import Stretches, stretch_maps
-from softnlp.statics.loadcase import rod_functions
+from softnlp.batch.newton import Batch, BatchSolver, Shot
+from softnlp.batch.plan import Plan
+from softnlp.model.quantities import LOADS
+from softnlp.native.kernels import Kernels
+from softnlp.native.shooting import shooting
+from softnlp.statics.loadcase import rod_functions, unpack_section
+from softnlp.statics.reduced import STATE, base_state, reduced_rod
+from softnlp.statics.stretches import Stretches, stretch_maps
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -57,7 +58,7 @@ class PoseLane:
         self._batch = BatchSolver(functions, self._kernels, plan.numerics.accuracy / 3, plan.numerics.intervals)
         self._stretches = Stretches(functions, self._kernels, shared=not set(plan.varied) - {"pressure", *LOADS})
         self._force, self._moment = (entries(plan, name) for name in ("tip_force", "tip_moment"))
-        self._diameter = entries(plan, "robot.outer_diameter").start
+        self._outline = {name: entries(plan, name) for name in plan.model.numbers}
 
     def sections(self, columns: Array) -> tuple[Sections, NDArray[np.intp]]:
         """Return the sections of the poses whose stretch is found, and their numbers; columns of every quantity, SI."""
@@ -73,8 +74,12 @@ class PoseLane:
 
     def outer_radius(self, columns: Array, sections: Sections) -> Array:
         """Return the scaled outer radii at the stretch, (S2)."""
-        radius: Array = columns[self._diameter] / (2 * np.sqrt(sections.stretch) * sections.length_unit)
-        return radius
+        numbers = {
+            name: columns[rows] if rows.stop - rows.start > 1 else columns[rows.start]
+            for name, rows in self._outline.items()
+        }
+        radii = self._plan.model.section.outline(numbers, sections.stretch)
+        return np.asarray(radii.outer / sections.length_unit)
 
     def self_intersecting(self, poses: Poses, columns: Array) -> Mask:
         """Return which solved poses pass through themselves; columns : of every pose asked."""
@@ -99,7 +104,8 @@ class PoseLane:
         sections, numbers = self.sections(columns)
         force, moment = self.loads(columns[:, numbers], sections)
         c = sections.constants
-        bend = c[11] * np.hypot(c[6] / c[2], c[7] / c[3])
+        rod = unpack_section(c)
+        bend = rod.length * np.hypot(rod.pressure_moment_x / rod.bending_x, rod.pressure_moment_y / rod.bending_y)
         shot = self._batch.solve(Batch(np.vstack([c, force, moment]), bend), features[numbers])
         residual = np.maximum(shot.residual, np.abs(sections.imbalance))
         numerics = self._plan.numerics

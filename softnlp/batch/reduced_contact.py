@@ -1,7 +1,7 @@
 """The rod against a wall with its base force and moment as unknowns: single shooting over many poses at once.
 
-As in `softnlp.batch.reduced` the force is known up to a constant, N(s) = N_0 - f_e s; with a wall and
-chamber reactions N_0 is unknown beside M(0) and the forces y of the tip conditions. A state is [p, R, M, chamber
+As in `softnlp.statics.reduced` the force is known up to a constant, N(s) = N_0 - f_e s; with a wall and
+chamber reactions N_0 is unknown beside M(0) and the forces y of the contact. A state is [p, R, M, chamber
 lengths]; data stacks the constants c of the load case and N_0.
 """
 
@@ -12,10 +12,9 @@ from typing import Any
 
 import casadi as ca
 
-from softnlp.batch.kernels import Step
-from softnlp.batch.reduced import MOMENT, STATE, advanced, checked, function
-from softnlp.model import rod
-from softnlp.statics.loadcase import RodFunctions, unpack_section
+from softnlp.native.kernels import Step
+from softnlp.statics.loadcase import RodFunctions, whole_weight
+from softnlp.statics.reduced import MOMENT, STATE, advanced, checked, function
 
 UNKNOWN = 6
 """Directions of a shooting: N_0, then M(0)."""
@@ -23,12 +22,12 @@ UNKNOWN = 6
 
 @dataclass(frozen=True, eq=False)
 class ReducedContact:
-    """Steps and maps for tip conditions with a wall; N chambers, ny forces of the conditions.
+    """Steps and maps for a contact at the tip; N chambers, ny forces of it.
 
     value : state (15 + N). directions : [state, its derivatives by N_0 and M(0) ((15 + N) x 6)]. check : [state, gap,
-    bending angle, backbone length, curvature]; gap and curvature are as in `softnlp.batch.reduced`, as is onward.
-    tip : [state, derivatives, data, tip force, tip moment, y, a, units] -> [residual (6 + ny), its derivatives by N_0,
-    M(0) and y, column by column]; a is what the conditions take (`softnlp.statics.loadcase.RodFunctions`).
+    bending angle, backbone length, curvature]; gap and curvature are as in `softnlp.statics.reduced`, as is onward.
+    tip : [state, derivatives, data, y, a, units] -> [residual (6 + ny), its derivatives by N_0,
+    M(0) and y, column by column]; a is what the loads take (`softnlp.statics.loadcase.RodFunctions`).
     arc : [quantities, stretch] -> the unloaded state.
     """
 
@@ -41,13 +40,12 @@ class ReducedContact:
 
 
 def reduced_contact(functions: RodFunctions) -> ReducedContact:
-    """Build the steps and maps from the rod functions of tip conditions with a wall."""
-    nc, N, ny = functions.field.size1_in(1), functions.model.robot.chambers, functions.tip_unknowns
+    """Build the steps and maps from the rod functions with a contact at the tip."""
+    nc, N, ny = functions.field.size1_in(1), functions.model.chambers, functions.tip_unknowns
     size = STATE + N
     data, s, h = ca.SX.sym("data", nc + 3), ca.SX.sym("s"), ca.SX.sym("h")
     c, N_0 = data[:nc], data[nc:]
-    section = unpack_section(c)
-    weight = c[len(rod.RodSection._fields)] * ca.vertcat(section.load_x, section.load_y, section.load_z)
+    weight = whole_weight(c)
 
     def full(state: Any, force: Any, at: Any) -> Any:
         """Return [p, R, N, M, lengths] with the force in closed form."""
@@ -60,10 +58,9 @@ def reduced_contact(functions: RodFunctions) -> ReducedContact:
     moved = ca.jtimes(rates, ca.vertcat(state, N_0), ca.vertcat(V, along_force))
     value = Step(function("rates", [state, data, s], rates))
 
-    a, y, units = ca.SX.sym("a", functions.tip.size1_in(5)), ca.SX.sym("y", ny), ca.SX.sym("units", 2)
-    force, moment = ca.SX.sym("force", 3), ca.SX.sym("moment", 3)
+    a, y, units = ca.SX.sym("a", functions.tip.size1_in(3)), ca.SX.sym("y", ny), ca.SX.sym("units", 2)
     at_tip = full(state, N_0, 1)
-    residual = functions.tip(at_tip, c, force, moment, y, a, units)
+    residual = functions.tip(at_tip, c, y, a, units)
     slopes = ca.jtimes(residual, ca.vertcat(state, N_0), ca.vertcat(V, along_force))
     judged = ca.vertcat(residual, ca.vec(slopes), ca.vec(ca.densify(ca.jacobian(residual, y))))
 
@@ -74,6 +71,6 @@ def reduced_contact(functions: RodFunctions) -> ReducedContact:
         directions=Step(function("rates", [ca.vertcat(state, ca.vec(V)), data, s], ca.vertcat(rates, ca.vec(moved)))),
         check=checked(functions, lambda state, at: full(state, N_0, at), state, rates, [data, s, h], N),
         onward=function("onward", [ca.vertcat(state, data, s, h)], advanced(value, state, data, s, h)),
-        tip=function("tip", [ca.vertcat(state, ca.vec(V), data, force, moment, y, a, units)], judged),
+        tip=function("tip", [ca.vertcat(state, ca.vec(V), data, y, a, units)], judged),
         arc=function("arc", [ca.vertcat(column, stretch)], arc),
     )

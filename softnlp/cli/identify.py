@@ -70,6 +70,8 @@ def _tensile(asked: Scenario, folder: Path | None, json: bool, report: Path | No
         figure = partial(tensile_figure, fit, task.name, task.before)
         write_results(to, asked, {"identified.json": document, **tables}, {"figure": figure})
 
+    for problem in fit.problems:  # first: what follows of such a fit means nothing
+        complain(f"{asked.path}: [tensile] {problem}")
     show(folder, json, write, lambda: document, lambda: _say_tensile(task, fit))
     if report is not None:
         from softnlp.figures import tensile_figure
@@ -78,15 +80,12 @@ def _tensile(asked: Scenario, folder: Path | None, json: bool, report: Path | No
         best = fit.best.material if fit.best is not None else None
         beside = [] if best is None else [library_section(best)]
         write_report(report, asked, document, figures, beside, quiet=json)
-    for problem in fit.problems:
-        complain(f"{asked.path.name}: [tensile] {problem}")
     return SOME_UNSOLVED if fit.problems else SOLVED
 
 
 def _say_tensile(task: TensileTask, fit: TensileFit) -> None:
     """Print the constants of every law."""
-    low, high = next(iter(fit.fits.values())).fitted_stretch
-    say(f"{task.name}: {task.stretch.size} points, stretch {low:.4g} to {high:.4g}{task.left_out}")
+    say(f"{task.name}: {task.about}{task.left_out}")
     if task.before is not None:
         from softnlp.studies.tensile import tensile_misfit
 
@@ -144,7 +143,7 @@ def _robots(asked: Scenario, folder: Path | None, json: bool, report: Path | Non
         figures = {"Measured and model": partial(identified_figure, found, asked.title)} if solved else {}
         write_report(report, asked, document, figures, [library_section(found.material)], quiet=json)
     for problem in found.problems:
-        complain(f"{asked.path.name}: [measurements] {problem}")
+        complain(f"{asked.path}: [measurements] {problem}")
     return SOLVED if solved and not found.problems else SOME_UNSOLVED
 
 
@@ -182,11 +181,13 @@ def _say_robots(asked: Scenario, found: Identified) -> None:
         rows.append([key, *(f"{v:.6g}" for v in values), found.notes[name]])
     say_rows(["constant", "value", "standard_error", "start", "note"], rows)
     before, after = found.errors(False), found.errors()
+    misfits = ("rmse_before", "rmse_after", "mape_before_percent", "mape_after_percent")
     say_rows(
-        ["observable", "numbers", "rmse_before", "rmse_after", "mape_before_percent", "mape_after_percent", "sigma"],
+        ["observable", "unit", "numbers", *misfits, "sigma"],
         [
             [
                 OUTPUTS[key].key,
+                str(OUTPUTS[key].unit),
                 str(after[key].count),
                 *(f"{m[key].rmse / OUTPUTS[key].scale:.4g}" for m in (before, after)),
                 *(f"{m[key].mape:.3g}" for m in (before, after)),

@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softnlp.base.errors import InputError
+from softnlp.base.errors import InputError, reworded
 from softnlp.base.processes import processors
 from softnlp.base.units import MILLIMETRE
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, interrupt_asked, say
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
     from softnlp.scenario.read import Scenario
     from softnlp.sweep.run import SweepProgress, SweepSummary
+
+_OPTIONS = {"resume=True": "--resume", "another folder leaves": "another --out leaves", "executor=": "--cluster"}
+"""What `softnlp.run_sweep` advises, as options."""
 
 
 def sweep(
@@ -101,6 +104,7 @@ def _run(
         executor: Executor | None = None if cluster is None else stack.enter_context(cluster_executor(cluster))
         bar = stack.enter_context(_Bar(asked.title))
         stop = stack.enter_context(interrupt_asked(bar.stopping))
+        stack.enter_context(reworded(_OPTIONS))
         summary = run_sweep(
             asked,
             folder,

@@ -27,6 +27,8 @@ GHOST_TINT, IDLE_TINT = 0.16, 0.40  # how much of its colour a faint body and a 
 MOST_GHOSTS = 3
 ELEVATION = 16.0  # of the viewer [deg]
 _ARROW = 0.32  # length of a load's arrow, of L_0
+_LOW, _ROOM = 5.0, 1.5  # how much less high than wide a text is; distance from others, of a moment's radius
+_ROUND, _CLEAR = 0.7, 0.65  # radius of a moment's arrow, of that length, and at least so much of the outer diameter
 _CANVAS = 5.6  # side of the square that the panel may draw in [inch]
 _BOX = (4.4, 3.7)  # largest width and height of the box of the axes, labels not included [inch]
 
@@ -186,7 +188,8 @@ def draw_cut_open(axes: Any, view: RunView, k: int, eye: Array, light: Array, *,
     arms = [(tip, tip + size * R[:, j]) for j in range(3)]
     draw_lines(axes, arms, 1.2, colors=GREY, zorder=6, label="tip frame")
     for (_, end), name in zip(arms, "xyz", strict=True):
-        axes.text(*(tip + 1.35 * (end - tip)), name, size=SMALL, color=GREY, ha="center", va="center", zorder=7)
+        look: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 7, "path_effects": _halo()}
+        axes.text(*(tip + 1.35 * (end - tip)), name, size=SMALL, color=INK, **look)
     return [skin.reshape(-1, 3), np.array([tip + 1.4 * size * R[:, j] for j in range(3)])]
 
 
@@ -210,8 +213,15 @@ def direction(azimuth: float, elevation: float) -> Array:
     return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
 
 
+def _halo() -> list[Any]:
+    """Return what keeps letters apart from what is behind them."""
+    from matplotlib.patheffects import withStroke
+
+    return [withStroke(linewidth=2.5, foreground="white")]
+
+
 def draw_loads(axes: Any, view: RunView, tip: Array, reach: Array, camera: Camera) -> list[Array]:
-    """Draw tip force, tip moment and gravity as arrows of one length with their size beside; return their ends [mm].
+    """Draw tip force and gravity as arrows of one length, a tip moment as one bent round its axis; return ends [mm].
 
     Gravity stands to the left of everything drawn so far, `reach`.
     """
@@ -222,16 +232,16 @@ def draw_loads(axes: Any, view: RunView, tip: Array, reach: Array, camera: Camer
     )
     height = (1.0 if gravity[2] <= 0 else 1 - _ARROW) * view.robot.length / MILLIMETRE
     aside = (float((reach @ right).min()) - 0.3 * size) * right + np.array([0.0, 0.0, height])
-    arrows = [
-        (tip, force, f"F {np.linalg.norm(force):.3g} N", "tip force"),
-        (tip, moment, f"M {np.linalg.norm(moment) / NEWTON_MILLIMETRE:.3g} N mm", "tip moment"),
-        (aside, gravity, "g", "gravity"),
-    ]
+    arrows = [(tip, force, f"F {np.linalg.norm(force):.3g} N", "tip force"), (aside, gravity, "g", "gravity")]
     ends = []
     for start, vector, text, label in arrows:
         norm = float(np.linalg.norm(vector))
         if norm > 0:
             ends += draw_arrow(axes, start, size * vector / norm, text, label, camera)
+    if (turn := float(np.linalg.norm(moment))) > 0:
+        radius = max(_ROUND * size, _CLEAR * view.robot.outer_diameter / MILLIMETRE)
+        text = f"M {turn / NEWTON_MILLIMETRE:.3g} N mm"
+        ends += draw_turn(axes, tip, moment / turn, radius, text, "tip moment", camera)
     return ends
 
 
@@ -247,8 +257,6 @@ def draw_arrow(
     at_tail: bool = False,
 ) -> list[Array]:
     """Draw an arrow [mm], its head flat towards the viewer and its text beyond one end; return points it reaches."""
-    from matplotlib.patheffects import withStroke
-
     eye, right = camera.eye, camera.right
     size = float(np.linalg.norm(step))
     across = np.cross(step, eye)
@@ -259,9 +267,48 @@ def draw_arrow(
     sideways = float(step @ right) / size * (-1 if at_tail else 1)
     place, away = ("center", 0.22) if abs(sideways) < 0.4 else ("left" if sideways > 0 else "right", 0.05)
     end = start - away * step if at_tail else start + (1 + away) * step
-    halo = [withStroke(linewidth=2.5, foreground="white")]
-    axes.text(*end, text, size=TEXT, color=ink, zorder=8, ha=place, va="center", path_effects=halo, parse_math=True)
+    _write_load(axes, end, text, place, ink)
     return [start[None], end[None]]
+
+
+def draw_turn(
+    axes: Any, centre: Array, axis: Array, radius: float, text: str, label: str, camera: Camera
+) -> list[Array]:
+    """Draw an arrow bent round an axis [mm] by the right-hand rule, its text beside; return points that it reaches."""
+    level = camera.right - (camera.right @ axis) * axis
+    if np.linalg.norm(level) < 0.1:  # seen along its axis
+        level = np.cross(axis, camera.eye)
+    first = level / np.linalg.norm(level)
+    second = np.cross(axis, first)
+
+    def at(angle: Any, reach: Any = radius) -> Array:
+        along = np.multiply.outer(np.cos(angle) * reach, first) + np.multiply.outer(np.sin(angle) * reach, second)
+        return np.asarray(centre + along)
+
+    # The gap is on the right, where the text is if no other stands there: the head ends before it.
+    bend = at(np.radians(np.linspace(45, 335, 49)))
+    heads = [np.array([at(np.radians(305.0), radius * part), bend[-1]]) for part in (0.78, 1.22)]
+    draw_lines(axes, [bend, *heads], 1.6, colors=INK, zorder=6, label=label)
+    up = np.cross(camera.eye, camera.right)
+    others = [t.get_position_3d() for t in axes.texts if len(t.get_text()) > 1]  # not the letters of axes
+    written = np.array(others or [bend[0] + 9 * radius * up])
+
+    def crowded(angle: float) -> float:
+        """How near other texts are, which are wide and low."""
+        away = at(angle, 1.15 * radius) - written
+        return float(-np.min(np.abs(away @ camera.right) + _LOW * np.abs(away @ up)))
+
+    angle = min(np.radians([0.0, 180.0, 60.0, -60.0, 120.0, -120.0]), key=lambda a: max(crowded(a), -_ROOM * radius))
+    end = at(angle, 1.15 * radius)
+    to_right = bool(np.cos(angle) > 0)
+    _write_load(axes, end, text, "left" if to_right else "right", INK)
+    # with room for the text before the numbers of the axis
+    return [bend, (end + (1.4 if to_right else -1.4) * radius * camera.right)[None]]
+
+
+def _write_load(axes: Any, place: Array, text: str, side: str, ink: str) -> None:
+    look: dict[str, Any] = {"ha": side, "va": "center", "path_effects": _halo(), "parse_math": True}
+    axes.text(*place, text, size=TEXT, color=ink, zorder=8, **look)
 
 
 def frame(axes: Any, points: Array) -> None:

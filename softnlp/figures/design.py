@@ -44,7 +44,13 @@ def design_figure(done: Design) -> Figure:
         f"{pressure_words(task.pressure)}  ·  {len(done.feasible)} of {len(done.candidates)} feasible"
     )
     figure = new_figure(_WIDTH, height, done.title or "Design", subtitle)
-    _bars(figure.add_axes((0.21, 0.62 / height, 0.37, 1 - _HEAD / height)), done, shown)
+    few = done.best is not None and len(shown) <= _FEWEST // 2
+    lines = list(held_back(done, done.best)) if done.best is not None and few else []
+    beneath = 0.35 + _ROW * (len(lines) + 1) if lines else 0.0  # what stands below the bars [inch]
+    _bars(figure.add_axes((0.21, (0.62 + beneath) / height, 0.37, 1 - (_HEAD + beneath) / height)), done, shown)
+    for k, line in enumerate(["held back by", *lines] if lines else []):
+        bold = "normal" if k else "bold"
+        figure.text(0.03, (beneath - 0.2 - _ROW * k) / height, line, size=SMALL, color=INK, weight=bold)
     _scatter(figure.add_axes((0.66, (height - 3.0) / height, 0.32, 2.15 / height)), done)
     if done.best is not None:
         best = done.best
@@ -81,11 +87,7 @@ def _bars(axes: Axes, done: Design, shown: list[Candidate]) -> None:
     axes.set_yticks(rows, [f"{user_text(label(done, c), 32)}  {c.number}" for c in shown], size=SMALL)
     axes.tick_params(axis="y", length=0)
     axes.grid(False, axis="y")
-    axes.set_ylim(max(len(shown), _FEWEST) - 0.4, -0.6)
-    if done.best is not None and len(shown) <= _FEWEST // 2:
-        lines = ["held back by", *(words for words in held_back(done, done.best))]
-        for k, line in enumerate(lines if len(lines) > 1 else []):
-            axes.text(0.02, 0.42 - 0.05 * k, line, size=SMALL, color=INK, transform=axes.transAxes)
+    axes.set_ylim(max(len(shown), _FEWEST // 2) - 0.4, -0.6)
     if len(shown) < len(done.candidates):
         axes.set_title(f"the first {len(shown)} of {len(done.candidates)}", size=SMALL, color=GREY, loc="left")
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from softnlp.studies.identified import Identified
     from softnlp.studies.tensile import TensileFit
 
+_LEAST_PASCAL = 0.01  # of the axis of residuals, on which those of round-off are a line
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")  # one more than colours, so that pairs repeat late
 
 
@@ -32,7 +33,11 @@ def tensile_figure(fit: TensileFit, name: str, before: Any = None) -> Figure:
     left = figure.add_axes((0.07, 0.13, 0.5, 0.69))
     right = figure.add_axes((0.65, 0.13, 0.32, 0.69))
     plain(left, "stretch [-]", "engineering stress [kPa]")
-    plain(right, "stretch [-]", "law - data [kPa]")
+    largest = max(float(np.max(np.abs(f.stress(fit.stretch) - fit.stress))) for f in fit.fits.values())
+    unit, name_of_unit = (KILOPASCAL, "kPa") if largest >= 0.1 * KILOPASCAL else (1.0, "Pa")
+    plain(right, "stretch [-]", f"law - data [{name_of_unit}]")
+    room = max(1.08 * largest / unit, _LEAST_PASCAL)
+    right.set_ylim(-room, room)
     left.plot(
         fit.stretch, fit.stress / KILOPASCAL, "o", color=INK, markersize=3.5, markerfacecolor="none", label="data"
     )
@@ -56,7 +61,7 @@ def tensile_figure(fit: TensileFit, name: str, before: Any = None) -> Figure:
             *(f"{name} {note}" for name, note in f.notes.items() if note),  # on constants
         )
         left.plot(stretch, f.stress(stretch) / KILOPASCAL, label=", ".join(words), **look)
-        right.plot(fit.stretch[order], (f.stress(fit.stretch) - fit.stress)[order] / KILOPASCAL, **look)
+        right.plot(fit.stretch[order], (f.stress(fit.stretch) - fit.stress)[order] / unit, **look)
     right.axhline(0.0, color=GREY, linewidth=0.8, zorder=1)
     legend(left)
     return figure
@@ -93,7 +98,10 @@ def identified_figure(found: Identified, title: str) -> Figure:
         axes.plot([low, high], [low, high], color=PALE, linewidth=1.5, zorder=0)
         before, after = found.errors(False)[key], found.errors()[key]
         axes.set_title(
-            f"rmse {before.rmse / unit:.3g} before (grey), {after.rmse / unit:.3g} after", size=TEXT, color=INK
+            f"rmse {before.rmse / unit:.3g} {OUTPUTS[key].unit} before (grey), {after.rmse / unit:.3g} "
+            f"{OUTPUTS[key].unit} after",
+            size=TEXT,
+            color=INK,
         )
         if k == named:
             legend(axes)

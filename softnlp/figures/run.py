@@ -184,10 +184,10 @@ def _left(axes: Axes, x: Abscissa, targets: TargetView) -> None:
         (angle, ANGLE.unit, "direction", "^", colour(1)),
     ):
         if np.isfinite(values).any():
-            names.append(f"{name} [{unit}]")
+            names.append(f"{name} left [{unit}]")
             shown = np.maximum(values, _LEAST_LEFT)
             axes.plot(x.values, shown, shape, color=ink, markersize=3.5, label=f"{name} left")
-    plain(axes, x.label, f"left: {', '.join(names)}" if len(names) == 1 else f"left [{DISTANCE.unit}], [{ANGLE.unit}]")
+    plain(axes, x.label, f"{names[0]}" if len(names) == 1 else f"left [{DISTANCE.unit}] or [{ANGLE.unit}]")
     axes.set_yscale("log")
     everything = np.concatenate([distance, angle, [_LEAST_LEFT]])
     axes.set_ylim(_LEAST_LEFT / 3, max(1e-3, 5 * float(np.nanmax(everything))))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from itertools import permutations
-from math import cos, degrees, hypot, isfinite, pi, radians, sin, sqrt
+from math import cos, degrees, hypot, isfinite, pi, radians, sin
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from softnlp.base.errors import InputError
 from softnlp.base.units import MILLIMETRE
 from softnlp.figures.style import GREY, INK, SMALL, TEXT, WRONG, colour, in_own_style, ink_on, legend, new_figure
 from softnlp.model.robot import Robot, Violation, touching_stretch
+from softnlp.model.round_chambers import radii
 from softnlp.statics.step import SectionRadii
 
 if TYPE_CHECKING:
@@ -42,14 +43,7 @@ def stretched_radii(robot: Robot, stretch: float) -> SectionRadii:
     least = 1 - (r_ci0 / r_co) ** 2
     if not isfinite(stretch) or stretch <= least:
         raise InputError(f"expected a stretch above {least:.3g}, where the bores close, got {stretch:g}", key="stretch")
-    shrink = 1 / sqrt(stretch)
-    return SectionRadii(
-        outer=float(robot.outer_radius * shrink),
-        lumen=float(robot.lumen_radius * shrink),
-        chamber_circle=float(robot.chamber_circle_radius * shrink),
-        chamber=float(r_co),
-        bore=float(sqrt(r_co**2 - (r_co**2 - r_ci0**2) / stretch)),
-    )
+    return radii(robot, stretch)
 
 
 @in_own_style

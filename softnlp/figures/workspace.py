@@ -39,7 +39,7 @@ COLOUR, TILT = OUTPUTS["bending_angle"].key, OUTPUTS["tilt"]
 _MAP = "viridis"
 _LOGARITHMIC = ("residual", "discretisation_error")
 _ROUND_OFF = 1e-20
-_WIDTH, _HEIGHT = 11.0, 7.6
+_WIDTH, _LOWEST, _HIGHEST = 11.0, 6.0, 7.6  # of the figure, which is as high as its projections [inch]
 
 
 @in_own_style
@@ -73,13 +73,16 @@ def workspace_figure(workspace: Workspace, colour: str = COLOUR) -> Figure:
     if through := int(np.count_nonzero(workspace.self_intersecting == 1)):
         parts.append(f"{through:,} through themselves")
     parts += gravity_lines(workspace.gravity)
-    figure = new_figure(_WIDTH, _HEIGHT, workspace.title, "  ·  ".join(parts))
+    subtitle = "  ·  ".join(parts)
     if not len(tips):
+        figure = new_figure(_WIDTH, _LOWEST, workspace.title, subtitle)
         figure.text(0.5, 0.5, "No pose has a solution with this number", size=TEXT, color=WRONG, ha="center")
         return figure
     scale = _scale(column, numbers)
     size = 2 * workspace.robot.outer_radius / MILLIMETRE
     low, high = _limits(tips, size)
+    height, places, free = _places(high - low)
+    figure = new_figure(_WIDTH, height, workspace.title, subtitle)
     count = parameters(workspace)
     outlines = [outline(tips, view, count) for view in VIEWS]
 
@@ -87,11 +90,11 @@ def workspace_figure(workspace: Workspace, colour: str = COLOUR) -> Figure:
         figure, tips, numbers, scale, (low, high), outlines, size, hanging=is_hanging(workspace.gravity)
     )
     drawn = []
-    for view, place, found in zip(VIEWS, _places(high - low), outlines, strict=True):
+    for view, place, found in zip(VIEWS, places, outlines, strict=True):
         axes = view_axes(figure, place, view)
         drawn.append(_projection(axes, tips, numbers, scale, view, (low, high), found, size))
-    colour_bar(figure, (0.05, 0.862, 0.36, 0.018), (scale, _MAP), column_label(column))
-    _captions(figure, len(tips), drawn_3d, drawn, outlines)
+    colour_bar(figure, free, (scale, _MAP), column_label(column))
+    _captions(figure, free, len(tips), drawn_3d, drawn, outlines)
     return figure
 
 
@@ -129,7 +132,8 @@ def _cloud_panel(
 ) -> int:
     """Draw the cloud in 3-D with the outlines on the walls behind it; return how many poses are drawn."""
     low, high = limits
-    axes = space_axes(figure, (-0.025, 0.05, 0.56, 0.86), limits, zoom=0.96, hanging=hanging)
+    slender = high[2] - low[2] > _SLENDER * max((high - low)[:2])
+    axes = space_axes(figure, (-0.015, 0.045, 0.56, 0.88), limits, zoom=0.9 if slender else 1.04, hanging=hanging)
     floor, side = (high[2], high[0]) if hanging else (low[2], low[0])
     # the walls that the viewer sees behind the cloud, one for each projection
     for (first, second, sight, _), wall, found in zip(VIEWS, (floor, high[1], side), outlines, strict=True):
@@ -145,26 +149,36 @@ def _cloud_panel(
     return len(k)
 
 
+_SLENDER = 1.3  # height over width from which on the height bounds the picture in 3-D
 _BOUNDARY: dict[str, Any] = {"colors": INK, "width": 1.1}
 _HULL: dict[str, Any] = {"colors": GREY, "width": 0.9, "linestyles": (0, (4, 3))}
 
-# Places of the projections: xz above xy, which share x; yz beside xz, which share z.
-_LEFT, _BOTTOM, _RIGHT, _TOP, _GAP = 0.605, 0.075, 0.985, 0.885, 0.055
+# Places of the projections: xz above xy, which share x; yz beside xz, which share z; beside xy what explains them.
+_LEFT, _RIGHT, _GAP = 0.605, 0.985, 0.055
+_ABOVE, _BETWEEN, _BELOW = 0.87, 0.63, 0.57  # heights of what is not a projection [inch]
+
+Place = tuple[float, float, float, float]
 
 
-def _places(spans: Array) -> list[tuple[float, float, float, float]]:
-    """Return where the projections are: first-angle views that share x and z, all at one scale."""
-    width, height = (_RIGHT - _LEFT - _GAP) * _WIDTH, (_TOP - _BOTTOM - 1.5 * _GAP) * _HEIGHT
-    inch = min(width / (spans[0] + spans[1]), height / (spans[2] + spans[1]))  # for a mm
+def _places(spans: Array) -> tuple[float, list[Place], Place]:
+    """Return the height of the figure, where the projections are, and where its colours are explained.
+
+    They are first-angle views that share x and z, all at one scale.
+    """
+    width, room = (_RIGHT - _LEFT - _GAP) * _WIDTH, _HIGHEST - _ABOVE - _BETWEEN - _BELOW
+    inch = min(width / (spans[0] + spans[1]), room / (spans[2] + spans[1]))  # for a mm
     dx, dy, dz = spans * inch
-    left, top = _LEFT * _WIDTH, _TOP * _HEIGHT
-    gap_x, gap_y = _GAP * _WIDTH, 1.5 * _GAP * _HEIGHT
+    height = max(_LOWEST, float(_ABOVE + dz + _BETWEEN + dy + _BELOW))
+    left, top = _LEFT * _WIDTH, height - _ABOVE
+    gap_x, gap_y = _GAP * _WIDTH, _BETWEEN
     boxes = (
         (left, top - dz - gap_y - dy, dx, dy),
         (left, top - dz, dx, dz),
         (left + dx + gap_x, top - dz, dy, dz),
     )
-    return [(x / _WIDTH, y / _HEIGHT, w / _WIDTH, h / _HEIGHT) for x, y, w, h in boxes]
+    bar = (left + dx + gap_x, top - dz - gap_y - dy / 2, _RIGHT * _WIDTH - left - dx - gap_x, 0.14)
+    first, *others = ((x / _WIDTH, y / height, w / _WIDTH, h / height) for x, y, w, h in (bar, *boxes))
+    return height, others, first
 
 
 def _projection(
@@ -189,8 +203,7 @@ def _projection(
     else:
         axes.plot([-size / 2, size / 2], [0, 0], color=GREY, linewidth=2.0, label="base")
     chosen = seen(tips, view)
-    box = axes.get_position()
-    area = box.width * _WIDTH * box.height * _HEIGHT * 72**2
+    area = float(np.prod(axes.bbox.size)) * (72 / axes.figure.dpi) ** 2
     draw_cloud(axes, tips[chosen][:, [first, second]], numbers[chosen], scale, _MAP, area, "poses")
     for words, edges, style in (("boundary", found.boundary, _BOUNDARY), ("convex hull", found.hull, _HULL)):
         look = {"linewidths" if key == "width" else key: value for key, value in style.items()}
@@ -208,15 +221,17 @@ def column_label(column: Column) -> str:
     return f"{words.replace('_', ' ')} [{unit}]"
 
 
-def _captions(figure: Figure, poses: int, drawn_3d: int, drawn: list[int], outlines: list[Outline]) -> None:
-    """Explain the lines, and say how many poses are drawn where not all are."""
+def _captions(
+    figure: Figure, free: Place, poses: int, drawn_3d: int, drawn: list[int], outlines: list[Outline]
+) -> None:
+    """Explain the lines above the colours, and say how many poses are drawn where not all are."""
     lines = [
         mark(words, style["colors"], line=style.get("linestyles", "-"), linewidth=style["width"])
         for name, style, words in (("boundary", _BOUNDARY, "boundary"), ("hull", _HULL, "convex hull"))
         if any(len(getattr(found, name)) for found in outlines)
     ]
     if lines:
-        legend(figure, lines, loc="upper right", bbox_to_anchor=(0.99, 0.945), ncols=2)
+        legend(figure, lines, loc="lower left", bbox_to_anchor=(free[0] - 0.01, free[1] + 1.6 * free[3]))
     least, most = min(drawn), max(drawn)
     flat = f"{least:,}" if least == most else f"{least:,} to {most:,}"
     if drawn_3d == poses == least:

@@ -3,27 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from softnlp.base.errors import InputError
+from softnlp.base.errors import InputError, nearest
 from softnlp.base.quantity import Quantity, quantity
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.model.load import Load
 from softnlp.model.materials import Material
-from softnlp.model.quantities import Model, contact_quantities, quantities
-from softnlp.model.robot import LOWERABLE_RULES, Robot, check
+from softnlp.model.quantities import LOADS, Model, quantities
+from softnlp.model.robot import Robot
+from softnlp.model.round_chambers import RoundChambers
+from softnlp.model.section import SectionType
+from softnlp.model.tip import TipContact
 
 T = TypeVar("T")
+Array = NDArray[np.float64]
 
-_OWN = ("robot.", "material.")
+_SHARED = ("stiffening.", "corrections.")
 
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """A length of body with one section and one silicone.
+    """A length of body with one kind of section and one silicone.
 
     Attributes
     ----------
@@ -31,10 +37,33 @@ class Segment:
         Of the library, or one of your own; its length is the segment's.
     material
         Of all of it.
+    section
+        The kind of section: the paper's, or one of your own, made of robot, material, coefficients and conventions;
+        such a one may take anything with a `length` for a robot.
+    along
+        What varies along it, by key as in "robot.outer_diameter", in place of what the robot says: a pair, at base and
+        tip, with a linear change, or {"s": [0, ..., 1], "value": [...]}, linear between these fractions of the length
+        [SI].
     """
 
     robot: Robot
     material: Material
+    section: SectionType = RoundChambers
+    along: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def tables(self) -> dict[str, tuple[Array, Array]]:
+        """What varies along it by key: fractions of the length, from 0 to 1, and as many values (knots,) [SI]."""
+        found = {}
+        for key, given in self.along.items():
+            table = given if isinstance(given, Mapping) else {"s": (0.0, 1.0), "value": given}
+            s, values = (np.asarray(table.get(name, ()), float) for name in ("s", "value"))
+            if s.ndim != 1 or s.size < 2 or s[0] != 0 or s[-1] != 1 or np.any(np.diff(s) <= 0):
+                raise InputError(f"'{key}': expected s from 0 to 1, rising", key="along")
+            if values.shape != s.shape or not np.all(np.isfinite(values)):
+                raise InputError(f"'{key}': expected {s.size} numbers", key="along")
+            found[key] = s, values
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +82,9 @@ class Body:
     Raises
     ------
     InputError
-        Without a segment.
+        Without a segment, and for what cannot vary along one.
     RobotError
-        For a robot that is geometrically impossible.
+        For a robot that is geometrically impossible, at any knot.
     """
 
     segments: Sequence[Segment]
@@ -66,39 +95,93 @@ class Body:
     def __post_init__(self) -> None:
         if not self.segments:
             raise InputError("expected at least one segment", key="segments")
-        for segment in self.segments:
-            check(segment.robot, allow=LOWERABLE_RULES)
+        for k, (segment, model) in enumerate(zip(self.segments, self.models, strict=True)):
+            model.section.check()
+            known = [q.name for q in model.section.quantities() if q.size == 1 and _is_own(q.name)]
+            known.remove("robot.length")
+            for key in segment.tables:
+                if key not in known:
+                    raise InputError(f"'{key}' cannot vary along a segment{nearest(key, known)}", key="along")
+            for s in self.knots(k) if segment.along else ():
+                there = {key: float(np.interp(s, *table)) for key, table in segment.tables.items()}
+                model.section.check({**model.numbers, **there})
 
     @cached_property
     def models(self) -> tuple[Model, ...]:
         """One model a segment."""
-        return tuple(Model(s.robot, s.material, self.coefficients, self.conventions) for s in self.segments)
+        return tuple(Model(s.robot, s.material, self.coefficients, self.conventions, s.section) for s in self.segments)
 
     @property
     def sets(self) -> int:
         """The number of chamber sets of all segments."""
-        return sum(s.robot.chamber_sets for s in self.segments)
+        return sum(model.sets for model in self.models)
+
+    @property
+    def varying(self) -> set[int]:
+        """The segments whose section varies along them, from 0."""
+        return {k for k, segment in enumerate(self.segments) if segment.along}
 
     @cached_property
     def quantities(self) -> dict[str, Quantity]:
         """Every quantity by its key: those of `softnlp.model.quantities.quantities`.
 
         "pressure" has one entry a set, counted through all segments from the base. With several segments a dimension
-        is "segment.2.robot.length" and a constant "segment.2.material.C10".
+        is "segment.2.robot.length" and a constant "segment.2.material.C10". What varies along a segment has one entry a
+        knot.
         """
-        declared = {key: q for key, q in quantities(self.models[0]).items() if not key.startswith(_OWN)}
-        declared["pressure"] = quantity("pressure", "Pa", np.zeros(self.sets), scale=1e5, lower=0.0)
-        for k, model in enumerate(self.models):
-            own = quantities(model).items()
-            declared |= {self._key(k, key): q for key, q in own if key.startswith(_OWN)}
+        pressure = quantity("pressure", "Pa", np.zeros(self.sets), scale=1e5, lower=0.0)
+        declared = {"pressure": pressure}
+        for own in (False, True):  # what segments share comes first
+            for k, model in enumerate(self.models):
+                for key, q in quantities(model).items():
+                    if key != "pressure" and _is_own(key) is own and self._key(k, key) not in declared:
+                        nominal = self.segments[k].tables[key][1] if key in self.segments[k].along else q.nominal
+                        declared[self._key(k, key)] = replace(q, nominal=nominal)
         return {key: self._named(key, q) for key, q in declared.items()}
 
-    @cached_property
+    @property
     def contact_quantities(self) -> dict[str, Quantity]:
         """The quantities of a wall at the tip by key, see `softnlp.model.tip.Given`."""
-        return {key: self._named(key, q) for key, q in contact_quantities(self.models[-1]).items()}
+        return self.quantities_of([TipContact("free")])
 
-    def of_segment(self, k: int, given: Mapping[str, T]) -> dict[str, T]:
+    def quantities_of(self, loads: Sequence[Load]) -> dict[str, Quantity]:
+        """Return the quantities of loads by key, the same ones each time.
+
+        Parameters
+        ----------
+        loads
+            On this body.
+
+        Returns
+        -------
+        dict
+            As `quantities`.
+        """
+        found = {}
+        for q in [q for load in loads for q in load.quantities(self.models[-1])]:
+            found[q.name] = self._of_loads.setdefault(q.name, self._named(q.name, q))
+        return found
+
+    @cached_property
+    def _of_loads(self) -> dict[str, Quantity]:
+        return {}
+
+    def knots(self, k: int) -> list[float]:
+        """Return the fractions of a segment's length between which its section is linear in s.
+
+        Parameters
+        ----------
+        k
+            The segment, from 0.
+
+        Returns
+        -------
+        list
+            From 0 to 1 (knots,) [1].
+        """
+        return sorted({0.0, 1.0, *(float(s) for at, _ in self.segments[k].tables.values() for s in at)})
+
+    def of_segment(self, k: int, given: Mapping[str, T], s: float = 0.0) -> dict[str, T]:
         """Return what is given by the body's keys as that of one segment alone, in the order that its model has.
 
         Parameters
@@ -107,22 +190,34 @@ class Body:
             The segment, from 0.
         given
             Symbols, or values, by the body's keys.
+        s
+            Where along it, from 0 to 1 [1].
 
         Returns
         -------
         dict
             By the keys of `softnlp.model.quantities.quantities`.
         """
-        first = sum(s.robot.chamber_sets for s in self.segments[:k])
         found = {key: given[self._key(k, key)] for key in quantities(self.models[k])}
+        for key, (at, _) in self.segments[k].tables.items():
+            value: Any = found[key]
+            j = min(int(np.searchsorted(at, s, side="right")), at.size - 1)
+            t = (s - at[j - 1]) / (at[j] - at[j - 1])
+            found[key] = value[j - 1 : j] * (1 - t) + value[j : j + 1] * t
+        first = sum(model.sets for model in self.models[:k])
         pressure: Any = given["pressure"]
-        found["pressure"] = pressure[first : first + self.segments[k].robot.chamber_sets]
+        found["pressure"] = pressure[first : first + self.models[k].sets]
         return found
 
     def _key(self, k: int, key: str) -> str:
-        return f"segment.{k + 1}.{key}" if len(self.segments) > 1 and key.startswith(_OWN) else key
+        return f"segment.{k + 1}.{key}" if len(self.segments) > 1 and _is_own(key) else key
 
     def _named(self, key: str, q: Quantity) -> Quantity:
         """Return a quantity with a symbol of this body alone."""
         name = f"{self.name}.{key}" if self.name else key
         return quantity(name, q.unit, q.nominal, scale=q.scale, lower=q.lower, upper=q.upper)
+
+
+def _is_own(key: str) -> bool:
+    """Whether a key is a segment's own, where the others are those of the whole body."""
+    return key not in ("pressure", *LOADS) and not key.startswith(_SHARED)

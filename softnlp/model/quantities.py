@@ -2,126 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from softnlp.base.quantity import Quantity, quantity
-from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
-from softnlp.model.materials import Material
-from softnlp.model.robot import DIMENSIONS, Robot
-from softnlp.model.section import deform
+from softnlp.model.dead_tip import DeadTip
+from softnlp.model.model import Model as Model
+from softnlp.model.round_chambers import with_numbers
+from softnlp.model.tip import TipContact
+from softnlp.model.weight import Weight
 
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Model:
-    """A robot, its silicone, and how the equations are read. Numbers here are the nominal values of quantities."""
-
-    robot: Robot
-    material: Material
-    coefficients: Coefficients = Coefficients()
-    conventions: Conventions = REPRODUCTION
-
-    @property
-    def kind(self) -> Hashable:
-        """What the compiled equations depend on; models of one kind differ by the values of quantities only."""
-        robot, law = self.robot, self.material.law
-        chambers = (robot.chamber_sets, robot.chambers_per_set)
-        return chambers, (law.name, law.constants, law.formula, law.modulus), self.conventions
-
-    def check_kind(self, other: Model) -> None:
-        """Raise `ValueError` for a model of another kind, whose numbers do not fit the compiled equations."""
-        if self.kind != other.kind:
-            raise ValueError("a model with other chambers, law or conventions needs a solver of its own")
-
-
-_SIZES = tuple(d.field for d in DIMENSIONS if d.scale is not None)
-_COEFFICIENT_NAMES = {
-    "elongation": "stiffening.elongation",
-    "bending": "stiffening.bending",
-    "area": "corrections.area",
-    "inertia": "corrections.inertia",
-    "bore_fraction": "corrections.bore_fraction",
-}
+LOADS = ("tip_force", "tip_moment", "gravity")
+"""Keys of the loads that every model has."""
 
 
 def quantities(model: Model) -> dict[str, Quantity]:
     """Return every quantity of the model by name, with the model's values as nominal ones.
 
-    "pressure" (one entry a set, Pa), "tip_force" (N), "tip_moment" (N m), "gravity" (m/s^2), "robot.<dimension>" (m
-    or rad), "material.<constant>", "material.density", "stiffening.elongation", "stiffening.bending",
-    "corrections.area", "corrections.inertia", "corrections.bore_fraction".
+    "pressure" (one entry a set, Pa), "tip_force" (N), "tip_moment" (N m), "gravity" (m/s^2), then those of the section,
+    see `softnlp.model.round_chambers.RoundChambers.quantities`.
     """
-    robot, material = model.robot, model.material
-    declared = [
-        quantity("pressure", "Pa", np.zeros(robot.chamber_sets), scale=1e5, lower=0.0),
-        quantity("tip_force", "N", np.zeros(3)),
-        quantity("tip_moment", "N m", np.zeros(3), scale=1e-2),
-        quantity("gravity", "m/s^2", np.zeros(3), scale=10.0),
-    ]
-    for name in _SIZES:
-        value = float(getattr(robot, name))
-        unit = "rad" if name == "chamber_angle" else "m"
-        declared.append(quantity(f"robot.{name}", unit, value, scale=max(abs(value), 1e-4), lower=0.0))
-    for constant in material.law.constants:
-        value = float(material.constants[constant.name])
-        unit = "Pa" if constant.unit == "MPa" else constant.unit
-        declared.append(quantity(f"material.{constant.name}", unit, value, scale=abs(value) or 1.0))
-    declared.append(quantity("material.density", "kg/m^3", float(material.density), scale=1e3, lower=0.0))
-    for field_name, name in _COEFFICIENT_NAMES.items():
-        declared.append(quantity(name, "1", float(getattr(model.coefficients, field_name)), lower=0.0))
-    return {q.name: q for q in declared}
+    pressure = quantity("pressure", "Pa", np.zeros(model.sets), scale=1e5, lower=0.0)
+    loads = [*DeadTip().quantities(model), *Weight().quantities(model)]
+    return {q.name: q for q in (pressure, *loads, *model.section.quantities())}
 
 
 def contact_quantities(model: Model) -> dict[str, Quantity]:
     """Return the quantities of a wall and a closure by name, "contact." and a field of `softnlp.model.tip.Given`."""
-    N = model.robot.chambers
-    L_0 = float(model.robot.length)
-    declared = [
-        quantity("contact.wall_point", "m", np.zeros(3), scale=L_0),
-        quantity("contact.wall_normal", "1", np.array([1.0, 0.0, 0.0])),
-        quantity("contact.tip_cap", "m", 0.0, scale=L_0, lower=0.0),
-        quantity("contact.chamber_reaction", "1", float(model.coefficients.chamber_reaction), lower=0.0),
-        quantity("contact.free_lengths", "m", np.full(N, L_0), scale=L_0, lower=0.0),
-        quantity("contact.pressed", "1", np.zeros(N)),
-        quantity("contact.force_error", "N", np.zeros(3)),
-        quantity("contact.moment_error", "N m", np.zeros(3), scale=1e-2),
-        quantity("contact.gap_error", "m", 0.0, scale=L_0),
-    ]
-    return {q.name: q for q in declared}
+    return {q.name: q for q in TipContact("free").quantities(model)}
 
 
 def with_symbols(model: Model, values: Mapping[str, Any]) -> Model:
     """Return the model with the named quantities (see `quantities`) in place of its numbers."""
-    robot = replace(model.robot, **{name: values[f"robot.{name}"] for name in _SIZES})
-    constants = {c.name: values[f"material.{c.name}"] for c in model.material.law.constants}
-    material = replace(model.material, constants=constants, density=values["material.density"])
-    coefficients = replace(model.coefficients, **{k: values[name] for k, name in _COEFFICIENT_NAMES.items()})
-    return Model(robot, material, coefficients, model.conventions)
+    numbers = with_numbers(model.robot, model.material, model.coefficients, values)
+    return Model(*numbers, model.conventions, model.section_type)
 
 
-def section_function(model: Model, build: Callable[[Model, Any, Any, Any], Sequence[Any]]) -> ca.Function:
-    """Compile `build(model, pressures, gravity, stretch)` for symbols in place of the model's numbers.
+def section_function(declared: Mapping[str, Quantity], build: Callable[[Any, Any], Sequence[Any]]) -> ca.Function:
+    """Compile `build(numbers, stretch)` for symbols in place of numbers, by the keys of what is declared.
 
-    Returns a function of (every quantity of `quantities(model)` in that order as one column, stretch) with the
-    expressions that `build` returns, made of scalar operations so that it costs one call in a larger graph.
+    Returns a function of (every quantity declared, in that order as one column, stretch) with the expressions that
+    `build` returns, made of scalar operations so that it costs one call in a larger graph.
     """
-    declared = quantities(model)
     symbols = {name: ca.SX.sym(name, q.size) for name, q in declared.items()}
     stretch = ca.SX.sym("stretch")
-    results = build(with_symbols(model, symbols), symbols["pressure"], symbols["gravity"], stretch)
-    return ca.Function("section", [ca.vertcat(*symbols.values()), stretch], list(results), {"cse": True})
-
-
-def force_unit(model: Model) -> Any:
-    """Return EI / L_0^2 [N], with EI the mean bending stiffness of the section without pressure."""
-    rest = deform(
-        model.robot, model.material, [0.0] * model.robot.chamber_sets, 1.0, model.coefficients, model.conventions
+    return ca.Function(
+        "section", [ca.vertcat(*symbols.values()), stretch], list(build(symbols, stretch)), {"cse": True}
     )
-    return (rest.bending_stiffness[0] + rest.bending_stiffness[1]) / 2 / model.robot.length**2
+
+
+def force_unit(model: Model, numbers: Mapping[str, Any] | None = None) -> Any:
+    """Return EI / L_0^2 [N], with EI the mean bending stiffness of the section without pressure.
+
+    numbers : of the section by key, symbols perhaps; None are the model's own.
+    """
+    own = model.numbers if numbers is None else numbers
+    rest = model.section.at(own, [0.0] * model.sets, 1.0)
+    return (rest.bending_stiffness[0] + rest.bending_stiffness[1]) / 2 / own["robot.length"] ** 2

@@ -9,12 +9,12 @@ the material law alone. Pure functions of numbers or symbols in any consistent s
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import casadi as ca
 
 from softnlp.model.gravity import gravity_named
-from softnlp.model.section import Section
+from softnlp.model.section import RodSection
 
 Vector = tuple[float, float, float]
 
@@ -52,49 +52,6 @@ class Loads:
         return any(bool(value) for load in (self.tip_force, self.tip_moment, self.gravity) for value in load)
 
 
-class RodSection(NamedTuple):
-    """What the rod asks of its section at s, in one consistent system of units.
-
-    shear, axial, bending_x, bending_y, torsion : GA, EA, EI_x, EI_y, GJ. pressure_force : F_P.
-    pressure_moment_x, pressure_moment_y : sum d_i x P_i A_c e3. load_x, load_y, load_z : f_e, force per length, world
-    frame.
-    """
-
-    shear: Any
-    axial: Any
-    bending_x: Any
-    bending_y: Any
-    torsion: Any
-    pressure_force: Any
-    pressure_moment_x: Any
-    pressure_moment_y: Any
-    load_x: Any
-    load_y: Any
-    load_z: Any
-
-
-def rod_section(section: Section, density: Any, gravity: Any, length_unit: Any, force_unit: Any) -> RodSection:
-    """Return the section as the rod sees it, with lengths and forces divided by the given units [m, N].
-
-    The weight is f_e = rho A g per length of the stretched rod.
-    """
-    EI_x, EI_y = section.bending_stiffness
-    M_x, M_y = section.pressure_moment
-    moment_unit = force_unit * length_unit
-    f_e = [density * section.area * gravity[k] * length_unit / force_unit for k in range(3)]
-    return RodSection(
-        section.shear_stiffness / force_unit,
-        section.axial_stiffness / force_unit,
-        EI_x / (moment_unit * length_unit),
-        EI_y / (moment_unit * length_unit),
-        section.torsional_stiffness / (moment_unit * length_unit),
-        section.pressure_force / force_unit,
-        M_x / moment_unit,
-        M_y / moment_unit,
-        *f_e,
-    )
-
-
 def hat(a: Any) -> Any:
     """Return the 3x3 matrix with hat(a) b = a x b."""
     return ca.vertcat(
@@ -109,37 +66,29 @@ def unpack(x: Any) -> tuple[Any, Any, Any, Any]:
     return x[0:3], ca.reshape(x[3:12], 3, 3), x[12:15], x[15:18]
 
 
-def strains(x: Any, section: RodSection) -> tuple[Any, Any]:
-    """Return the linear strain v and the curvature u in the body frame, Eq. (5): R^T M + M_P = K u."""
+def in_body(x: Any) -> tuple[Any, Any]:
+    """Return R^T N and R^T M."""
     _, R, N, M = unpack(x)
-    N_b, m_b = R.T @ N, R.T @ M + pressure_moment(section)
-    v = ca.vertcat(N_b[0] / section.shear, N_b[1] / section.shear, N_b[2] / section.axial + 1)
-    u = ca.vertcat(m_b[0] / section.bending_x, m_b[1] / section.bending_y, m_b[2] / section.torsion)
-    return v, u
-
-
-def pressure_moment(section: RodSection) -> Any:
-    """Return M_P, the sum of d_i x P_i A_c e3 in the body frame."""
-    return ca.vertcat(section.pressure_moment_x, section.pressure_moment_y, 0)
+    return R.T @ N, R.T @ M
 
 
 def wall_resultants(x: Any, section: RodSection) -> tuple[Any, Any]:
     """Return the paper's n and m, force and moment of the wall alone, world frame."""
     _, R, N, M = unpack(x)
-    return N + section.pressure_force * R[:, 2], M + R @ pressure_moment(section)
+    M_P = ca.vertcat(section.pressure_moment_x, section.pressure_moment_y, 0)
+    return N + section.pressure_force * R[:, 2], M + R @ M_P
 
 
-def field(x: Any, section: RodSection) -> Any:
+def field(x: Any, v: Any, u: Any, force: Any, moment: Any) -> Any:
     """Return dx/ds, Eqs. (2), (8), (13), for the stretched arc length s in 0..L.
 
+    v, u : the strains of the section there. force, moment : f_e and l_e of all loads, (3,) per length, world frame.
     The pressure term of the paper's moment balance, sum P_i A_c [(v + u x d_i) x e3 + d_i x (u x e3)], is by the Jacobi
-    identity F_P v x e3 + u x M_P, which is what N and M take out of n and m: N' = -f_e, M' = -p' x N.
+    identity F_P v x e3 + u x M_P, which is what N and M take out of n and m: N' = -f_e, M' = -p' x N - l_e.
     """
     _, R, N, _ = unpack(x)
-    v, u = strains(x, section)
-    f_e = ca.vertcat(section.load_x, section.load_y, section.load_z)
     dp = R @ v
-    return ca.vertcat(dp, ca.reshape(R @ hat(u), 9, 1), -f_e, -ca.cross(dp, N))
+    return ca.vertcat(dp, ca.reshape(R @ hat(u), 9, 1), -force, -ca.cross(dp, N) - moment)
 
 
 def base_balance(x: Any) -> Any:
@@ -154,13 +103,11 @@ def tip_balance(x: Any, force: Any, moment: Any) -> Any:
     return ca.vertcat(N - force, M - moment)
 
 
-def arc_state(s: Any, section: RodSection) -> Any:
-    """Return the state at s of the rod without gravity or tip load: the circular arc of constant u, with v = e3.
+def arc_state(s: Any, u_x: Any, u_y: Any) -> Any:
+    """Return the state at s of the rod without gravity or tip load: the circular arc of this curvature, with v = e3.
 
     Exact for `field` with no weight; written without division by the curvature, so that zero pressure is straight.
     """
-    u_x = section.pressure_moment_x / section.bending_x
-    u_y = section.pressure_moment_y / section.bending_y
     angle2 = (u_x**2 + u_y**2) * s**2
     small = angle2 < 1e-8
     safe2 = ca.if_else(small, 1.0, angle2)

@@ -1,168 +1,284 @@
-"""The stretched cross-section: Eqs. (10) to (12), (19) to (24) and (S2) to (S6) of the paper.
+"""What rod, cases and batches ask of a cross-section: its quantities, its state by name, its outline.
 
-Pure functions of numbers or CasADi symbols. The stretch is a given here: `stretch_balance` is the residual whose root
-it is.
+A section of another kind is a class that inherits from `Section`, in one file: `Segment(robot, material, section=...)`
+takes it. The paper's is `softnlp.model.round_chambers`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Protocol
 
 import casadi as ca
 
-from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.base.errors import InputError
+from softnlp.base.quantity import Quantity
+from softnlp.model.conventions import Coefficients, Conventions
 from softnlp.model.materials import Material
-from softnlp.model.robot import Robot
-
-
-@dataclass(frozen=True, eq=False)
-class Section:
-    """A section at one stretch and set of pressures. SI units, body frame (S1 is +x), N chambers.
-
-    stretch : lambda [-].
-    outer_radius, lumen_radius, chamber_circle_radius : r_r, r_i, r_cp [m], shrunk by lambda^-1/2 (S2).
-    chamber_radius, bore_radius : r_co, which the thread keeps, and r_ci of Eq. (22) [m].
-    centres : N pairs (d_ix, d_iy) [m].
-    area : A = A_0 / lambda [m^2]; reference_area : A_0 (S6).
-    pressure_area : the area A_c that pressure acts on in a chamber [m^2].
-    pressure_force : F_P = sum P_i A_c [N]; pressure_moment : (x, y) of sum d_i x P_i A_c e3 [N m].
-    tangent_modulus : E_t of Eq. (24) [Pa]; engineering_stress : sigma_e [Pa].
-    axial_stiffness : EA of Eq. (11) [N]; shear_stiffness : GA [N].
-    bending_stiffness : (EI_x, EI_y) of Eq. (12) [N m^2]; torsional_stiffness : GJ [N m^2].
-    """
-
-    stretch: Any
-    outer_radius: Any
-    lumen_radius: Any
-    chamber_circle_radius: Any
-    chamber_radius: Any
-    bore_radius: Any
-    centres: tuple[tuple[Any, Any], ...]
-    area: Any
-    reference_area: Any
-    pressure_area: Any
-    pressure_force: Any
-    pressure_moment: tuple[Any, Any]
-    engineering_stress: Any
-    tangent_modulus: Any
-    axial_stiffness: Any
-    shear_stiffness: Any
-    bending_stiffness: tuple[Any, Any]
-    torsional_stiffness: Any
-
-
-def reference_area(robot: Robot, coefficients: Coefficients, conventions: Conventions) -> Any:
-    """Return the silicone's area A_0 before pressure, (S6), times k_a [m^2]."""
-    N, t_f = robot.chambers, conventions.fibre_thickness
-    r_r, r_i, r_ci, r_co = robot.outer_radius, robot.lumen_radius, robot.bore_radius, robot.chamber_radius
-    fibre = N * ((r_co + t_f) ** 2 - r_co**2)
-    return coefficients.area * ca.pi * (r_r**2 - r_i**2 - N * r_ci**2 - fibre)
-
-
-def deform(
-    robot: Robot,
-    material: Material,
-    set_pressures: Any,
-    stretch: Any,
-    coefficients: Coefficients,
-    conventions: Conventions = REPRODUCTION,
-) -> Section:
-    """Return the section at a stretch, Eqs. (11), (12), (22), (24), (S2) to (S6).
-
-    `set_pressures` is indexable by set, one gauge pressure each [Pa]. Nothing is raised: a section past its
-    limits shows as a stiffness that is not positive.
-    """
-    k_b, k_i, phi = coefficients.bending, coefficients.inertia, coefficients.bore_fraction
-    N, t_f, pi = robot.chambers, conventions.fibre_thickness, ca.pi
-    P = [set_pressures[i] for i in robot.set_of_chamber]
-
-    shrink = 1 / ca.sqrt(stretch)
-    r_r, r_i, r_cp = (r * shrink for r in (robot.outer_radius, robot.lumen_radius, robot.chamber_circle_radius))
-    d = tuple((x * shrink, y * shrink) for x, y in robot.chamber_centres())
-    r_co = robot.chamber_radius
-    r_ci = ca.sqrt(r_co**2 - (r_co**2 - robot.bore_radius**2) / stretch)
-    A_0 = reference_area(robot, coefficients, conventions)
-    A = A_0 / stretch
-
-    def inertia(r: Any, offset: Any) -> Any:
-        return pi * (r**4 / 4 + r**2 * offset**2)
-
-    r_f = r_co + t_f
-    ring = pi * (r_r**4 - r_i**4) / 4
-    I_x, I_y = (
-        k_i * (ring - sum(inertia(r_ci, d_i[k]) + pi * (r_f**3 * t_f + 2 * r_f * t_f * d_i[k] ** 2) for d_i in d))
-        for k in (1, 0)
-    )
-    J_z = (
-        pi * (r_r**4 - r_i**4) / 2
-        - N * pi * (r_ci**4 / 2 + r_ci**2 * r_cp**2)
-        - N * pi * (2 * r_f**3 * t_f + 2 * r_f * t_f * r_cp**2)
-    )
-
-    r_p = r_ci + phi * (r_co - r_ci)
-    A_c = pi * r_p**2
-    F_P = A_c * sum(P)
-    M_P = (A_c * sum(P_i * d_i[1] for P_i, d_i in zip(P, d, strict=True)),
-           -A_c * sum(P_i * d_i[0] for P_i, d_i in zip(P, d, strict=True)))  # fmt: skip
-
-    Pbar = sum(P) / N
-    chamber_terms = []
-    for k in (1, 0):
-        I_c = [inertia(r_p, d_i[k]) for d_i in d]
-        if conventions.mean_pressure:
-            chamber_terms.append(Pbar * sum(I_c))
-        else:
-            chamber_terms.append(sum(P_i * I_i for P_i, I_i in zip(P, I_c, strict=True)))
-
-    E_t = material.tangent_modulus(stretch)
-    G = material.shear_modulus(stretch)
-    return Section(
-        stretch=stretch,
-        outer_radius=r_r,
-        lumen_radius=r_i,
-        chamber_circle_radius=r_cp,
-        chamber_radius=r_co,
-        bore_radius=r_ci,
-        centres=d,
-        area=A,
-        reference_area=A_0,
-        pressure_area=A_c,
-        pressure_force=F_P,
-        pressure_moment=M_P,
-        engineering_stress=material.engineering_stress(stretch),
-        tangent_modulus=E_t,
-        axial_stiffness=E_t * A + coefficients.elongation * F_P,
-        shear_stiffness=G * A,
-        bending_stiffness=(E_t * I_x + k_b * chamber_terms[0], E_t * I_y + k_b * chamber_terms[1]),
-        torsional_stiffness=G * J_z,
-    )
-
 
 STIFFNESSES = ("E_t", "EA", "EI_x", "EI_y", "GA", "GJ")
 """What the section gives the rod; where one of them is not positive there is no pose."""
 
 
-def stiffnesses(section: Section) -> list[Any]:
-    """Return the stiffnesses of a section in the order of `STIFFNESSES`."""
-    return [
-        section.tangent_modulus,
-        section.axial_stiffness,
-        *section.bending_stiffness,
-        section.shear_stiffness,
-        section.torsional_stiffness,
-    ]
+@dataclass(frozen=True, eq=False)
+class SectionState:
+    """A section at one stretch and set of pressures; body frame, N chambers.
 
-
-def stretch_balance(section: Section, coefficients: Coefficients, conventions: Conventions = REPRODUCTION) -> Any:
-    """Return the axial imbalance A_0 sigma_e - F_P +- k_e F_P (lambda - 1) [N], Eqs. (10), (19), (21), (23).
-
-    Zero at equilibrium. The stiffening force opposes the pressure unless the conventions say as printed.
+    Attributes
+    ----------
+    imbalance
+        What the wall's axial force exceeds that of the pressures by, a number [N]; zero where the stretch is right.
+    line_density
+        Mass per length of the stretched rod, a number [kg/m].
+    tangent_modulus
+        E_t, a number [Pa].
+    axial_stiffness, shear_stiffness
+        EA and GA, numbers [N].
+    bending_stiffness
+        (2,) EI_x, EI_y, about the body's x and y [N m^2].
+    torsional_stiffness
+        GJ, a number [N m^2].
+    pressure_force
+        F_P, of all chambers along e3, a number [N].
+    pressure_moment
+        (2,) x and y of M_P, the sum of d_i x P_i A_c e3 [N m].
+    centres
+        (N, 2) d_i of the chambers [m].
+    chamber_stiffness
+        Of one reinforced chamber along its axis, which the closure `compliant` takes, a number [N].
+    own
+        What else `Section.strains` takes: numbers, each with the name of its unit [SI].
     """
-    sign = 1 if conventions.stiffening_opposes_pressure else -1
-    F_P = section.pressure_force
-    return (
-        section.reference_area * section.engineering_stress
-        - F_P
-        + sign * coefficients.elongation * F_P * (section.stretch - 1)
+
+    imbalance: Any
+    line_density: Any
+    tangent_modulus: Any
+    axial_stiffness: Any
+    shear_stiffness: Any
+    bending_stiffness: tuple[Any, Any]
+    torsional_stiffness: Any
+    pressure_force: Any
+    pressure_moment: tuple[Any, Any]
+    centres: tuple[tuple[Any, Any], ...]
+    chamber_stiffness: Any
+    own: Sequence[tuple[Any, str]] = field(default=(), kw_only=True)
+
+    @property
+    def stiffnesses(self) -> list[Any]:
+        """In the order of `STIFFNESSES`, numbers [SI]."""
+        EI_x, EI_y = self.bending_stiffness
+        return [self.tangent_modulus, self.axial_stiffness, EI_x, EI_y, self.shear_stiffness, self.torsional_stiffness]
+
+
+@dataclass(frozen=True)
+class SectionRadii:
+    """Deformed section, Eqs. (22), (S2).
+
+    Attributes
+    ----------
+    outer, lumen, chamber_circle
+        r_r, r_i, r_cp [m].
+    chamber, bore
+        r_co, which the thread keeps, and r_ci [m].
+    """
+
+    outer: float
+    lumen: float
+    chamber_circle: float
+    chamber: float
+    bore: float
+
+
+class RodSection(NamedTuple):
+    """What the rod asks of its section at s, in one consistent system of units.
+
+    shear, axial, bending_x, bending_y, torsion : GA, EA, EI_x, EI_y, GJ. pressure_force : F_P.
+    pressure_moment_x, pressure_moment_y : sum d_i x P_i A_c e3. line_density : mass per length. length : of the whole
+    stretched rod.
+    """
+
+    shear: Any
+    axial: Any
+    bending_x: Any
+    bending_y: Any
+    torsion: Any
+    pressure_force: Any
+    pressure_moment_x: Any
+    pressure_moment_y: Any
+    line_density: Any
+    length: Any
+
+
+def rod_section(state: SectionState, length: Any, length_unit: Any, force_unit: Any) -> RodSection:
+    """Return the section as the rod sees it, with lengths and forces divided by the units [m, N].
+
+    length : of the whole stretched rod, in the unit of length. Accelerations stay in m/s^2.
+    """
+    EI_x, EI_y = state.bending_stiffness
+    M_x, M_y = state.pressure_moment
+    moment_unit = force_unit * length_unit
+    return RodSection(
+        state.shear_stiffness / force_unit,
+        state.axial_stiffness / force_unit,
+        EI_x / (moment_unit * length_unit),
+        EI_y / (moment_unit * length_unit),
+        state.torsional_stiffness / (moment_unit * length_unit),
+        state.pressure_force / force_unit,
+        M_x / moment_unit,
+        M_y / moment_unit,
+        state.line_density * length_unit / force_unit,
+        length,
     )
+
+
+class Section(Protocol):
+    """A kind of cross-section with its numbers, any of which may be a symbol elsewhere.
+
+    One of your own inherits from this class. Its methods are written with operators and casadi functions, on numbers
+    and symbols alike, in SI units. `numbers` are by the keys of `quantities`.
+    """
+
+    @property
+    def kind(self) -> Hashable:
+        """What its equations depend on beside numbers; sections of a class and a kind share what is compiled."""
+        return ()
+
+    @property
+    def set_of_chamber(self) -> tuple[int, ...]:
+        """The set of each chamber, both counted from 0, (N,) entries [1]."""
+        return ()
+
+    @property
+    def sets(self) -> int:
+        """The number of sets, with one pressure each."""
+        return max(self.set_of_chamber, default=-1) + 1
+
+    @property
+    def by_sum(self) -> bool:
+        """Whether pressures enter the imbalance by their sum alone and only add to stiffnesses; batches are quicker."""
+        return False
+
+    def check(self, numbers: Mapping[str, Any] | None = None) -> None:
+        """Raise `RobotError` for a section that cannot be made.
+
+        Parameters
+        ----------
+        numbers
+            By key; None are its own.
+        """
+
+    def quantities(self) -> Sequence[Quantity]:
+        """Return its numbers as quantities, "robot.length" among them, the unpressurised length of its segment.
+
+        Returns
+        -------
+        Sequence
+            In a fixed order.
+        """
+        ...
+
+    def at(self, numbers: Mapping[str, Any], pressures: Any, stretch: Any) -> SectionState:
+        """Return the section at a stretch; imbalance and stiffnesses are linear in the pressures.
+
+        Parameters
+        ----------
+        numbers
+            By key.
+        pressures
+            (sets,) gauge [Pa].
+        stretch
+            lambda, a number [1].
+
+        Returns
+        -------
+        SectionState
+            As said.
+        """
+        ...
+
+    def strains(self, section: RodSection, own: Sequence[Any], force: Any, moment: Any) -> tuple[Any, Any]:
+        """Return the strains under what wall and fluid carry together, Eq. (5): R^T M + M_P = K u.
+
+        Without a load v has to be e3, which is what the stretch means.
+
+        Parameters
+        ----------
+        section, own
+            Its state, and (entries,) the numbers of `SectionState.own`, in any consistent system of units [SI].
+        force, moment
+            (3,) R^T N and R^T M in the same units, body frame [SI].
+
+        Returns
+        -------
+        tuple
+            (3,) v [1] and (3,) u [1/m], per stretched length, body frame.
+        """
+        m = moment + ca.vertcat(section.pressure_moment_x, section.pressure_moment_y, 0)
+        v = ca.vertcat(force[0] / section.shear, force[1] / section.shear, force[2] / section.axial + 1)
+        return v, ca.vertcat(m[0] / section.bending_x, m[1] / section.bending_y, m[2] / section.torsion)
+
+    def outline(self, numbers: Mapping[str, Any], stretch: Any) -> SectionRadii:
+        """Return the section's deformed radii.
+
+        Parameters
+        ----------
+        numbers
+            By key.
+        stretch
+            lambda, a number [1].
+
+        Returns
+        -------
+        SectionRadii
+            Of which "outer" bounds the body.
+        """
+        ...
+
+    def warnings(self, stretch: float) -> list[str]:
+        """Return what to know of the section at a stretch.
+
+        Parameters
+        ----------
+        stretch
+            lambda [1].
+
+        Returns
+        -------
+        list
+            One line each.
+        """
+        return []
+
+
+SectionType = Callable[[Any, Material, Coefficients, Conventions], Section]
+"""Makes a section of a robot, its silicone, coefficients and conventions: a class, or a function."""
+
+
+def unit_scale(unit: str, length: Any, force: Any) -> Any:
+    """Return one SI unit's size in the scaled system: SI value = scaled value * this; accelerations are not scaled.
+
+    Raises
+    ------
+    InputError
+        For a unit that is not known.
+    """
+    scales = {
+        "1": 1.0,
+        "rad": 1.0,
+        "m": length,
+        "m^2": length**2,
+        "1/m": 1 / length,
+        "N": force,
+        "N m": force * length,
+        "N/m": force / length,
+        "N/rad": force,
+        "Pa": force / length**2,
+        "m/s^2": 1.0,
+        "kg": force,
+        "kg/m": force / length,
+        "kg/m^3": force / length**3,
+    }
+    if unit not in scales:
+        raise InputError(f"expected one of {', '.join(scales)}, got {unit!r}", key="unit")
+    return scales[unit]

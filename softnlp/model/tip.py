@@ -1,44 +1,28 @@
-"""What holds at the tip of the rod: dead loads alone, or a wall and chamber reactions, Eqs. (9), (14) to (18).
+"""The wall of a blocked force and its closures, as a load at the tip, Eqs. (14) to (18).
 
-Pure functions of numbers or symbols in any consistent system of units. Every condition is 6 balances and as many more
-equations as it has unknown forces of its own.
+Pure functions of numbers or symbols in any consistent system of units.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
+import numpy as np
 
 from softnlp.base.errors import InputError
+from softnlp.base.quantity import Quantity, quantity
 from softnlp.model import rod
 from softnlp.model.contact_settings import Closure
-from softnlp.model.rod import RodSection
-
-
-class AtTip(NamedTuple):
-    """What the conditions may use; N chambers.
-
-    state : p, R, N, M at s = L, see `softnlp.model.rod`. section : the rod's. lengths : (N,) of the chambers.
-    centres : N pairs d_i. chamber_stiffness : E_t pi r_co^2. force, moment : dead loads. unknowns : forces of the
-    conditions. given : `Given`.
-    """
-
-    state: Any
-    section: RodSection
-    lengths: Any
-    centres: list[tuple[Any, Any]]
-    chamber_stiffness: Any
-    force: Any
-    moment: Any
-    unknowns: Any
-    given: Any
+from softnlp.model.load import AtTip as AtTip
+from softnlp.model.load import Load, Wrench
+from softnlp.model.model import Model
 
 
 class Given(NamedTuple):
-    """The numbers of a wall and its closure; `contact_quantities` of `softnlp.model.quantities` declares them so.
+    """The numbers of a wall and its closure; `TipContact.quantities` declares them so.
 
     wall_point, wall_normal : (3,), the normal is unit and points where the wall pushes. tip_cap : L_t.
     chamber_reaction : k_c. free_lengths : (N,) L_i^free. pressed : (N,) 1 where a chamber is pressurised, else 0.
@@ -56,27 +40,8 @@ class Given(NamedTuple):
     gap_error: Any
 
 
-@dataclass(frozen=True, eq=False)
-class TipConditions:
-    """Conditions that close the rod's problem.
-
-    unknowns : names of the forces that they add. equations : names of as many length equations that they add.
-    residual : the 6 balances, then those. reaction : (N,) T_i of the chambers.
-    has_contact : whether they need `Given` and the chamber lengths.
-    """
-
-    unknowns: tuple[str, ...]
-    equations: tuple[str, ...]
-    residual: Callable[[AtTip], Any]
-    reaction: Callable[[AtTip], Any]
-    has_contact: bool
-
-
 def _no_reaction(at: AtTip) -> Any:
     return ca.DM.zeros(len(at.centres))
-
-
-DEAD_LOADS = TipConditions((), (), lambda at: rod.tip_balance(at.state, at.force, at.moment), _no_reaction, False)
 
 
 def length_error(at: AtTip) -> Any:
@@ -121,50 +86,79 @@ BUILT_IN: Mapping[str, Closure] = {
 """The closures that a scenario may name."""
 
 
-def _balance(at: AtTip, T: Any, F_b: Any) -> Any:
-    """Return the 6 tip balances with reactions T (N,) of the chambers and the wall's force F_b."""
-    R = rod.unpack(at.state)[1]
-    e3 = R[:, 2]
-    push = F_b * at.given.wall_normal
-    M_x = sum(T[i] * d_y for i, (_, d_y) in enumerate(at.centres))
-    M_y = -sum(T[i] * d_x for i, (d_x, _) in enumerate(at.centres))
-    M_T = ca.vertcat(M_x, M_y, 0)
-    force = at.force + push + ca.sum1(T) * e3 + at.given.force_error
-    moment = at.moment + at.given.tip_cap * ca.cross(e3, push) + R @ M_T + at.given.moment_error
-    return rod.tip_balance(at.state, force, moment)
+@dataclass(frozen=True)
+class TipContact(Load):
+    """A closure, one of `BUILT_IN` or your own, with a wall that holds the tip, or for the other loads without.
 
+    closure : by name, or as such. wall : whether there is one, whose push is unknown.
 
-def tip_conditions(closure: str | Closure, *, wall: bool = True) -> TipConditions:
-    """Return the conditions of a closure, one of `BUILT_IN` or your own, with a wall, or for a given load without.
-
-    Raises
-    ------
-    InputError
-        When the conditions are used, where the closure's functions return another number of entries than they should.
+    Its functions raise `InputError` where those of the closure return another number of entries than they should.
     """
-    chosen = BUILT_IN[closure] if isinstance(closure, str) else closure
-    equation = chosen.equation
-    own = equation is not None
 
-    def reaction(at: AtTip) -> Any:
-        return _sized(chosen, "reaction", chosen.reaction(at), len(at.centres))
+    closure: str | Closure
+    wall: bool = True
+    needs_lengths = True
 
-    def residual(at: AtTip) -> Any:
-        F_b = at.unknowns[0] if wall else 0.0
-        rows = [_balance(at, reaction(at), F_b)]
-        if wall:
-            rows.append(gap(at) - at.given.gap_error)
-        if equation is not None:
-            rows.append(_sized(chosen, "equation", equation(at), 1))
-        return ca.vertcat(*rows)
+    @property
+    def _chosen(self) -> Closure:
+        return BUILT_IN[self.closure] if isinstance(self.closure, str) else self.closure
 
-    return TipConditions(
-        unknowns=("wall force",) * wall + ("chamber reaction",) * own,
-        equations=("contact gap",) * wall + ("chamber length",) * own,
-        residual=residual,
-        reaction=reaction,
-        has_contact=True,
-    )
+    @property
+    def unknowns(self) -> Mapping[str, str]:
+        """The wall's push, and the unknown force of the closure."""
+        own = self._chosen.equation is not None
+        return dict.fromkeys(("wall force",) * self.wall + ("chamber reaction",) * own, "N")
+
+    @property
+    def equations(self) -> Mapping[str, str]:
+        """The gap, and the equation of the closure."""
+        own = self._chosen.equation is not None
+        return dict.fromkeys(("contact gap",) * self.wall + ("chamber length",) * own, "m")
+
+    def quantities(self, model: Model) -> list[Quantity]:
+        """Return "contact." and each field of `Given`."""
+        N, L_0 = model.chambers, model.length
+        return [
+            quantity("contact.wall_point", "m", np.zeros(3), scale=L_0),
+            quantity("contact.wall_normal", "1", np.array([1.0, 0.0, 0.0])),
+            quantity("contact.tip_cap", "m", 0.0, scale=L_0, lower=0.0),
+            quantity("contact.chamber_reaction", "1", float(model.coefficients.chamber_reaction), lower=0.0),
+            quantity("contact.free_lengths", "m", np.full(N, L_0), scale=L_0, lower=0.0),
+            quantity("contact.pressed", "1", np.zeros(N)),
+            quantity("contact.force_error", "N", np.zeros(3)),
+            quantity("contact.moment_error", "N m", np.zeros(3), scale=1e-2),
+            quantity("contact.gap_error", "m", 0.0, scale=L_0),
+        ]
+
+    def named(self, numbers: Mapping[str, Any]) -> Given:
+        """Return them as they are told of in `Given`."""
+        return Given(**numbers)
+
+    def reaction(self, at: AtTip) -> Any:
+        """Return T_i (N,) of the chambers."""
+        return _sized(self._chosen, "reaction", self._chosen.reaction(at), len(at.centres))
+
+    def tip(self, at: AtTip) -> Wrench:
+        """Return the push of the wall, the reactions, and what a closure leaves of the balances."""
+        e3, R = rod.unpack(at.state)[1][:, 2], rod.unpack(at.state)[1]
+        T = self.reaction(at)
+        push = (at.unknowns[0] if self.wall else 0.0) * at.given.wall_normal
+        M_x = sum(T[i] * d_y for i, (_, d_y) in enumerate(at.centres))
+        M_y = -sum(T[i] * d_x for i, (d_x, _) in enumerate(at.centres))
+        force = push + ca.sum1(T) * e3 + at.given.force_error
+        moment = at.given.tip_cap * ca.cross(e3, push) + R @ ca.vertcat(M_x, M_y, 0) + at.given.moment_error
+        return force, moment
+
+    def rows(self, at: AtTip) -> list[Any]:
+        """Return e_h and what the closure asks for."""
+        found = [gap(at) - at.given.gap_error] if self.wall else []
+        if self._chosen.equation is not None:
+            found.append(_sized(self._chosen, "equation", self._chosen.equation(at), 1))
+        return found
+
+    def at_rest(self, values: Mapping[str, Any], tip: Any) -> dict[str, Any]:
+        """Put the wall where it touches the unloaded shape."""
+        return {"contact.wall_point": tip[:3] + values["contact.tip_cap"] * tip[9:12]}
 
 
 def _sized(closure: Closure, part: str, value: Any, size: int) -> Any:

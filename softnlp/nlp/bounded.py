@@ -99,15 +99,15 @@ def quadratic_step(H: Array, g: Array, A: Array, b: Array, E: Array | None = Non
     return d
 
 
-def curvature(measure: Map, here: Measured, weights: Array, limits: Limits) -> Array | None:
-    """Return the sum of weights times second derivatives of r, by differences of J; None where the map ends."""
+def curvature(measure: Map, here: Measured, weights: Array, limits: Limits) -> Array:
+    """Return the sum of weights times second derivatives of r, by differences of J; 0 where the map ends."""
     n = here.z.size
     S = np.zeros((n, n))
     for j in range(n):
         h = _DIFFERENCE if here.z[j] + _DIFFERENCE <= limits.upper[j] else -_DIFFERENCE
         there = measure(here.z + h * np.eye(n)[j], here)
         if there is None:
-            return None
+            return np.zeros((n, n))
         S[:, j] = (there.J - here.J).T @ weights / h
     symmetric: Array = (S + S.T) / 2
     return symmetric
@@ -137,31 +137,27 @@ def _definite(H: Array) -> Array:
     return made
 
 
-def nearest(
-    measure: Map, start: Measured, limits: Limits, second: Array | None = None, *, measured_curvature: bool = True
-) -> tuple[Measured, Array | None, int]:
-    """Return the point of least sum of squares near a start, the curvature of its residuals, and the points measured.
+def nearest(measure: Map, start: Measured, limits: Limits, second: Array | None = None) -> tuple[Measured, Array]:
+    """Return the point of least sum of squares near a start, and the curvature of its residuals there (n, n).
 
-    second : curvature to begin with. measured_curvature : measure it where the residuals stay large.
+    second : that curvature, taken as it is. None: measured where the residuals stay large, else 0.
     """
-    here, radius, spent = start, _FIRST_RADIUS, 0
-    slow = False
+    here, radius, slow = start, _FIRST_RADIUS, False
+    S = np.zeros((start.z.size, start.z.size)) if second is None else second
     for _ in range(_STEPS):
         size = float(np.linalg.norm(here.r))
         if size <= MET:
             break
-        if measured_curvature and slow and size > 1e-4:
-            second = curvature(measure, here, here.r, limits)
-            spent += here.z.size
+        if second is None and slow and size > 1e-4:
+            S = curvature(measure, here, here.r, limits)
         g = here.J.T @ here.r
-        H = _definite(here.J.T @ here.J + (0 if second is None else second))
+        H = _definite(here.J.T @ here.J + S)
         d = quadratic_step(H, g, *limits.rows(here.z, radius))
         predicted = -float(g @ d + d @ H @ d / 2)
         length = float(np.max(np.abs(d)))
         if predicted <= 0.01 * _NOISE * size or length < 1e-12:
             break
         there = measure(limits.clip(here.z + d), here)
-        spent += 1
         gained = -np.inf if there is None else here.cost - there.cost
         # Where the target can be met, Gauss and Newton's steps soon leave little; where not, they need the curvature.
         slow = length < 0.9 * radius and gained < 0.75 * here.cost
@@ -173,26 +169,24 @@ def nearest(
             radius = length / 4
         if radius < _LEAST_RADIUS:
             break
-    return here, second, spent
+    return here, S
 
 
-def least_norm(
-    measure: Map, start: Measured, limits: Limits, second: Array | None = None, *, measured_curvature: bool = True
-) -> tuple[Measured, Array | None, int]:
+def least_norm(measure: Map, start: Measured, limits: Limits, second: Array | None = None) -> tuple[Measured, Array]:
     """Return the point of least |z| that keeps r = 0, near a start that has r = 0; otherwise as `nearest`.
 
     J must have full row rank. second : of the residuals weighed by their multipliers.
     """
-    here, radius, spent = start, _FIRST_RADIUS, 0
+    here, radius = start, _FIRST_RADIUS
     n = here.z.size
+    S = np.zeros((n, n)) if second is None else second
     multipliers: Array = np.zeros(here.r.size)
     for _ in range(_STEPS):
-        if measured_curvature and np.any(multipliers):
-            second = curvature(measure, here, multipliers, limits)
-            spent += n
+        if second is None and np.any(multipliers):
+            S = curvature(measure, here, multipliers, limits)
         A, b = limits.rows(here.z, radius)
         back = quadratic_step(_definite(here.J.T @ here.J), here.J.T @ here.r, A, b)
-        H = _definite(np.eye(n) + (0 if second is None else second))
+        H = _definite(np.eye(n) + S)
         d = quadratic_step(H, here.z, A, b, here.J, back)
         # Limits that hold d take their share of the gradient, so only free directions tell the multipliers.
         free = (A @ d < b - 1e-12)[: 2 * n].reshape(2, n).all(axis=0)
@@ -202,7 +196,6 @@ def least_norm(
         if length < _ENOUGH:
             break
         there = measure(limits.clip(here.z + d), here)
-        spent += 1
         weight = 2 * float(np.max(np.abs(multipliers), initial=0.0)) + 1.0
 
         def merit(point: Measured, weight: float = weight) -> float:
@@ -213,4 +206,4 @@ def least_norm(
             radius = min(1.5 * radius, _LARGEST_RADIUS) if length > 0.9 * radius else radius
         else:
             radius = length / 4
-    return here, second, spent
+    return here, S

@@ -8,6 +8,7 @@ follows from it, dz/dp = z_x dx/dp + z_p. These are the derivatives of the numbe
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from softnlp.base.errors import IllPosedError, nearest
 from softnlp.base.quantity import Quantity
+from softnlp.nlp.evaluation import evaluated
 from softnlp.nlp.linear import LinearSolver, ManySidedSolver, SparseSolver
 from softnlp.nlp.problem import CompiledProblem
 
@@ -34,7 +36,9 @@ class ImplicitDerivatives:
 
     """
 
-    def __init__(self, problem: CompiledProblem, names: Sequence[str], linear: LinearSolver | None = None) -> None:
+    def __init__(
+        self, problem: CompiledProblem, names: Sequence[str], linear: LinearSolver | ManySidedSolver | None = None
+    ) -> None:
         if not problem.is_square:
             raise IllPosedError("a problem with an objective or an inequality is not differentiated; fix what is free")
         start, columns = {}, 0
@@ -47,39 +51,41 @@ class ImplicitDerivatives:
                 raise IllPosedError(f"'{name}' is not a fixed quantity of this problem{nearest(name, by_name)}")
         self.problem = problem
         self.quantities: tuple[Quantity, ...] = tuple(by_name[name] for name in dict.fromkeys(names))
-        self._linear = linear if isinstance(linear, ManySidedSolver) else SparseSolver(problem)
+        self.linear = linear if isinstance(linear, ManySidedSolver) else SparseSolver(problem)
         chosen = [start[q.name] + k for q in self.quantities for k in range(q.size)]
         self.columns = np.array(chosen, dtype=int)
         x, p, g = (problem.nlp[name] for name in "xpg")
         seeds = ca.DM(columns, len(chosen))
         for k, column in enumerate(chosen):
             seeds[column, k] = 1.0
-        self._residual = ca.Function("residual_by_theta", [x, p], [ca.densify(ca.jtimes(g, p, seeds))])
-        dx = ca.MX.sym("dx", x.numel(), len(chosen))
-        results = problem.outputs(x=x, p=p)
-        self._names = tuple(results)
-        moved = [ca.jtimes(ca.vec(z), x, dx) + ca.jtimes(ca.vec(z), p, seeds) for z in results.values()]
+        by_theta = ca.horzcat(ca.jtimes(g, p, seeds), g)
+        self._right = ca.Function("residual_by_theta", [x, p], [ca.densify(by_theta)])
+        self._seeds = seeds
+
+    @cached_property
+    def _outputs(self) -> tuple[tuple[str, ...], ca.Function]:
+        """The outputs' names, and the function (x, p, dx) of their derivatives; built at first use."""
+        x, p = self.problem.nlp["x"], self.problem.nlp["p"]
+        dx = ca.MX.sym("dx", x.numel(), self.columns.size)
+        results = self.problem.outputs(x=x, p=p)
+        moved = [ca.jtimes(ca.vec(z), x, dx) + ca.jtimes(ca.vec(z), p, self._seeds) for z in results.values()]
         # Forward, so that a bending angle without a derivative, of a straight robot, leaves the others theirs.
-        self._outputs = ca.Function("outputs_by_theta", [x, p, dx], [ca.densify(m) for m in moved])
+        return tuple(results), ca.Function("outputs_by_theta", [x, p, dx], [ca.densify(m) for m in moved])
 
     def states(self, x: Array, p: Array) -> Array:
         """Return d x / d theta (n, k) at a solution.
 
         Raises `numpy.linalg.LinAlgError` where the Jacobian is singular: at a fold or a branch point.
         """
-        return self._solved(x, p, np.asarray(self._residual(x, p)))
+        right = self.right(x, p)[:, :-1]
+        return self.linear.solve_many(x, p, right) if right.size else right
 
-    def newton(self, x: Array, p: Array, g: Array) -> tuple[Array, Array]:
-        """Return Newton's step (n,) for the residual g at x and d x / d theta (n, k), for the cost of one of them.
+    def right(self, x: Array, p: Array) -> Array:
+        """Return d g / d theta, x held, and the residual g behind it (n, k + 1).
 
-        Raises as `states`.
+        They are the right sides that give d x / d theta and Newton's step.
         """
-        moves = self._solved(x, p, np.column_stack([np.asarray(self._residual(x, p)), g]))
-        return moves[:, -1], moves[:, :-1]
-
-    def _solved(self, x: Array, p: Array, G: Array) -> Array:
-        """Return -J^-1 G."""
-        return self._linear.solve_many(x, p, G) if G.size else G
+        return evaluated(self._right, x, p)[0]
 
     def outputs(self, x: Array, p: Array, moves: Array | None = None) -> dict[str, Array]:
         """Return d output / d theta (size, k) by the name of the output; matrices column by column.
@@ -87,6 +93,5 @@ class ImplicitDerivatives:
         moves : of `states` at the same point, when they are known. Raises as `states`.
         """
         dx = self.states(x, p) if moves is None else moves
-        return {
-            name: np.asarray(value) for name, value in zip(self._names, self._outputs.call([x, p, dx]), strict=True)
-        }
+        names, moved = self._outputs
+        return {name: np.asarray(value) for name, value in zip(names, moved.call([x, p, dx]), strict=True)}

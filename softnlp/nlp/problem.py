@@ -35,6 +35,9 @@ class Constraint:
         SI.
     scale
         A number above 0 or a symbol, in `unit` [SI]. It only says what counts as large: it changes no bound.
+    in_hessian
+        Whether its second derivatives are in the Hessian of the Lagrangian. Without them IPOPT takes more steps, which
+        cost less where the expression is a long computation.
     """
 
     name: str
@@ -43,6 +46,7 @@ class Constraint:
     upper: Any = 0.0
     unit: str = "1"
     scale: Any = 1.0
+    in_hessian: bool = True
 
     @property
     def is_equality(self) -> bool:
@@ -90,7 +94,8 @@ class CompiledProblem:
     """A problem as functions of its unknowns x (scaled) and its fixed values p (SI).
 
     x stacks the free quantities, then each case's unknowns; p stacks the fixed quantities. residual(x, p) stacks each
-    case's equations, then the constraints over their scales. nlp holds x, p, f, g as expressions. function(name,
+    case's equations, then the constraints over their scales, those that are not in the Hessian last. nlp holds x, p, f,
+    g as expressions; of g, curved are the rows in the Hessian and left_out the others, if any. function(name,
     expressions) makes a function of (x, p) of expressions in the symbols of quantities and cases. own_slope : makes the
     Jacobian where it is that of a case alone.
     """
@@ -101,6 +106,8 @@ class CompiledProblem:
     constraints: tuple[Constraint, ...]
     equations: tuple[Equation, ...]
     nlp: Mapping[str, ca.MX]
+    curved: ca.MX
+    left_out: ca.MX
     residual: ca.Function
     fine_residual: ca.Function
     si_scales: ca.Function
@@ -129,12 +136,20 @@ class CompiledProblem:
         Those of the cases and of the constraints are made apart: a constraint may depend on every state of a rod, and
         one such row would take the sparse directions from all the others.
         """
-        x, _, g = (self.nlp[name] for name in "xpg")
+        x, g = self.nlp["x"], self.curved
         if self.own_slope is not None:
             return self.own_slope()
         own = sum(case.residuals.numel() for case in self.cases)
-        parts = [ca.jacobian(g[rows], x) for rows in (slice(0, own), slice(own, g.numel())) if rows.start < rows.stop]
-        return ca.vertcat(*parts) if parts else ca.jacobian(g, x)
+        parts = [part for part in (g[:own], g[own:], self.left_out) if part.numel()]
+        return ca.vertcat(*(ca.jacobian(part, x) for part in parts)) if parts else ca.jacobian(g, x)
+
+    @cached_property
+    def hessian(self) -> ca.Function:
+        """(x, p, lam_f, lam_g) -> the upper triangle of the Lagrangian's, of the curved rows; built at first use."""
+        x, p, f, g = (self.nlp[name] for name in "xpfg")
+        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", g.numel())
+        lagrangian = lam_f * f + ca.dot(lam_g[: self.curved.numel()], self.curved)
+        return ca.Function("hess_lag", [x, p, lam_f, lam_g], [ca.triu(ca.hessian(lagrangian, x)[0])])
 
     @cached_property
     def slopes(self) -> ca.Function:
@@ -173,11 +188,13 @@ class CompiledProblem:
 
     def free_values(self, x: Array) -> dict[str, Array]:
         """Return the free quantities in x by name, SI."""
-        found, start = {}, 0
-        for q in self.free:
-            found[q.name] = x[start : start + q.size] * q.scale
-            start += q.size
-        return found
+        places = self._free_column.places
+        return {q.name: x[places[q.name]] * q.scale for q in self.free}
+
+    def values(self, x: Array, p: Array) -> dict[str, Array]:
+        """Return every quantity by name, SI."""
+        found = {q.name: p[self._fixed_column.places[q.name]] for q in self.fixed}
+        return {**self.free_values(x), **found}
 
     def pack_free(self, values: Mapping[str, Any]) -> Array:
         """Return the head of x from SI values of the free quantities; nominal where not named. Raises as `pack`."""
@@ -260,12 +277,18 @@ def compile_problem(
         found: ca.MX = ca.Function("slope", originals, [cases[0].slope]).call(pieces, True, False)[0]
         return found
 
+    constraints = sorted(constraints, key=lambda c: not c.in_hessian)
     scaled = [c.scaled() for c in constraints]
     rows = [row for row, _, _ in scaled]
     residual = function("residual", [ca.vertcat(*(case.residuals for case in cases), *rows)])
     fine = function("fine", [ca.vertcat(*(case.fine_residuals for case in cases), *rows)])
     cost = function("cost", [objective])(x, p) if objective is not None else ca.MX(0)
-    g = residual(x, p)
+    curved, left_out = residual(x, p), ca.MX(0, 1)
+    if not all(c.in_hessian for c in constraints):
+        within = sum(c.in_hessian for c in constraints)
+        groups = [*(case.residuals for case in cases), *rows[:within]], rows[within:]
+        curved, left_out = (function("rows", [ca.vertcat(*group)])(x, p) for group in groups)
+    g = ca.vertcat(curved, left_out)
 
     equations = _all_equations(cases, constraints)
     none = np.zeros(sum(case.residuals.numel() for case in cases))
@@ -277,6 +300,8 @@ def compile_problem(
         constraints=tuple(constraints),
         equations=equations,
         nlp={"x": x, "p": p, "f": cost, "g": g},
+        curved=curved,
+        left_out=left_out,
         residual=residual,
         fine_residual=fine,
         si_scales=function("si_scales", [ca.vertcat(*(e.si_scale for e in equations))]),
@@ -328,7 +353,7 @@ def _all_equations(cases: Sequence[Case], constraints: Sequence[Constraint]) -> 
 def _refuse_ill_posed(problem: CompiledProblem, has_objective: bool) -> None:
     """Raise `IllPosedError` where counting or the structure of the Jacobian shows that there is no isolated answer."""
     equal = problem.lower_g == problem.upper_g
-    J = problem.jacobian.sparsity_out(0)
+    J = ca.jacobian_sparsity(problem.nlp["g"], problem.nlp["x"])
     added = sum(c.expression.numel() for c in problem.constraints if c.is_equality)
     freed = problem.free_size
     free_text = ", ".join(f"{q.name} ({q.size})" for q in problem.free) or "nothing"
@@ -367,10 +392,8 @@ def _refuse_ill_posed(problem: CompiledProblem, has_objective: bool) -> None:
             f"the constraints {added_text} cannot all be met by freeing {free_text}: they move {len(rows) - rank} "
             "combination(s) of unknowns too few; free a quantity that enters them"
         )
-    start = 0
     for q in problem.free:
-        columns = list(range(start, start + q.size))
-        start += q.size
+        columns = problem._free_column.places[q.name]
         if not np.all(entries_in_column[columns] + entries_in_cost[columns]):
             raise IllPosedError(
                 f"'{q.name}' is free but enters no equation and no objective, so nothing determines it; fix it"

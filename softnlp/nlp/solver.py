@@ -69,6 +69,8 @@ class Ipopt:
         (m,) multiplier of each row, scaled as it is; empty where IPOPT gave up [1].
     bounds
         (n,) of the bounds of each unknown [1].
+    objective
+        What is minimised, there [1].
     """
 
     status: str
@@ -76,6 +78,7 @@ class Ipopt:
     multipliers: float
     rows: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
     bounds: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
+    objective: float = field(default=float("nan"), repr=False, compare=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,12 +170,17 @@ class Engine:
             n, m = x.numel(), nlp["g"].numel()
             symbols = [ca.MX.sym("x", n), ca.MX.sym("p", p.numel()), ca.MX.sym("lam_f"), ca.MX.sym("lam_g", m)]
             options["hess_lag"] = ca.Function("zero_hessian", symbols, [ca.MX(n, n)])
+        elif self.problem.left_out.numel():
+            options["hess_lag"] = self.problem.hessian
         return ca.nlpsol("solver", "ipopt", dict(nlp), options)
 
-    def solve(self, p: Array, x_start: Array, most_steps: int = _NEWTON_STEPS) -> Solution:
+    def solve(
+        self, p: Array, x_start: Array, most_steps: int = _NEWTON_STEPS, room: Array | float = np.inf
+    ) -> Solution:
         """Solve at fixed values p from a first guess; judge the result by the residual, evaluated again.
 
-        most_steps : of Newton's method, where it is used; never more than are worth following.
+        most_steps : of Newton's method, where it is used; never more than are worth following. room : by which IPOPT
+        may move the scaled free quantities from the first guess, within their bounds.
         """
         x_start = np.asarray(x_start, dtype=float)
         spent = 0
@@ -188,7 +196,7 @@ class Engine:
         if self.problem.is_square and not start_residual < _DIVERGED:
             # A sparse factorisation of such numbers may take minutes and leads nowhere.
             return Solution(x_start, p, start_residual, spent, "the first guess is out of all proportion")
-        reference = self._ipopt(p, x_start)
+        reference = self._ipopt(p, x_start, room)
         return replace(reference, iterations=reference.iterations + spent)
 
     def closed(self, solution: Solution) -> Solution:
@@ -225,15 +233,17 @@ class Engine:
         """Send IPOPT's log, where it is asked for, to standard error: standard output is for results."""
         return redirect_stdout(sys.stderr) if self._options.get("print_level") else nullcontext()
 
-    def _ipopt(self, p: Array, x_start: Array) -> Solution:
+    def _ipopt(self, p: Array, x_start: Array, room: Array | float = np.inf) -> Solution:
         problem = self.problem
+        around = np.full(x_start.size, np.inf)
+        around[: problem.free_size] = room
         with self._lock, self._log():
             try:
                 result = self._solver(
                     x0=x_start,
                     p=p,
-                    lbx=problem.lower_x,
-                    ubx=problem.upper_x,
+                    lbx=np.maximum(problem.lower_x, x_start - around),
+                    ubx=np.minimum(problem.upper_x, x_start + around),
                     lbg=problem.lower_g,
                     ubg=problem.upper_g,
                 )
@@ -245,7 +255,7 @@ class Engine:
         kkt = kkt_error(problem.slopes, problem.bounds, p, x_start, x, *lam) if problem.has_objective else 0.0
         status, iterations = str(stats["return_status"]), int(stats["iter_count"])
         largest = float(max(np.max(np.abs(v), initial=0.0) for v in lam))
-        said = Ipopt(status, iterations, largest, rows=lam[1], bounds=lam[0])
+        said = Ipopt(status, iterations, largest, rows=lam[1], bounds=lam[0], objective=float(result["f"]))
         return Solution(x, p, violation(problem, x, p), iterations, status, kkt, said)
 
 

@@ -18,7 +18,7 @@ from softnlp.model.robot import DIMENSIONS, Robot
 from softnlp.results.document import csv_text, document_head, document_text, engine_table, number
 from softnlp.studies.design import Design
 from softnlp.studies.design_candidate import Candidate
-from softnlp.studies.design_optimise import Active
+from softnlp.studies.design_problem import Active
 from softnlp.studies.design_task import FORCE, OUTPUTS, PressureSteps, Range
 
 if TYPE_CHECKING:

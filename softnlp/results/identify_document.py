@@ -47,6 +47,7 @@ def tensile_document(asked: Scenario, task: TensileTask, fit: TensileFit) -> dic
         "points": int(task.stretch.size),
         "stretch_range": None if task.stretch_range is None else list(task.stretch_range),
         "dropped": task.dropped,
+        "data_stretch": list(task.data_stretch),
         "fitted_stretch": [float(v) for v in next(iter(fit.fits.values())).fitted_stretch],
         "before": None
         if before is None
@@ -84,7 +85,7 @@ def material_file_text(task: TensileTask, fit: TensileFit) -> str:
     """Return a materials file with every fitted law that is a material; the others are comments."""
     low, high = next(iter(fit.fits.values())).fitted_stretch
     name = _quoted(task.name)
-    source = f"tensile test: {', '.join(task.files)}, {task.stretch.size} points"
+    source = f"tensile test: {', '.join(task.files)}, {task.about}"
     lines = [
         "# Constants fitted by softnlp identify; +- is one standard error.",
         "",

@@ -14,8 +14,8 @@ from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.scenario.data import Read, Scenario, run_of
 from softnlp.scenario.schema import MOST_STEPS, Normal, NotNegative, Positive, ScenarioFile, Table, Vector
 from softnlp.statics.step import Run, Step
-from softnlp.studies.inverse import follow_targets
-from softnlp.studies.inverse_solver import InverseSolver
+from softnlp.studies.forward import followed
+from softnlp.studies.inverse_solver import InverseKinematics
 from softnlp.studies.targets import InverseTask, Target
 
 Array = NDArray[np.float64]
@@ -106,5 +106,5 @@ def run_inverse(scenario: Scenario, progress: Callable[[int, Step], None] | None
     """Run inverse kinematics, a step a target; `branches` means nothing here."""
     task = scenario.task
     assert isinstance(task, InverseTask)
-    solver = InverseSolver(scenario.model, scenario.numerics, scenario.loads, task, "newton")
-    return run_of(scenario, follow_targets(solver, progress))
+    solver = InverseKinematics(scenario.model, scenario.numerics, scenario.loads, task, "newton")
+    return run_of(scenario, followed(solver.nearest, task.targets, progress))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from softnlp.base.errors import IllPosedError, InputError, nearest
 from softnlp.base.status import Status
 from softnlp.nlp.optimality import not_optimal
-from softnlp.nlp.reduced import Reduced
+from softnlp.nlp.reduced import Reduced, held_states
 from softnlp.nlp.solver import FROM_SOLUTION, EquationResidual, Solution, certificate, outputs
 from softnlp.statics.case import pose_entries
 from softnlp.statics.chain import Chain
@@ -79,16 +79,21 @@ class Answer:
         Returns
         -------
         ndarray
-            (n, states) p, R column by column, N, M, in lengths L_0, forces EI/L_0^2 and moments EI/L_0 [1].
+            (n, states) p, R column by column, N, M, in lengths L_0, forces EI/L_0^2 and moments EI/L_0, EI at the base;
+            of a section that varies the stretch and s of each part too, and its knots twice [1].
         """
         found = next((c for c in self.problem.cases if c.name == case), None)
         if found is None:
             raise KeyError(f"no case is named '{case}'{nearest(case, [c.name for c in self.problem.cases])}")
-        several = isinstance(found, Chain)
-        transcribed = found.transcribed[segment - 1] if isinstance(found, Chain) else found.transcribed
-        where = self.problem.variables[f"{case}: {f'segment {segment} ' if several else ''}states"]
-        states: Array = self.solution.x[where].reshape(-1, transcribed.state_size).T
-        return states
+        chained = found.transcribed if isinstance(found, Chain) else (found.transcribed,)
+        segment_of = found.segment_of if isinstance(found, Chain) else (0,)
+        places = [self.problem.variables[f"{case}: {label}"] for label in found.labels if label.endswith("states")]
+        parts = [
+            self.solution.x[where].reshape(-1, transcribed.state_size).T
+            for where, transcribed, k in zip(places, chained, segment_of, strict=True)
+            if k == segment - 1
+        ]
+        return np.hstack(parts)
 
 
 def solve(
@@ -144,7 +149,11 @@ def solve(
         x = problem._start(values, start or {})
     square, options = compiled.is_square, dict(ipopt or {})
     if engine == "newton" and not square:
-        reduced = problem._kept("reduced", lambda: Reduced(compiled, linear_solver, problem.residuals))
+
+        def made() -> Reduced:
+            return Reduced(compiled, held_states(compiled, linear_solver), problem.residuals)
+
+        reduced = problem._kept("reduced", made)
         return _judged(problem, reduced.minimise(p, x), tolerance)
     if engine == "newton":
         return _judged(problem, problem._engine(newton_only=True).solve(p, x), tolerance)
@@ -237,11 +246,6 @@ def _judged(problem: Problem, solution: Solution, tolerance: float) -> Answer:
         message = f"no solution was found ({solution.engine_status}); start nearer, or follow a path from a solution"
     elif compiled.has_objective and not solution.optimal:
         status, message = Status.NOT_OPTIMAL, not_optimal(solution.kkt, solution.engine_status)
-    values = dict(compiled.free_values(solution.x))
-    start = 0
-    for q in compiled.fixed:
-        values[q.name] = solution.p[start : start + q.size]
-        start += q.size
     multipliers: dict[str, Array] = {}
     if compiled.has_objective and solution.ipopt is not None and solution.ipopt.rows.size:
         multipliers = {e.name: solution.ipopt.rows[e.rows] for e in compiled.equations}
@@ -250,7 +254,7 @@ def _judged(problem: Problem, solution: Solution, tolerance: float) -> Answer:
         problem=problem,
         status=status,
         message=message,
-        values=values,
+        values=compiled.values(solution.x, solution.p),
         outputs=outputs(compiled, solution) if status is Status.SOLVED else {},
         residuals=certificate(compiled, solution),
         multipliers=multipliers,

@@ -40,7 +40,7 @@ def unloaded_arc(poses: PoseSolver, pressure: Array) -> tuple[BranchPoint, Arc]:
     state = np.asarray(poses.functions.arc(column, branch.stretch, 1.0)).ravel()
     constants = poses.functions.section(column, branch.stretch)[0]
     along = np.asarray(poses.functions.lengths(state, constants)).ravel()  # rates, which are constant on an arc
-    L_0, N = float(poses.model.robot.length), poses.model.robot.chambers
+    L_0, N = poses.model.length, poses.model.chambers
     lengths, backbone = L_0 * along[:N], L_0 * float(along[N + 1])
     arc = Arc(column, branch.stretch, L_0 * state[:3], state[9:12], lengths, float(along[N]), backbone)
     return branch, arc

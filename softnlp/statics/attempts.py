@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.model.quantities import LOADS
 from softnlp.model.rod import STATE_SIZE
 from softnlp.nlp.continuation import Followed, Path, around_folds, follow, straight_path
 from softnlp.nlp.solver import Solution
@@ -21,7 +22,6 @@ from softnlp.statics.pose_grid import Grid, pose_distance, pose_weight
 Array = NDArray[np.float64]
 Values = Mapping[str, Any]
 
-LOADS = ("tip_force", "tip_moment", "gravity")
 _PRESSURE_PARTS = (0.0, 0.5, 0.25, 0.75)
 _ROUNDING = 1e-12  # of the length or of a load
 _MOST_STEPS = 12  # of one try of Newton's method

@@ -15,7 +15,7 @@ from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.numerics import Numerics, Transcribing
 from softnlp.model.quantities import Model
 from softnlp.model.rod import Loads
-from softnlp.model.tip import tip_conditions
+from softnlp.model.tip import TipContact
 from softnlp.nlp.continuation import follow
 from softnlp.nlp.solver import Solution
 from softnlp.statics.blocked_grid import Blocked, BlockedGrid, kept_grid, transferred
@@ -23,9 +23,10 @@ from softnlp.statics.blocked_step import failed_step, solved_step, touching_step
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.compiled import RodEquations, rod_equations
 from softnlp.statics.free_shape import Free, FreeShapes, Route, free_shape, from_zero, route_from
+from softnlp.statics.grid_size import MOST_INTERVALS
 from softnlp.statics.loadcase import RodFunctions
 from softnlp.statics.pose_grid import iteration_cost
-from softnlp.statics.solver import MOST_INTERVALS, SEARCHED_BY, PoseSolver
+from softnlp.statics.solver import SEARCHED_BY, PoseSolver
 from softnlp.statics.step import Step
 from softnlp.statics.wall import Situation, Wall, keeps_plane, slipping_pressure
 
@@ -77,7 +78,7 @@ class BlockedSolver:
         self.has_wall = wall
         # Without loads the free lengths and tip are taken from the closed form, so the grid need not show it.
         self.poses = poses or PoseSolver(model, numerics, unloaded_accuracy=numerics.accuracy)
-        self.equations = equations or rod_equations(model, tip_conditions(contact.closure, wall=wall))
+        self.equations = equations or rod_equations(model, (TipContact(contact.closure, wall),))
 
     def with_contact(self, contact: ContactSettings) -> BlockedSolver:
         """Return a solver with other settings that shares what both need compiled."""
@@ -120,11 +121,11 @@ class BlockedSolver:
         touch = TOUCHING + 3 * free.error if situation.loads.act else TOUCHING
         if wall is not None:
             ahead = wall.gap(free.contact_point)
-            if ahead > -touch * float(self.model.robot.length):
+            if ahead > -touch * self.model.length:
                 free_step = free.step or self.poses.solve(situation.pressure, loads)[0]
                 if free_step.pose is None:
                     return free_step, None
-                step = touching_step(free_step, self.contact, wall, ahead, touch * float(self.model.robot.length))
+                step = touching_step(free_step, self.contact, wall, ahead, touch * self.model.length)
                 return replace(step, solve_time=time.perf_counter() - began), None
         found, spent = self._settle(situation, free, near)
         spent += free.iterations
@@ -149,7 +150,7 @@ class BlockedSolver:
     def _settle(self, situation: Situation, free: Free, near: Blocked | None) -> tuple[Blocked | _Ended, int]:
         """Follow the branch to a situation and refine the grid until its accuracy is met."""
         plane = self.plane(situation)
-        pressed = np.array([float(situation.pressure[k] > 0) for k in self.model.robot.set_of_chamber])
+        pressed = np.array([float(situation.pressure[k] > 0) for k in self.model.section.set_of_chamber])
         first = self.poses.first_intervals(free.column, free.stretch)
         first = self.numerics.intervals or (min(first, _FINEST_FIRST) if situation.wall is not None else first)
         intervals = near.grid.intervals if near else first
@@ -290,7 +291,7 @@ class BlockedSolver:
             intervals = min(intervals, solved.intervals)
         shapes = FreeShapes(self.poses, self.functions, intervals, self.contact.tip_cap)
         if near is None:
-            return from_zero(end, shapes, TOUCHING * float(self.model.robot.length))
+            return from_zero(end, shapes, TOUCHING * self.model.length)
         solved = near.free.solved
         on_grid = solved is not None and solved.grid is self.poses.grid(intervals, SEARCHED_BY)
         start = near.free.stretch, solved.solution.x if solved and on_grid else None
@@ -316,7 +317,7 @@ class BlockedSolver:
             return grid.problem.pack(self.values(begin.towards(end, u), pressed, lengths))
 
         if near is not None:
-            x = transferred(near, grid, self.equations.shape)
+            x = transferred(near, grid.case, self.equations.shape)
         else:
             free_x = shapes.guess(begin, grid.case.transcribed.points)
             x = np.concatenate([free_x, np.zeros(self.functions.tip_unknowns)])
@@ -365,7 +366,7 @@ class BlockedSolver:
     def _refined(self, found: Blocked, grid: BlockedGrid) -> Blocked | None:
         """Return a solution solved again on a finer grid, or None where that leads elsewhere."""
         p = grid.problem.pack(self.values(found.situation, found.pressed, found.free.lengths))
-        guess = transferred(found, grid, self.equations.shape)
+        guess = transferred(found, grid.case, self.equations.shape)
         solution = grid.engine.solve(p, guess)
         if not solution.holds(self.numerics.tolerance) or grid.distance(solution.x - guess) > 0.05:
             return None

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +19,7 @@ from softnlp.statics.compiled import RodEquations
 from softnlp.statics.condensed import CondensedSolver, plane_directions
 from softnlp.statics.free_shape import Free
 from softnlp.statics.loadcase import LoadCase, load_case
-from softnlp.statics.pose import between_nodes
+from softnlp.statics.pose import Mapped, between_nodes
 from softnlp.statics.wall import Situation
 from softnlp.statics.weighted import Weighted
 
@@ -76,7 +75,7 @@ class BlockedGrid:
         return slice(start, start + 3)
 
     def tip_forces(self, x: Array) -> Array:
-        """Return the scaled forces that the tip conditions add."""
+        """Return the scaled forces that the loads add."""
         return x[1 + self.state_size * len(self.case.transcribed.points) :]
 
     @property
@@ -160,13 +159,13 @@ class Blocked:
     free: Free
 
 
-def transferred(found: Blocked, grid: BlockedGrid, shape: ca.Function) -> Array:
-    """Return the unknowns of a solution on another grid, see `between_nodes`."""
+def transferred(found: Blocked, case: LoadCase, shape: Mapped) -> Array:
+    """Return the unknowns of a solution as those of the same rod's case on another grid, see `between_nodes`."""
     x = found.solution.x
-    if found.grid is grid:
+    if found.grid.case is case:
         return x
-    states = between_nodes(shape, found.grid.nodes(x), found.constants, grid.case.transcribed.points)
-    return np.concatenate([x[:1], states[: grid.state_size].T.ravel(), found.grid.tip_forces(x)])
+    states = between_nodes(shape, found.grid.nodes(x), found.constants, case.transcribed.points)
+    return np.concatenate([x[:1], states[: found.grid.state_size].T.ravel(), found.grid.tip_forces(x)])
 
 
 def kept_grid(

@@ -103,9 +103,9 @@ def solved_step(
             f'{grid.intervals} intervals; set [solver] intervals = "auto" or a larger number'
         )
     wall = situation.wall
-    taken = solution.p[column.size :]
     tip = grid.nodes(solution.x)[:, -1]
-    T, e_L, _ = (np.asarray(v).ravel() for v in functions.contact(tip, found.constants, y, taken, [L_0, F_0]))
+    a = functions.tip_numbers(solution.p)
+    T, e_L, _ = (np.asarray(v).ravel() for v in functions.contact(tip, found.constants, y, a, [L_0, F_0]))
     if wall is None:
         wall = Wall(pose.tip_position, np.zeros(3))
         gap = 0.0

@@ -6,7 +6,7 @@ chambers' force is linear in pressure), so the branch is followed by evaluating,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_FLOOR, Context
 from typing import Any
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from softnlp.base.status import Status
 from softnlp.base.units import BAR
-from softnlp.model.quantities import Model, section_function
-from softnlp.model.section import STIFFNESSES, deform, stiffnesses, stretch_balance
+from softnlp.model.quantities import Model, quantities, section_function
+from softnlp.model.section import STIFFNESSES
 
 Array = NDArray[np.float64]
 
@@ -55,16 +55,13 @@ def branch_function(model: Model) -> ca.Function:
     Rows: A_0 sigma_e; what balances it at full pressure; the `STIFFNESSES` without pressure, then at full pressure.
     """
 
-    def at(m: Model, pressures: Any, stretch: Any) -> tuple[Any, list[Any]]:
-        section = deform(m.robot, m.material, pressures, stretch, m.coefficients, m.conventions)
-        return stretch_balance(section, m.coefficients, m.conventions), stiffnesses(section)
+    def build(numbers: Mapping[str, Any], stretch: Any) -> Sequence[Any]:
+        at_rest, loaded = (model.section.at(numbers, P, stretch) for P in ([0.0] * model.sets, numbers["pressure"]))
+        resistance = at_rest.imbalance
+        rows = [resistance, resistance - loaded.imbalance, *at_rest.stiffnesses, *loaded.stiffnesses]
+        return [ca.vertcat(*rows)]
 
-    def build(m: Model, pressures: Any, gravity: Any, stretch: Any) -> Sequence[Any]:
-        resistance, at_rest = at(m, [0.0] * m.robot.chamber_sets, stretch)
-        imbalance, at_pressure = at(m, pressures, stretch)
-        return [ca.vertcat(resistance, resistance - imbalance, *at_rest, *at_pressure)]
-
-    return section_function(model, build)
+    return section_function(quantities(model), build)
 
 
 def stretch_on_branch(function: ca.Function, column: Array, pressures: Array) -> BranchPoint:

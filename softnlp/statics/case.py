@@ -14,8 +14,10 @@ from softnlp.base.errors import IllPosedError, nearest
 from softnlp.base.quantity import Quantity, quantity
 from softnlp.model.body import Body
 from softnlp.model.contact_settings import Closure
+from softnlp.model.load import Load
+from softnlp.model.quantities import LOADS
 from softnlp.model.rod import STATE_SIZE
-from softnlp.model.tip import DEAD_LOADS, tip_conditions
+from softnlp.model.tip import TipContact
 from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.transcription import MultipleShooting, Transcription
 from softnlp.statics.branch import stretch_on_branch
@@ -35,6 +37,7 @@ def case(
     *,
     given: Mapping[str, Quantity | ca.MX] | None = None,
     own: Sequence[str] = (),
+    loads: Sequence[Load] = (),
     wall: str | Closure | None = None,
     method: Transcription | None = METHOD,
 ) -> LoadCase | Chain:
@@ -50,6 +53,8 @@ def case(
         Expressions, or quantities, in place of some of them, by key: `{"pressure": scale * P}`.
     own
         Keys of quantities that are this case's alone: "tip_force" is then "<name>.tip_force".
+    loads
+        Beside the dead ones, each a `softnlp.Load`; the case takes their quantities too (`Body.quantities_of`).
     wall
         A closure by name, or of your own: a wall at the tip, whose `contact.` quantities the case takes too
         (`Body.contact_quantities`). None: dead loads alone.
@@ -64,12 +69,20 @@ def case(
     Raises
     ------
     IllPosedError
-        For a key that the body does not have, an expression of another size, and a wall or a closed form for a body of
-        several segments.
+        For a key that the body does not have, an expression of another size, a wall or a closed form for a body of
+        several segments or of a section that varies, and loads on a closed form.
     """
-    if len(body.segments) > 1 and (wall is not None or method is None):
+    every = (*loads, *((TipContact(wall),) if wall is not None else ()))
+    chained = len(body.segments) > 1 or bool(body.varying)
+    if chained and (method is None or any(load.needs_lengths for load in every)):
         raise IllPosedError("a wall at the tip, and an arc in closed form, take a body of one segment")
-    declared = {**body.quantities, **(body.contact_quantities if wall is not None else {})}
+    if method is None and loads:
+        raise IllPosedError("an arc in closed form takes no loads")
+    taken = body.quantities_of(every)
+    for key in taken:
+        if key in body.quantities:
+            raise IllPosedError(f"a load has a quantity '{key}', which is one of the body's")
+    declared = {**body.quantities, **taken}
     for key in [*own, *(given or {})]:
         if key not in declared:
             raise IllPosedError(f"'{key}' is not a quantity of this case{nearest(key, declared)}")
@@ -81,13 +94,12 @@ def case(
         if q.symbol.numel() != declared[key].size:
             raise IllPosedError(f"'{key}' takes {declared[key].size} numbers, got {q.symbol.numel()}")
         declared[key] = q
-    if len(body.segments) > 1 and method is not None:
-        return chain_case(name, body, tuple(kept_equations(m) for m in body.models), declared, method)
-    (model,) = body.models
     if method is None:
-        return unloaded_case(name, kept_equations(model).functions, declared)
-    equations = kept_equations(model, (wall, True), lambda: tip_conditions(wall)) if wall else kept_equations(model)
-    return load_case(name, equations.functions, declared, method)
+        return unloaded_case(name, kept_equations(body.models[0]).functions, declared)
+    compiled = tuple(kept_equations(model, every) for model in body.models)
+    if chained:
+        return chain_case(name, body, compiled, declared, method)
+    return load_case(name, compiled[0].functions, declared, method)
 
 
 def own_quantities(case: LoadCase | Chain) -> list[Quantity]:
@@ -112,22 +124,30 @@ def alone(case: LoadCase | Chain) -> CompiledProblem:
 
 def first_guess(case: LoadCase | Chain, values: Mapping[str, Array]) -> Array:
     """Return x of a case without loads at values of its quantities by key, SI: the arc, no force added at the tip."""
+    return _unloaded(case, values)[0]
+
+
+def _unloaded(case: LoadCase | Chain, values: Mapping[str, Array]) -> tuple[Array, Array]:
+    """Return x of a case without loads, and the state at its tip, SI."""
     if isinstance(case, Chain):
         return case.first_guess(values)
     functions = case.functions
-    column = np.concatenate([values[key] for key in kept_equations(functions.model).declared])
-    stretch = stretch_on_branch(kept_equations(functions.model).branch, column, values["pressure"]).stretch
-    return case.arc(column, stretch)
+    branch = kept_equations(functions.model).branch
+    column = np.concatenate([values[key] for key in functions.taken])
+    stretch = stretch_on_branch(branch, column[: branch.size1_in(0)], values["pressure"]).stretch
+    tip = np.asarray(functions.arc(column, stretch, 1.0)).ravel()[:STATE_SIZE]
+    return case.arc(column, stretch), np.concatenate([values["robot.length"] * tip[:3], tip[3:]])
 
 
 def unloaded_values(case: LoadCase | Chain, values: Mapping[str, Array]) -> dict[str, Any]:
     """Return values of a case's quantities with no load, and with the wall where it touches the tip of the arc."""
-    resting: dict[str, Any] = {**values, **{key: np.zeros(3) for key in ("tip_force", "tip_moment", "gravity")}}
-    if isinstance(case, LoadCase) and case.functions.conditions is not DEAD_LOADS:
-        functions = case.functions
-        tip = first_guess(case, resting)[-functions.tip_unknowns - functions.state_size :][:STATE_SIZE]
-        L_0, cap = float(values["robot.length"][0]), float(values["contact.tip_cap"][0])
-        resting["contact.wall_point"] = L_0 * tip[:3] + cap * tip[9:12]
+    resting: dict[str, Any] = {**values, **{key: np.zeros(3) for key in LOADS}}
+    functions = case.equations_of[-1].functions if isinstance(case, Chain) else case.functions
+    if functions.loads:
+        tip = _unloaded(case, resting)[1]
+        for load in functions.loads:
+            own = {q.name: values[q.name] for q in load.quantities(functions.model)}
+            resting |= load.at_rest(own, tip)
     return resting
 
 

@@ -1,13 +1,15 @@
-"""A load case of several segments: each a rod of its own stretch and constants, joined by its state.
+"""A load case of several segments, or of a section that varies: rods one behind the other, joined by their states.
 
 The states hold the force and moment of wall and fluid together, so they go through a junction unchanged, whatever
-pressure ends there. Each segment is posed in its own units, lengths in L_0 and forces in EI/L_0^2.
+pressure ends there. Each segment is posed in its own units, lengths in L_0 and forces in EI/L_0^2 at its base. One
+whose section varies has a part between each two knots, see `softnlp.statics.varying`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -20,17 +22,20 @@ from softnlp.nlp.case import Equation
 from softnlp.nlp.transcription import Transcribed, Transcription
 from softnlp.statics.branch import stretch_on_branch
 from softnlp.statics.compiled import RodEquations
+from softnlp.statics.varying import STATE_BLOCKS, STRETCH, in_units
+from softnlp.statics.wrenches import tip_equations, unknown_units
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Several segments in one state of loading, as equations in scaled units; a `softnlp.nlp.case.Case`.
+    """Several rods in one state of loading, as equations in scaled units; a `softnlp.nlp.case.Case`.
 
-    symbols : the stretch and the states of each segment in turn. outputs : as `LoadCase`, of the whole body, "stretch"
-    (segments), and "segment.k.tip_position", "segment.k.tip_rotation" for each. given : its quantities by key.
-    column : all of them. length_unit, force_unit : of the last segment's states [m, N].
+    symbols : the stretch and the states of each part in turn, then what the loads add. labels : what these are called.
+    segment_of : the segment of each part, from 0. outputs : as `LoadCase`, of the whole body, "stretch" (segments), at
+    their bases, and "segment.k.tip_position", "segment.k.tip_rotation", "segment.k.tip_stretch" for each. given : its
+    quantities by key. column : all of them. length_unit, force_unit : of the last states [m, N].
     """
 
     name: str
@@ -39,7 +44,9 @@ class Chain:
     method: Transcription
     given: Mapping[str, Quantity]
     transcribed: tuple[Transcribed, ...]
+    segment_of: tuple[int, ...]
     symbols: tuple[ca.MX, ...]
+    labels: tuple[str, ...]
     constants: ca.MX
     column: ca.MX
     residuals: ca.MX
@@ -54,22 +61,42 @@ class Chain:
         """The Jacobian of the residuals by the unknowns."""
         return ca.horzcat(*(ca.jacobian(self.residuals, symbol) for symbol in self.symbols))
 
-    def first_guess(self, values: Mapping[str, Array]) -> Array:
-        """Return x of the shape without loads at values of `given` by key, SI: arcs, one behind the other."""
+    def first_guess(self, values: Mapping[str, Array]) -> tuple[Array, Array]:
+        """Return x of the shape without loads at values of `given` by key, SI, and its last state, SI.
+
+        Arcs one behind the other, and what a section that varies makes of them.
+        """
         parts: list[Array] = []
         R, p = np.eye(3), np.zeros(3)  # of the end before, world frame [m]
+        chained = iter(self.transcribed)
         for k, equations in enumerate(self.equations_of):
-            own = self.body.of_segment(k, values)
-            column = np.concatenate(list(own.values()))
-            stretch = stretch_on_branch(equations.branch, column, own["pressure"]).stretch
-            L_0 = float(equations.functions.section(column, stretch)[2][0])
-            states = np.asarray(equations.functions.arc(column, stretch, self.transcribed[k].points[None, :]))
-            turned = states.copy()
-            turned[:3] = p[:, None] / L_0 + R @ states[:3]
-            turned[3:12] = np.concatenate([R @ states[3 * j : 3 * j + 3] for j in (1, 2, 3)])
-            p, R = L_0 * turned[:3, -1], turned[3:12, -1].reshape(3, 3).T
-            parts += [np.array([stretch]), turned.T.ravel()]
-        return np.concatenate(parts)
+            functions, knots = equations.functions, self.body.knots(k)
+            columns = [_column_of(self.body, equations, k, values, s) for s in knots]
+            pressure = self.body.of_segment(k, values)["pressure"]
+            own = columns[0][: equations.branch.size1_in(0)]
+            stretch = stretch_on_branch(equations.branch, own, pressure).stretch
+            L_0, F_0 = (float(unit) for unit in np.asarray(functions.section(columns[0], stretch)[2]).ravel())
+            varies = k in self.body.varying
+            for (s_a, s_b), (a, b) in zip(pairwise(knots), pairwise(columns), strict=True):
+                points = next(chained).points
+                if varies:
+                    start = np.concatenate([p / L_0, R.T.ravel(), np.zeros(6), [stretch, 0.0]])
+                    states = equations.varying.unloaded(start, np.concatenate([a, b, [s_b - s_a, F_0]]), points)
+                else:
+                    states = np.asarray(functions.arc(a, stretch, points[None, :]))
+                    turned = [R @ states[3 * j : 3 * j + 3] for j in (1, 2, 3)]
+                    states = np.concatenate([p[:, None] / L_0 + R @ states[:3], *turned, states[12:]])
+                parts += [np.array([stretch]), states.T.ravel()]
+                p, R = L_0 * states[:3, -1], states[3:12, -1].reshape(3, 3).T
+                stretch = states[STRETCH, -1] if varies else stretch
+        unknown = functions.tip_unknowns
+        return np.concatenate([*parts, np.zeros(unknown)]), np.concatenate([p, R.T.ravel(), np.zeros(6)])
+
+
+def _column_of(body: Body, equations: RodEquations, k: int, values: Mapping[str, Array], s: float) -> Array:
+    """Return what the section of a segment takes at s."""
+    own = {**values, **body.of_segment(k, values, s)}
+    return np.concatenate([own[key] for key in equations.functions.taken])
 
 
 def chain_case(
@@ -77,61 +104,69 @@ def chain_case(
 ) -> Chain:
     """Transcribe the segments of a body in the state of loading that the quantities `given` describe.
 
-    equations_of : what is compiled for each segment, under dead loads. given : every key of `body.quantities`. method :
-    of each segment, with as many intervals.
+    equations_of : what is compiled for each segment, under the same loads. given : every key of `body.quantities` and
+    of the loads. method : of each segment, with as many intervals; each part of one that varies has its share of them.
     """
-    pieces, symbols, residuals, fine, equations = [], [], [], [], list[Equation]()
+    made = _Rows([], [], [], 0)
+    pieces, symbols, labels, segment_of = [], list[ca.MX](), list[str](), list[int]()
     lengths, angles, backbone, stretches, outputs = [], [], [], [], {}
-    before: tuple[ca.MX, ca.MX, ca.MX] | None = None  # the last state of the segment before, and its units
-    rows = 0
+    values = {key: q.symbol for key, q in given.items()}
+    before: tuple[ca.MX, ca.MX, ca.MX] | None = None  # the last state of the part before, and its units
     for k, compiled in enumerate(equations_of):
-        functions = compiled.functions
-        own = body.of_segment(k, {key: q.symbol for key, q in given.items()})
-        stretch = ca.MX.sym("stretch")
-        constants, balance, units = functions.section(ca.vertcat(*own.values()), stretch)
-        L_0, F_0 = units[0], units[1]
-        transcribed = method.transcribe(functions.field, constants)
-        first, last = transcribed.nodes[:, 0], transcribed.nodes[:, -1]
-        start = rod.base_balance(first) if before is None else first - _in_units(*before, L_0, F_0)
-        residuals += [balance, start, transcribed.residuals]
-        fine += [balance, start, transcribed.fine_residuals]
-        label = f"segment {k + 1}: "
-        equations.append(Equation(f"{label}stretch balance", np.array([rows]), "N", F_0))
-        blocks = {key: where for key, where in rod.STATE_BLOCKS.items() if before is not None or where.start < 12}
-        scales = {
-            "position": ("m", L_0),
-            "rotation": ("1", ca.MX(1)),
-            "force": ("N", F_0),
-            "moment": ("N m", F_0 * L_0),
-        }
-        word = "base" if before is None else "junction"
-        equations += [
-            Equation(f"{label}{word} {key}", rows + 1 + np.arange(where.start, where.stop), *scales[key])
-            for key, where in blocks.items()
-        ]
-        rows += 1 + start.numel()
-        inner = rows + np.arange(transcribed.residuals.numel()).reshape(-1, rod.STATE_SIZE)
-        equations += [
-            Equation(f"{label}along the rod, {key}", inner[:, where].ravel(), *scales[key])
-            for key, where in rod.STATE_BLOCKS.items()
-        ]
-        rows += transcribed.residuals.numel()
-
-        along = transcribed.integrate(functions.lengths)
-        N = functions.model.robot.chambers
-        lengths.append(along[:N] * L_0)
-        angles.append(along[N])
-        backbone.append(along[N + 1] * L_0)
-        stretches.append(stretch)
+        functions, knots, varies = compiled.functions, body.knots(k), k in body.varying
+        columns = []
+        for s in knots:
+            own = {**values, **body.of_segment(k, values, s)}
+            columns.append(ca.vertcat(*(own[key] for key in functions.taken)))
+        summed = ca.MX.zeros(functions.model.chambers + 2)
+        for j, (column, following) in enumerate(pairwise(columns)):
+            several = len(knots) > 2
+            label = f"segment {k + 1} part {j + 1}" if several else f"segment {k + 1}"
+            stretch = ca.MX.sym("stretch")
+            constants, balance, units = functions.section(column, stretch)
+            if j == 0:
+                L_0, F_0 = units[0], units[1]
+            field, rates, part = functions.field, functions.lengths, method
+            if varies:
+                share = knots[j + 1] - knots[j]
+                field, rates = compiled.varying.field, compiled.varying.lengths
+                constants = ca.vertcat(column, following, share, F_0)
+                part = method.with_intervals(max(1, round(method.intervals * share)))
+            transcribed = part.transcribe(field, constants)
+            first, last = transcribed.nodes[:, 0], transcribed.nodes[:, -1]
+            scales = _scales(L_0, F_0)
+            start = rod.base_balance(first) if before is None else first[: rod.STATE_SIZE] - in_units(*before, L_0, F_0)
+            made.add(f"{label}: stretch balance", balance, "N", units[1])
+            word = "base" if before is None else "junction"
+            for key, where in rod.STATE_BLOCKS.items():
+                if before is not None or where.start < 12:
+                    made.add(f"{label}: {word} {key}", start[where], *scales[key])
+            if varies:
+                made.add(f"{label}: {word} stretch", first[STRETCH] - stretch, "1", ca.MX(1))
+                made.add(f"{label}: {word} place", first[STRETCH + 1], "1", ca.MX(1))
+            made.along(label, transcribed, scales)
+            summed += transcribed.integrate(rates)
+            pieces.append((transcribed, constants))
+            symbols += [stretch, transcribed.unknowns]
+            labels += [f"{label} stretch", f"{label} states"]
+            segment_of.append(k)
+            if j == 0:
+                stretches.append(stretch)
+            before = last[: rod.STATE_SIZE], L_0, F_0
+        end = last[STRETCH] if varies else stretch
+        lengths.append(summed[:-2] * L_0)
+        angles.append(summed[-2])
+        backbone.append(summed[-1] * L_0)
         outputs[f"segment.{k + 1}.tip_position"] = last[:3] * L_0
         outputs[f"segment.{k + 1}.tip_rotation"] = ca.reshape(last[3:12], 3, 3)
-        pieces.append((transcribed, constants))
-        symbols += [stretch, transcribed.unknowns]
-        before = last, L_0, F_0
-    force, moment = own["tip_force"] / F_0, own["tip_moment"] / (F_0 * L_0)
-    tip = rod.tip_balance(last, force, moment)
-    equations.append(Equation("tip force", np.arange(rows, rows + 3), "N", F_0))
-    equations.append(Equation("tip moment", np.arange(rows + 3, rows + 6), "N m", F_0 * L_0))
+        outputs[f"segment.{k + 1}.tip_stretch"] = end
+    reached = last
+    if varies:
+        constants, _, units = functions.section(columns[-1], end)
+        reached = in_units(last[: rod.STATE_SIZE], L_0, F_0, units[0], units[1])
+    y = ca.MX.sym("tip_forces", functions.tip_unknowns)
+    tip = functions.tip(reached, constants, y, functions.tip_column(given), units)
+    made.equations += tip_equations(made.count, functions.loads, units[0], units[1])
     whole = {
         "stretch": ca.vertcat(*stretches),
         "tip_position": last[:3] * L_0,
@@ -140,6 +175,9 @@ def chain_case(
         "bending_angle": ca.sum1(ca.vertcat(*angles)),
         "backbone_length": ca.sum1(ca.vertcat(*backbone)),
     }
+    if functions.tip_unknowns:
+        symbols, labels = [*symbols, y], [*labels, y.name()]
+        whole["tip_forces"] = y * unknown_units(functions.loads, units[0], units[1])
     return Chain(
         name=name,
         body=body,
@@ -147,19 +185,52 @@ def chain_case(
         method=method,
         given=given,
         transcribed=tuple(transcribed for transcribed, _ in pieces),
+        segment_of=tuple(segment_of),
         symbols=tuple(symbols),
+        labels=tuple(labels),
         constants=ca.vertcat(*(constants for _, constants in pieces)),
-        column=ca.vertcat(*(q.symbol for q in given.values())),
-        residuals=ca.vertcat(*residuals, tip),
-        fine_residuals=ca.vertcat(*fine, tip),
-        equations=tuple(equations),
+        column=ca.vertcat(*values.values()),
+        residuals=ca.vertcat(*made.residuals, tip),
+        fine_residuals=ca.vertcat(*made.fine, tip),
+        equations=tuple(made.equations),
         outputs=whole | outputs,
         length_unit=L_0,
         force_unit=F_0,
     )
 
 
-def _in_units(state: ca.MX, L_a: ca.MX, F_a: ca.MX, L_b: ca.MX, F_b: ca.MX) -> ca.MX:
-    """Return a scaled state of one segment in the units of another."""
-    moment = F_a * L_a / (F_b * L_b)
-    return ca.vertcat(state[:3] * L_a / L_b, state[3:12], state[12:15] * F_a / F_b, state[15:18] * moment)
+def _scales(L_0: ca.MX, F_0: ca.MX) -> dict[str, tuple[str, ca.MX]]:
+    """Return the unit of each block of a state, and one of it in SI."""
+    none = ("1", ca.MX(1))
+    scales = {"position": ("m", L_0), "rotation": none, "force": ("N", F_0), "moment": ("N m", F_0 * L_0)}
+    return {**scales, "stretch": none, "place": none}
+
+
+@dataclass
+class _Rows:
+    """Residuals on their way, those at half the step beside them, and their names. count : of the rows so far."""
+
+    residuals: list[ca.MX]
+    fine: list[ca.MX]
+    equations: list[Equation]
+    count: int
+
+    def add(self, name: str, rows: ca.MX, unit: str, scale: ca.MX) -> None:
+        """Add rows that are the same on every grid."""
+        self.equations.append(Equation(name, self.count + np.arange(rows.numel()), unit, scale))
+        self.residuals.append(rows)
+        self.fine.append(rows)
+        self.count += rows.numel()
+
+    def along(self, label: str, transcribed: Transcribed, scales: Mapping[str, tuple[str, ca.MX]]) -> None:
+        """Add the rows of all intervals."""
+        size = transcribed.residuals.numel()
+        inner = self.count + np.arange(size).reshape(-1, transcribed.state_size)
+        self.equations += [
+            Equation(f"{label}: along the rod, {key}", inner[:, where].ravel(), *scales[key])
+            for key, where in STATE_BLOCKS.items()
+            if where.start < transcribed.state_size
+        ]
+        self.residuals.append(transcribed.residuals)
+        self.fine.append(transcribed.fine_residuals)
+        self.count += size

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -19,33 +20,42 @@ class DisputedError(Exception):
     """IPOPT does not confirm a solution; the message says both tips."""
 
 
-def closed(engine: Engine, proposed: Solution, numerics: Numerics, tip: slice) -> Solution:
-    """Return IPOPT's solution from a proposed one, or that where IPOPT takes no part or has solved it already.
+def closed(
+    engine: Engine, proposed: Solution, numerics: Numerics, tip: slice, whole: tuple[Engine, Solution] | None = None
+) -> Solution:
+    """Return IPOPT's solution from a proposed pose, or that where IPOPT takes no part or has solved it already.
 
-    tip : where x holds the tip's position, in lengths of the robot.
+    tip : where x holds the tip's position, in lengths of the robot. whole : what else than the pose alone IPOPT solves,
+    with the pose at the end of x, and its start. Raises as `close`, where the tip is further away than the accuracy.
+    """
+    if numerics.engine != "auto":
+        return proposed
+
+    def differs(found: Solution) -> str:
+        away = float(np.linalg.norm(found.x[tip] - proposed.x[tip]))
+        if found.holds(numerics.tolerance) and away <= numerics.accuracy:
+            return ""
+        units = np.asarray(engine.problem.units(proposed.x, proposed.p)).ravel() / MILLIMETRE
+        here, there = (", ".join(f"{units[0] * v:.6g}" for v in solution.x[tip]) for solution in (proposed, found))
+        return f"the tip is at ({here}) mm by Newton's method and at ({there}) mm by IPOPT"
+
+    found = close(*(whole or (engine, proposed)), differs)
+    return replace(found, engine_status=proposed.engine_status)
+
+
+def close(engine: Engine, start: Solution, differs: Callable[[Solution], str]) -> Solution:
+    """Return IPOPT's solution of a whole program from a proposed one.
+
+    differs : how what IPOPT found differs from what was proposed, in words; none where it confirms it.
 
     Raises
     ------
     DisputedError
-        Where IPOPT ends at no solution, or at one whose tip is further away than the accuracy asked for.
+        Where it does not.
     """
-    if numerics.engine != "auto":
-        return proposed
-    found = confirmed(engine, proposed, engine.closed(proposed), numerics, tip)
-    return replace(found, engine_status=proposed.engine_status)
-
-
-def confirmed(engine: Engine, proposed: Solution, found: Solution, numerics: Numerics, tip: slice) -> Solution:
-    """Return what IPOPT found where it confirms a proposed solution. Raises as `closed`."""
-    away = float(np.linalg.norm(found.x[tip] - proposed.x[tip]))
-    if found.holds(numerics.tolerance) and away <= numerics.accuracy:
-        return found
-    length = float(np.asarray(engine.problem.units(proposed.x, proposed.p)).ravel()[0]) / MILLIMETRE
-    here, there = (", ".join(f"{length * v:.6g}" for v in solution.x[tip]) for solution in (proposed, found))
-    raise disputed(f"the tip is at ({here}) mm by Newton's method and at ({there}) mm by IPOPT", found)
-
-
-def disputed(both: str, found: Solution) -> DisputedError:
-    """Return the error of two answers, in words that end with that of IPOPT."""
-    said = "" if found.ipopt is None else f" ({found.ipopt.status})"
-    return DisputedError(f"{Status.DISPUTED.advice}; {both}{said}, whose largest residual is {found.residual:.2g}")
+    found = engine.closed(start)
+    both = differs(found)
+    if both:
+        said = "" if found.ipopt is None else f" ({found.ipopt.status})"
+        raise DisputedError(f"{Status.DISPUTED.advice}; {both}{said}, whose largest residual is {found.residual:.2g}")
+    return found

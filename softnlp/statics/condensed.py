@@ -6,7 +6,7 @@ For J(x) dx = -g, with x = [stretch | x_0 | ... | x_K | y] and g = [balance | ba
     stretch   the balance depends on nothing else, so d(lambda) = -g_0 / b'(lambda)
     base      d(p, R, L_i)_0 = -g_base; d(n, m)_0 stays unknown: six directions and one known part
     interval  dx_k+1 = F_x dx_k + F_c c' d(lambda) + g_k, one Runge-Kutta step with seven forward directions
-    tip       6 + n_y equations for d(n, m)_0 and the forces y that the tip conditions add
+    tip       6 + n_y equations for d(n, m)_0 and the forces y that the loads add
 
 The same numbers as a sparse factorisation gives, for the cost of one sweep.
 """
@@ -27,6 +27,7 @@ from softnlp.nlp.linear import BorderedSolver, LinearSolver, SparseSolver
 from softnlp.nlp.problem import CompiledProblem
 from softnlp.nlp.transcription import MultipleShooting, Tableau, rk_step
 from softnlp.statics.loadcase import LoadCase, RodFunctions, stretch_imbalance
+from softnlp.statics.tangents import Tangents, tangents
 
 Array = NDArray[np.float64]
 
@@ -70,12 +71,9 @@ class CondensedSolver:
         """
         rows, known = len(self._into[0]), self._base.shape[1]
         given = np.zeros(x.size) if g is None else g
-        directions, tip, turned = evaluated(self._sweep(1), x, p, given)
-        if not np.max(np.abs(tip)) < _LARGEST:  # nan is not either
-            raise np.linalg.LinAlgError("the linearised tip equations are not finite")
+        directions, tip, turned = self._swept(x, p, given[:, None])
         matrix = np.delete(tip, known, axis=1)
-        every = directions.reshape(*self._shape, known + 1)
-        return TipSystem(matrix, tip[:, known] + given[-rows:], every, float(turned[0, 0]))
+        return TipSystem(matrix, tip[:, known] + given[-rows:], directions, float(turned[0, 0]))
 
     def solve(self, x: Array, p: Array, g: Array) -> Array:
         """Return dx. Raises `numpy.linalg.LinAlgError` where the tip equations are singular or not finite."""
@@ -88,16 +86,51 @@ class CondensedSolver:
     def solve_many(self, x: Array, p: Array, G: Array) -> Array:
         """Return the columns dx for as many right sides G (n, r) in one sweep. Raises as `solve`."""
         r, rows, known = G.shape[1], len(self._into[0]), self._base.shape[1]
-        directions, tip, turned = evaluated(self._sweep(r), x, p, G)
-        if not np.max(np.abs(tip)) < _LARGEST:  # nan is not either
-            raise np.linalg.LinAlgError("the linearised tip equations are not finite")
+        every, tip, turned = self._swept(x, p, G)
         matrix = np.delete(tip, np.s_[known : known + r], axis=1)
         right = tip[:, known : known + r] + G[-rows:]
         found = np.linalg.solve(self._into @ matrix, -(self._into @ right))
         nx, nodes = self._shape
-        every = directions.reshape(nx, nodes, known + r)
         states = every[:, :, :known] @ found[:known] + every[:, :, known:]
         return np.concatenate([turned, states.transpose(1, 0, 2).reshape(nx * nodes, r), found[known:]])
+
+    def _swept(self, x: Array, p: Array, G: Array) -> tuple[Array, Array, Array]:
+        """Return directions (nx, K + 1, d + r), the linearised tip (rows, d + r + n_y) and d(stretch) (1, r).
+
+        Raises `numpy.linalg.LinAlgError` where the tip equations are not finite.
+        """
+        r, known = G.shape[1], self._base.shape[1]
+        own = tangents(self._functions)
+        if own.ready(self._method.intervals):
+            with np.errstate(all="ignore"):
+                every, tip, turned = self._by_machine(own, x, p, G)
+        else:
+            directions, tip, turned = evaluated(self._sweep(r), x, p, G)
+            every = directions.reshape(*self._shape, known + r)
+        if not np.max(np.abs(tip)) < _LARGEST:  # nan is not either
+            raise np.linalg.LinAlgError("the linearised tip equations are not finite")
+        return every, tip, turned
+
+    def _by_machine(self, own: Tangents, x: Array, p: Array, G: Array) -> tuple[Array, Array, Array]:
+        """Return what the sweep function does, its intervals differentiated in machine code and then put together."""
+        nx, nodes = self._shape
+        r, known, rows, K = G.shape[1], self._base.shape[1], len(self._into[0]), nodes - 1
+        _, tip, section = _pieces(self._functions, self._method.tableau, known + r, r)
+        n_p = section.size1_in(0)
+        c, slope, balance_slope, scales = evaluated(section, p[:n_p], x[:1])
+        d_stretch = -G[:1] / balance_slope
+        states = x[1 : 1 + nx * nodes].reshape(nodes, nx)
+        maps, by_stretch = own.maps(states[:K].T, c[:, 0], slope[:, 0], 1 / K)
+        forced = by_stretch[:, :, None] * d_stretch + G[1 + nx - 6 : -rows].reshape(K, nx, r)
+        every = np.zeros((nodes, nx, known + r))
+        every[0, _FORCE, :known] = self._base
+        every[0, :12, known:], every[0, 18:, known:] = -G[1:13], -G[13 : 1 + nx - 6]
+        for k in range(K):
+            np.matmul(maps[k], every[k], out=every[k + 1])
+            every[k + 1, :, known:] += forced[k]
+        y, a = x[1 + nx * nodes :], self._functions.tip_numbers(p)
+        (linear,) = evaluated(tip, every[K], states[K], c, slope @ d_stretch, y, a, scales)
+        return every.transpose(1, 0, 2), linear, d_stretch
 
     def _sweep(self, right_sides: int) -> ca.Function:
         """Return the sweep for so many right sides, built at first use."""
@@ -161,7 +194,7 @@ class StretchSolver:
 
     def solve_many(self, x: Array, p: Array, G: Array) -> Array:
         """Return the columns dx (1, r). Raises `numpy.linalg.LinAlgError` at the end of the branch."""
-        slope = float(self._imbalance(p, x)[1])
+        slope = float(evaluated(self._imbalance, p, x)[1][0, 0])
         if not (np.isfinite(slope) and slope):
             raise np.linalg.LinAlgError("the slope of the stretch balance is zero or not finite")
         return -np.asarray(G) / slope
@@ -176,12 +209,21 @@ def _pieces(
     columns : directions, of which the last `right_sides` carry gaps and a change of the constants.
     """
     nx, ny = functions.state_size, functions.tip_unknowns
-    nc, na = functions.field.size1_in(1), functions.tip.size1_in(5)
+    nc, na = functions.field.size1_in(1), functions.tip.size1_in(3)
     step = rk_step(functions.field, tableau)
 
     def sym(name: str, *shape: int) -> ca.SX:
         return ca.SX.sym(name, *shape)
 
+    column, stretch = sym("p", functions.section.size1_in(0)), sym("stretch")
+    constants, balance, scales = functions.section(column, stretch)
+    c_slope = ca.jacobian(constants, stretch)
+    section = ca.Function(
+        "section",
+        [column, stretch],
+        [constants, ca.densify(c_slope), ca.jacobian(balance, stretch), scales],
+        {"cse": True},
+    )
     r = right_sides
     V, state, gap, c, dc, h = (
         sym("V", nx, columns),
@@ -191,24 +233,18 @@ def _pieces(
         sym("dc", nc, r),
         sym("h"),
     )
-    moves = ca.vertcat(V, ca.horzcat(ca.SX(nc, columns - r), dc))
+    moving = ca.SX(nc, r)  # those of the constants that follow the stretch
+    moving[c_slope.sparsity().row(), :] = dc[c_slope.sparsity().row(), :]
+    moves = ca.vertcat(V, ca.horzcat(ca.SX(nc, columns - r), moving))
     arrived = ca.jtimes(step(state, c, h), ca.vertcat(state, c), moves)
     arrived[:, columns - r :] += gap
     advance = ca.Function("advance", [V, state, gap, c, dc, h], [arrived], {"cse": True})
 
     y, a, units = sym("y", ny), sym("a", na), sym("units", 2)
-    tip_residual = functions.tip(state, c, ca.SX.zeros(3), ca.SX.zeros(3), y, a, units)
+    tip_residual = functions.tip(state, c, y, a, units)
     linear = ca.horzcat(ca.jtimes(tip_residual, ca.vertcat(state, c), moves), ca.jacobian(tip_residual, y))
     tip = ca.Function("tip", [V, state, c, dc, y, a, units], [ca.densify(linear)], {"cse": True})
 
-    column, stretch = sym("p", functions.section.size1_in(0)), sym("stretch")
-    constants, balance, scales = functions.section(column, stretch)
-    section = ca.Function(
-        "section",
-        [column, stretch],
-        [constants, ca.jacobian(constants, stretch), ca.jacobian(balance, stretch), scales],
-        {"cse": True},
-    )
     return advance, tip, section
 
 
@@ -222,8 +258,8 @@ def _sweep_function(
     K, nx, ny, r = method.intervals, functions.state_size, functions.tip_unknowns, right_sides
     columns = base_directions.shape[1] + r
     advance, tip, section = _pieces(functions, method.tableau, columns, r)
-    n_p, na = section.size1_in(0), functions.tip.size1_in(5)
-    x, p = ca.MX.sym("x", 1 + nx * (K + 1) + ny), ca.MX.sym("p", n_p + na)
+    n_p, every = section.size1_in(0), sum(q.size for q in functions.declared().values())
+    x, p = ca.MX.sym("x", 1 + nx * (K + 1) + ny), ca.MX.sym("p", every)
     g = ca.MX.sym("g", x.numel(), r)
     c_now, c_slope, balance_slope, scales_now = section(p[:n_p], x[0])
     d_stretch = -g[0, :] / balance_slope
@@ -238,6 +274,7 @@ def _sweep_function(
     held = ca.vertcat(-base[:12, :], ca.DM.zeros(6, r), -base[12:, :])
     start = ca.horzcat(ca.MX(free), held)
     steps = advance.mapaccum(K)
-    every = steps(start, nodes[:, :K], gaps, ca.repmat(c_now, 1, K), ca.repmat(d_constants, 1, K), ca.DM.ones(1, K) / K)
-    last = tip(every[:, -columns:], nodes[:, K], c_now, d_constants, x[x.numel() - ny :], p[n_p:], scales_now)
-    return ca.Function("condensed", [x, p, g], [ca.horzcat(start, every), last, d_stretch])
+    swept = steps(start, nodes[:, :K], gaps, ca.repmat(c_now, 1, K), ca.repmat(d_constants, 1, K), ca.DM.ones(1, K) / K)
+    a = functions.tip_numbers(p)
+    last = tip(swept[:, -columns:], nodes[:, K], c_now, d_constants, x[x.numel() - ny :], a, scales_now)
+    return ca.Function("condensed", [x, p, g], [ca.horzcat(start, swept), last, d_stretch])

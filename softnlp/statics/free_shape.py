@@ -118,7 +118,7 @@ class FreeShapes:
         column = self._poses.column(values)
         last = self._last[1]
         stretch = self.stretch(column)
-        L_0 = float(self._poses.model.robot.length)
+        L_0 = self._poses.model.length
         if not situation.loads.act:
             state = np.asarray(self._functions.arc(column, stretch, 1.0)).ravel()
             return state[STATE_SIZE:] * L_0, (state[:3] + self._tip_cap / L_0 * state[9:12]) * L_0
@@ -130,7 +130,7 @@ class FreeShapes:
         if last is not None and not solution.holds(10 * grid.stepper.tolerance):
             solution = grid.stepper.solve(p, last)
         if not solution.holds(10 * grid.stepper.tolerance):
-            N = self._poses.model.robot.chambers
+            N = self._poses.model.chambers
             return np.full(N, np.nan), np.full(3, np.nan)
         self._last, self._arc = (stretch, solution.x), arc
         found = grid.problem.outputs(x=solution.x, p=p)

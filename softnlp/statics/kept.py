@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
+from typing import Any
 
 from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.load import Load
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
-from softnlp.model.tip import DEAD_LOADS, TipConditions, tip_conditions
+from softnlp.model.tip import TipContact
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.compiled import RodEquations, rod_equations
 from softnlp.statics.solver import PoseSolver
@@ -21,28 +23,26 @@ MOST_KINDS = 8
 """How many rods are kept; those that were used least recently go."""
 
 
-def pose_solver(model: Model, numerics: Numerics, **settings: float) -> PoseSolver:
+def pose_solver(model: Model, numerics: Numerics, **settings: Any) -> PoseSolver:
     """Return a solver for use in this thread, which shares what it compiles with all others for models of its kind."""
     return PoseSolver(model, numerics, equations=kept_equations(model), **settings)
 
 
 def blocked_solver(model: Model, numerics: Numerics, contact: ContactSettings, *, wall: bool = True) -> BlockedSolver:
     """Return a solver for use in this thread, which shares what it compiles as `pose_solver`."""
-    kept = kept_equations(model, (contact.closure, wall), lambda: tip_conditions(contact.closure, wall=wall))
+    kept = kept_equations(model, (TipContact(contact.closure, wall),))
     poses = pose_solver(model, numerics, unloaded_accuracy=numerics.accuracy)
     return BlockedSolver(model, numerics, contact, wall=wall, poses=poses, equations=kept)
 
 
-def kept_equations(
-    model: Model, key: Hashable = (), conditions: Callable[[], TipConditions] = lambda: DEAD_LOADS
-) -> RodEquations:
+def kept_equations(model: Model, loads: tuple[Load, ...] = ()) -> RodEquations:
     """Return the equations of the model's kind, compiled at their first use in this thread.
 
-    key : what tells tip conditions apart. conditions : makes them.
+    loads : beside the dead ones; equal ones share what is compiled.
     """
-    kept, name = _KEPT.equations, (model.kind, key)
+    kept, name = _KEPT.equations, (model.kind, loads)
     if name not in kept:
-        kept[name] = rod_equations(model, conditions())
+        kept[name] = rod_equations(model, loads)
         while len(kept) > MOST_KINDS:
             kept.popitem(last=False)
     kept.move_to_end(name)

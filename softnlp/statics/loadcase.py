@@ -6,9 +6,9 @@ stiffness of the unpressurised section. So one compiled problem is well scaled f
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import casadi as ca
@@ -17,51 +17,51 @@ from numpy.typing import NDArray
 
 from softnlp.base.quantity import Quantity
 from softnlp.model import rod
-from softnlp.model.quantities import Model, contact_quantities, force_unit, quantities, section_function
-from softnlp.model.section import deform, stretch_balance
-from softnlp.model.tip import DEAD_LOADS, AtTip, Given, TipConditions, gap, length_error
+from softnlp.model.dead_tip import DeadTip
+from softnlp.model.load import Load
+from softnlp.model.quantities import Model, force_unit, quantities, section_function
+from softnlp.model.section import RodSection, rod_section, unit_scale
 from softnlp.nlp.case import Equation
 from softnlp.nlp.transcription import Transcribed, Transcription
+from softnlp.statics.wrenches import line_loads, tip_equations, tip_rows, unknown_units
 
 Array = NDArray[np.float64]
 
-_SECTION_SIZE = len(rod.RodSection._fields)
+_SECTION_SIZE = len(RodSection._fields)
+_GRAVITY = slice(_SECTION_SIZE, _SECTION_SIZE + 3)
 _NEWTON_STEPS = 30
-
-
-def _pack(model: Model, pressures: Any, gravity: Any, stretch: Any) -> list[Any]:
-    """Return the rod's constants, the scaled stretch imbalance, and the units, for `section_function`."""
-    L_0, F_0 = model.robot.length, force_unit(model)
-    section = deform(model.robot, model.material, pressures, stretch, model.coefficients, model.conventions)
-    scaled = rod.rod_section(section, model.material.density, gravity, L_0, F_0)
-    centres = [coordinate / L_0 for centre in section.centres for coordinate in centre]
-    balance = stretch_balance(section, model.coefficients, model.conventions) / F_0
-    chamber = section.tangent_modulus * ca.pi * section.chamber_radius**2 / F_0
-    return [ca.vertcat(*scaled, stretch, *centres, chamber), balance, ca.vertcat(L_0, F_0)]
 
 
 @dataclass(frozen=True, eq=False)
 class RodFunctions:
     """The rod of a model as functions, in scaled units; c are its constants at one stretch and pressure.
 
-    The state x has the chamber lengths behind p, R, N, M where the tip conditions need them; y are the forces that the
-    conditions add, a the quantities that they take (SI).
+    The state x has the chamber lengths behind p, R, N, M where a load needs them; y are the unknowns that the loads
+    add, a the numbers that they take at the tip (SI): those of the dead loads, then those of `loads`.
 
-    section : (quantities, stretch) -> c, scaled stretch imbalance, units (L_0, EI / L_0^2). field : (x, c) -> dx/ds on
-    s in 0..1. lengths : (x, c) -> rates of the chamber lengths, the bending angle and the backbone length.
-    tip : (x, c, force, moment, y, a, units) -> the tip residuals, 6 and as many more as y has entries.
-    contact : (x, c, y, a, units) -> T_i (N), e_L, e_h. arc : (quantities, stretch, s) -> state without gravity or tip
-    load, exact there and the first guess elsewhere.
+    loads : beside the dead ones; those that act along the rod come first.
+    section : (quantities, stretch) -> c, scaled stretch imbalance, units (L_0, EI / L_0^2). taken : which, in
+    order: the model's, then those of loads that act along the rod. field : (x, c) -> dx/ds on s in 0..1. lengths :
+    (x, c) -> rates of the chamber lengths, the bending angle and the backbone length. strains : (p, R, N, M; c) ->
+    v, u.
+    tip : (x, c, y, a, units) -> the tip residuals, 6 and as many more as y has entries.
+    contact : (x, c, y, a, units) -> T_i (N), e_L, e_h where there is a `TipContact`. arc : (quantities, stretch, s) ->
+    state without gravity or tip load, exact there and the first guess elsewhere. by_machine : whether machine
+    code may take the place of the virtual machine where that pays: the same numbers but for round-off, from when on
+    depends on what was solved before.
     """
 
     model: Model
-    conditions: TipConditions
+    loads: tuple[Load, ...]
+    taken: tuple[str, ...]
     section: ca.Function
     field: ca.Function
     lengths: ca.Function
+    strains: ca.Function
     tip: ca.Function
     contact: ca.Function
     arc: ca.Function
+    by_machine: bool = True
 
     @property
     def state_size(self) -> int:
@@ -71,56 +71,97 @@ class RodFunctions:
     @property
     def tip_unknowns(self) -> int:
         """The number of entries of y."""
-        return len(self.conditions.unknowns)
+        return int(self.tip.size1_in(2))
 
     def declared(self, model: Model | None = None) -> dict[str, Quantity]:
-        """Return every quantity of a load case by name: those of the model, then those that the tip conditions take.
+        """Return every quantity of a load case by name: those of the model, then those of the loads.
 
         model : whose numbers are nominal, of the same kind; None is the one that these functions were compiled of.
         """
         numbers = model or self.model
-        taken = contact_quantities(numbers) if self.conditions.has_contact else {}
-        return {**quantities(numbers), **taken}
+        return {**quantities(numbers), **{q.name: q for load in self.loads for q in load.quantities(numbers)}}
+
+    @cached_property
+    def _tip_names(self) -> list[str]:
+        return [q.name for load in (DeadTip(), *self.loads) for q in load.quantities(self.model)]
+
+    @cached_property
+    def _tip_rows(self) -> list[int]:
+        rows, start = dict[str, range](), 0
+        for name, q in self.declared().items():
+            rows[name] = range(start, start + q.size)
+            start += q.size
+        return [row for name in self._tip_names for row in rows[name]]
+
+    def tip_numbers(self, p: Any) -> Any:
+        """Return a of a column of every quantity that is declared, an array or an expression."""
+        return p[self._tip_rows]
+
+    def tip_column(self, given: Mapping[str, Quantity]) -> ca.MX:
+        """Return a of quantities by key."""
+        return ca.vertcat(*(given[name].symbol for name in self._tip_names))
 
 
-def rod_functions(model: Model, conditions: TipConditions = DEAD_LOADS) -> RodFunctions:
-    """Compile the rod of a model for symbols in place of its numbers."""
-    chambers = model.robot.chambers
-    with_lengths = chambers if conditions.has_contact else 0
-    c = ca.SX.sym("c", _SECTION_SIZE + 2 + 2 * chambers)
-    x = ca.SX.sym("x", rod.STATE_SIZE + with_lengths)
-    section = unpack_section(c)
-    L = c[_SECTION_SIZE]
-    v, u = rod.strains(x, section)
-    centres = [(c[_SECTION_SIZE + 1 + 2 * i], c[_SECTION_SIZE + 2 + 2 * i]) for i in range(chambers)]
+def rod_functions(model: Model, loads: Sequence[Load] = (), *, by_machine: bool = True) -> RodFunctions:
+    """Compile the rod of a model for symbols in place of its numbers.
+
+    loads : beside the dead ones. by_machine : see `RodFunctions`.
+    """
+    chambers = model.chambers
+    line, loads = line_loads(model, loads)
+    with_lengths = chambers if any(load.needs_lengths for load in loads) else 0
+    section = RodSection(*(ca.SX.sym(name) for name in RodSection._fields))
+    centres = [(ca.SX.sym("d_x"), ca.SX.sym("d_y")) for _ in range(chambers)]
+    chamber, x = ca.SX.sym("chamber"), ca.SX.sym("x", rod.STATE_SIZE + with_lengths)
+    flat = [coordinate for centre in centres for coordinate in centre]
+    probed = model.section.at(model.numbers, np.zeros(model.sets), 1.0)
+    own = [ca.SX.sym("own") for _ in probed.own]
+    c = ca.vertcat(*section, *line.symbols[:1], *flat, chamber, *own, *line.symbols[1:])
+    v, u = model.section.strains(section, own, *rod.in_body(x))
     rates = [ca.norm_2(v + ca.cross(u, ca.vertcat(d_x, d_y, 0))) for d_x, d_y in centres]
     along = ca.vertcat(*rates, ca.norm_2(u[:2]), ca.norm_2(v))
-    lengths = ca.Function("lengths", [x, c], [L * along], {"cse": True})
-    field = ca.vertcat(rod.field(x, section), *rates[:with_lengths])
+    lengths = ca.Function("lengths", [x, c], [section.length * along], {"cse": True})
+    field = ca.vertcat(rod.field(x, v, u, *line.wrench(x, section)), along[:with_lengths])
+    strains = ca.Function("strains", [x[: rod.STATE_SIZE], c], [v, u])
 
-    packed = section_function(model, _pack)
+    def build(numbers: Mapping[str, Any], stretch: Any) -> list[Any]:
+        L_0, F_0 = numbers["robot.length"], force_unit(model, numbers)
+        state = model.section.at(numbers, numbers["pressure"], stretch)
+        scaled = rod_section(state, stretch, L_0, F_0)
+        more = [value / unit_scale(unit, L_0, F_0) for value, unit in state.own]
+        d = [coordinate / L_0 for centre in state.centres for coordinate in centre]
+        g, *others = line.numbers(numbers, L_0, F_0)
+        return [
+            ca.vertcat(*scaled, g, *d, state.chamber_stiffness / F_0, *more, *others),
+            state.imbalance / F_0,
+            ca.vertcat(L_0, F_0),
+        ]
+
+    declared = {**quantities(model), **{q.name: q for _, own, _ in line.loads[1:] for q in own}}
+    packed = section_function(declared, build)
     column = ca.SX.sym("quantities", packed.size1_in(0))
     stretch, s = ca.SX.sym("stretch"), ca.SX.sym("s")
     at_rest = packed(column, stretch)[0]
-    arc = rod.arc_state(s * at_rest[_SECTION_SIZE], unpack_section(at_rest))
+    unloaded = ca.vertcat(ca.SX.zeros(3), ca.vec(ca.SX.eye(3)), ca.SX.zeros(6))
+    bent = strains(unloaded, at_rest)[1]
+    arc = rod.arc_state(s * unpack_section(at_rest).length, bent[0], bent[1])
     if with_lengths:  # their rates are constant on an arc
         full = ca.vertcat(arc, ca.SX.zeros(chambers))
         arc = ca.vertcat(arc, s * lengths(full, at_rest)[:chambers])
 
-    units, y = ca.SX.sym("units", 2), ca.SX.sym("y", len(conditions.unknowns))
-    force, moment = ca.SX.sym("force", 3), ca.SX.sym("moment", 3)
-    a, given = _given(model, conditions, units)
-    at = AtTip(x[: rod.STATE_SIZE], section, x[rod.STATE_SIZE :], centres, c[-1], force, moment, y, given)
-    judged = [conditions.reaction(at), length_error(at), gap(at)] if conditions.has_contact else []
+    given, tip, contact = tip_rows(model, loads, x, section, centres, chamber)
     return RodFunctions(
         model=model,
-        conditions=conditions,
+        loads=loads,
+        taken=tuple(declared),
         section=packed,
-        field=ca.Function("field", [x, c], [L * field], {"cse": True}),
+        field=ca.Function("field", [x, c], [section.length * field], {"cse": True}),
         lengths=lengths,
-        tip=ca.Function("tip", [x, c, force, moment, y, a, units], [conditions.residual(at)], {"cse": True}),
-        contact=ca.Function("contact", [x, c, y, a, units], judged),
+        strains=strains,
+        tip=ca.Function("tip", [x, c, *given], [tip], {"cse": True}),
+        contact=ca.Function("contact", [x, c, *given], contact),
         arc=ca.Function("arc", [column, stretch, s], [arc]),
+        by_machine=by_machine,
     )
 
 
@@ -148,30 +189,27 @@ def stretch_near(imbalance: ca.Function, columns: Array, start: Array) -> Array:
     return found
 
 
-def _given(model: Model, conditions: TipConditions, units: Any) -> tuple[Any, Given | None]:
-    """Return the column a of what tip conditions take, SI, and its parts scaled."""
-    if not conditions.has_contact:
-        return ca.SX(0, 1), None
-    L_0, F_0 = units[0], units[1]
-    scale = {"m": L_0, "N": F_0, "N m": F_0 * L_0, "1": 1.0}
-    symbols, scaled = [], {}
-    for q in contact_quantities(model).values():
-        symbol = ca.SX.sym(q.name, q.size)
-        symbols.append(symbol)
-        scaled[q.name.removeprefix("contact.")] = symbol / scale[q.unit]
-    return ca.vertcat(*symbols), Given(**scaled)
-
-
-def unpack_section(c: Any) -> rod.RodSection:
+def unpack_section(c: Any) -> RodSection:
     """Return the rod's section from the constants of a load case."""
-    return rod.RodSection(*(c[k] for k in range(_SECTION_SIZE)))
+    return RodSection(*(c[k] for k in range(_SECTION_SIZE)))
+
+
+def centres_of(c: Any, chambers: int) -> list[tuple[Any, Any]]:
+    """Return d_i of the chambers from the constants of a load case."""
+    return [(c[_GRAVITY.stop + 2 * i], c[_GRAVITY.stop + 2 * i + 1]) for i in range(chambers)]
+
+
+def whole_weight(c: Any) -> Any:
+    """Return the weight of the whole rod (3,) from the constants of a load case, or (3, poses) of those of many."""
+    section = unpack_section(c)
+    return section.length * section.line_density * c[_GRAVITY]
 
 
 @dataclass(frozen=True, eq=False)
 class LoadCase:
     """One robot in one state of loading, as equations in scaled units.
 
-    symbols : its unknowns, the stretch, the column of all states, and the forces that the tip conditions add, if any.
+    symbols : its unknowns, the stretch, the column of all states, and what the loads add, if anything.
     residuals : as many equations. ends : those of them before and behind the intervals.
     fine_residuals : the same at half the step. outputs : by name, SI and world frame: "stretch", "tip_position" (3),
     "tip_rotation" (3x3), "chamber_lengths" (N), "bending_angle", "backbone_length", and "tip_forces", those added.
@@ -197,6 +235,11 @@ class LoadCase:
     force_unit: ca.MX
 
     @property
+    def labels(self) -> list[str]:
+        """What the unknowns are called, one name each of `symbols`."""
+        return [symbol.name() for symbol in self.symbols]
+
+    @property
     def slope(self) -> ca.MX:
         """The Jacobian of the residuals by the unknowns."""
         first, last = (ca.horzcat(*(ca.jacobian(rows, symbol) for symbol in self.symbols)) for rows in self.ends)
@@ -219,23 +262,20 @@ def load_case(name: str, functions: RodFunctions, given: Mapping[str, Quantity],
     functions : of `rod_functions`, which every grid and case of the model shares. given : every name of
     `functions.declared()`; a case of its own pressure takes a quantity of its own under "pressure".
     """
-    model = functions.model
-    column = ca.vertcat(*(given[key].symbol for key in quantities(model)))
+    declared = [given[key].symbol for key in functions.declared()]
+    column = ca.vertcat(*declared)
     stretch = ca.MX.sym("stretch")
-    constants, balance, units = functions.section(column, stretch)
+    constants, balance, units = functions.section(column[: functions.section.size1_in(0)], stretch)
     L_0, F_0 = units[0], units[1]
 
     transcribed = method.transcribe(functions.field, constants)
     first, last = transcribed.nodes[:, 0], transcribed.nodes[:, -1]
     integrals = transcribed.integrate(functions.lengths)
-    force, moment = given["tip_force"].symbol / F_0, given["tip_moment"].symbol / (F_0 * L_0)
     y = ca.MX.sym("tip_forces", functions.tip_unknowns)
-    taken = [q.symbol for name, q in given.items() if name in contact_quantities(model)]
-    a = ca.vertcat(*taken) if functions.conditions.has_contact else ca.MX(0, 1)
     base = ca.vertcat(balance, rod.base_balance(first), first[rod.STATE_SIZE :])
-    tip = functions.tip(last, constants, force, moment, y, a, units)
+    tip = functions.tip(last, constants, y, functions.tip_column(given), units)
 
-    N = model.robot.chambers
+    N = functions.model.chambers
     outputs = {
         "stretch": stretch,
         "tip_position": last[:3] * L_0,
@@ -245,7 +285,7 @@ def load_case(name: str, functions: RodFunctions, given: Mapping[str, Quantity],
         "backbone_length": integrals[N + 1] * L_0,
     }
     if functions.tip_unknowns:
-        outputs["tip_forces"] = y * F_0
+        outputs["tip_forces"] = y * unknown_units(functions.loads, L_0, F_0)
     return LoadCase(
         name=name,
         method=method,
@@ -254,18 +294,18 @@ def load_case(name: str, functions: RodFunctions, given: Mapping[str, Quantity],
         given=given,
         symbols=(stretch, transcribed.unknowns, y) if functions.tip_unknowns else (stretch, transcribed.unknowns),
         constants=constants,
-        column=ca.vertcat(column, a),
+        column=column,
         residuals=ca.vertcat(base, transcribed.residuals, tip),
         ends=(base, tip),
         fine_residuals=ca.vertcat(base, transcribed.fine_residuals, tip),
-        equations=_equations(transcribed, functions.conditions, L_0, F_0),
+        equations=_equations(transcribed, functions.loads, L_0, F_0),
         outputs=outputs,
         length_unit=L_0,
         force_unit=F_0,
     )
 
 
-def _equations(transcribed: Transcribed, conditions: TipConditions, L_0: ca.MX, F_0: ca.MX) -> tuple[Equation, ...]:
+def _equations(transcribed: Transcribed, loads: Sequence[Load], L_0: ca.MX, F_0: ca.MX) -> tuple[Equation, ...]:
     """Name the residual rows of a load case: stretch, base, stages and continuity, tip."""
     nx = transcribed.state_size
     units = {
@@ -293,12 +333,7 @@ def _equations(transcribed: Transcribed, conditions: TipConditions, L_0: ca.MX, 
             chosen = rows[kinds == kind][:, where].ravel()
             if chosen.size:
                 named.append(Equation(f"{label} of {block}", chosen, *units[block]))
-    end = start + rows.size
-    named.append(Equation("tip force", np.arange(end, end + 3), "N", F_0))
-    named.append(Equation("tip moment", np.arange(end + 3, end + 6), "N m", F_0 * L_0))
-    for k, name in enumerate(conditions.equations):
-        named.append(Equation(name, np.array([end + 6 + k]), "m", L_0))
-    return tuple(named)
+    return (*named, *tip_equations(start + rows.size, loads, L_0, F_0))
 
 
 def blocked_case(

@@ -25,7 +25,7 @@ def other_equilibria(solver: BlockedSolver, found: Blocked, starts: int) -> tupl
     points = grid.case.transcribed.points
     known = [x]
     told = []
-    sets = solver.model.robot.chamber_sets
+    sets = solver.model.sets
     for _ in range(starts):
         column = p[:n_c].copy()
         column[:sets] *= rng.uniform(-2.0, 2.5)

@@ -2,68 +2,97 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any, Protocol
+
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.model import rod
 from softnlp.model.quantities import Model
-from softnlp.model.robot import touching_stretch
-from softnlp.model.rod import Loads, RodSection
-from softnlp.model.section import deform
+from softnlp.model.rod import Loads
 from softnlp.nlp.transcription import RK4, rk_step
-from softnlp.statics.loadcase import unpack_section
-from softnlp.statics.step import Pose, SectionRadii, Shape
+from softnlp.statics.loadcase import RodFunctions, unpack_section
+from softnlp.statics.step import Pose, Shape
 
 Array = NDArray[np.float64]
 
 SHAPE_POINTS = 61
 _SUBSTEPS = 4
-_LENGTH = len(RodSection._fields)  # where the constants of a load case hold the length of the stretched rod
-_SAMPLES, _ZOOMS, _GRADES, _GAUSS = 6, 12, 16, 4  # of the bending angle's quadrature
-_MOST_PARTS = 225
+# Of the bending angle's quadrature.
+_SAMPLES, _ZOOMS, _MOST_PARTS = 6, 12, 225
+_ENDS = (1 - np.cos(np.pi * np.arange(_SAMPLES) / (_SAMPLES - 1))) / 2  # Chebyshev points, 0 and 1 among them
+_TO_POWERS = np.linalg.inv(np.vander(_ENDS, increasing=True))
+_GRADES = np.append(0.0, 0.5 ** np.arange(16, -1, -1))  # from the least outwards
+_GRADED_GAUSS = np.polynomial.legendre.leggauss(4)
+_LITTLE = 0.25  # change of a curvature over its mean, up to which a quadrature without grades is at round-off
+_GAUSS = tuple(part / 2 + middle for part, middle in zip(np.polynomial.legendre.leggauss(12), (0.5, 0.0), strict=True))
+_TO_GAUSS = (np.vander(_GAUSS[0], _SAMPLES, increasing=True) @ _TO_POWERS).T  # from samples to its points
 
 
-def shape_function(field: ca.Function) -> ca.Function:
-    """Return (state, c, h) -> [state a step h further, strains (v, u), n, m], scaled, for the field of a load case.
+def shape_function(functions: RodFunctions) -> ca.Function:
+    """Return (state, c, h) -> [state a step h further, strains (v, u), n, m], scaled.
 
     n and m are the paper's, of the wall alone.
     """
+    field = functions.field
     x, c, h = ca.SX.sym("x", field.size1_in(0)), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("h")
     step = rk_step(field, RK4)
     end = x
     for _ in range(_SUBSTEPS):
         end = step(end, c, h / _SUBSTEPS)
     section = unpack_section(c)
-    every = ca.vertcat(end, *rod.strains(end, section), *rod.wall_resultants(end, section))
+    every = ca.vertcat(end, *functions.strains(end[: rod.STATE_SIZE], c), *rod.wall_resultants(end, section))
     return ca.Function("shape", [x, c, h], [every], {"cse": True})
 
 
-def between_nodes(function: ca.Function, nodes: Array, constants: Array, s: Array) -> Array:
+class Mapped(Protocol):
+    """What `shape_function` returns, or the same in machine code."""
+
+    def map(self, n: int) -> Callable[..., Any]:
+        """Return what takes n columns of states, the constants and n steps (1, n)."""
+        ...
+
+
+def between_nodes(function: Mapped, nodes: Array, constants: Array, s: Array) -> Array:
     """Evaluate `shape_function` at any s in 0..1 from the node to its left; (30, len(s))."""
     K = nodes.shape[1] - 1
     left = np.minimum(np.floor(s * K + 1e-9).astype(int), K)
     return np.asarray(function.map(s.size)(nodes[:, left], constants, (s - left / K)[None, :]))
 
 
-def bending_angle(function: ca.Function, nodes: Array, constants: Array) -> float:
+def bending_angle(function: Mapped, nodes: Array, constants: Array) -> float:
     """Return the integral of sqrt(u_x^2 + u_y^2) over s [rad], to 1e-7 also where the curvature vanishes on the way.
 
     function : of `shape_function`. The curvature is smooth, its norm has a kink where it crosses zero, or nearly so. In
-    every interval, or part of the rod where those are many, the curvature is the polynomial through `_SAMPLES` points,
-    and the quadrature of its norm is graded towards the point where that is smallest.
+    every interval, or part of the rod where those are many, the curvature is the polynomial through `_SAMPLES` points.
+    Where it changes little its norm is smooth too; elsewhere the quadrature of the norm is graded towards the point
+    where that is smallest.
     """
     K = min(nodes.shape[1] - 1, _MOST_PARTS)
-    length = float(constants[_LENGTH])  # in L_0
-    ends = (1 - np.cos(np.pi * np.arange(_SAMPLES) / (_SAMPLES - 1))) / 2  # Chebyshev points, 0 and 1 among them
-    s = ((np.arange(K)[:, None] + ends[:-1]) / K).ravel()
+    length = float(unpack_section(constants).length)  # in L_0
+    s = ((np.arange(K)[:, None] + _ENDS[:-1]) / K).ravel()
     u = between_nodes(function, nodes, constants, np.append(s, 1.0))[21:23]
     last = u[:, _SAMPLES - 1 :: _SAMPLES - 1]  # the right end of each interval is the left one of the next
     values = np.concatenate([u[:, :-1].reshape(2, K, -1), last[:, :, None]], axis=2)
-    coefficients = np.einsum("ij,akj->aki", np.linalg.inv(np.vander(ends, increasing=True)), values)
+    middle = values.mean(axis=2, keepdims=True)
+    away = np.abs(values - middle).sum(axis=0).max(axis=1)
+    smooth = away < _LITTLE * np.hypot(*middle[:, :, 0])
+    total = np.hypot(*(values[:, smooth] @ _TO_GAUSS)) @ _GAUSS[1]
+    angle: float = (np.sum(total) + np.sum(_graded(values[:, ~smooth]))).item() * length / K
+    return angle
+
+
+def _graded(values: Array) -> Array:
+    """Return the integrals over 0..1 of the norm of polynomials through values (2, k, samples), (k,)."""
+    K = values.shape[1]
+    if K == 0:
+        return np.zeros(0)
+    coefficients = np.einsum("ij,akj->aki", _TO_POWERS, values)
 
     def norm(at: Array) -> Array:
-        """Return the curvature's norm at local coordinates (K, n) in 0..1."""
+        """Return the norm at local coordinates (K, n) in 0..1."""
         found = np.zeros((2, *at.shape))
         for c in np.moveaxis(coefficients, 2, 0)[::-1]:
             found = found * at + c[:, :, None]
@@ -76,16 +105,14 @@ def bending_angle(function: ca.Function, nodes: Array, constants: Array) -> floa
         best = np.argmin(norm(at), axis=1)
         left, width = at[np.arange(K), np.clip(best - 1, 0, 6)], width / 4
     least = left + width / 2
-    graded = np.append(0.0, 0.5 ** np.arange(_GRADES, -1, -1))  # from the least outwards
-    points, weights = np.polynomial.legendre.leggauss(_GAUSS)
+    points, weights = _GRADED_GAUSS
     total = np.zeros(K)
     for reach in (least, least - 1.0):  # to the left end and to the right one
-        middle = least[:, None] - reach[:, None] * (graded[1:] + graded[:-1]) / 2
-        half = np.abs(reach)[:, None] * (graded[1:] - graded[:-1]) / 2
+        middle = least[:, None] - reach[:, None] * (_GRADES[1:] + _GRADES[:-1]) / 2
+        half = np.abs(reach)[:, None] * (_GRADES[1:] - _GRADES[:-1]) / 2
         at = middle[:, :, None] + half[:, :, None] * points
         total += np.sum(norm(at.reshape(K, -1)).reshape(at.shape) * half[:, :, None] * weights, axis=(1, 2))
-    angle: float = np.sum(total).item() * length / K
-    return angle
+    return total
 
 
 def shape_of(values: Array, s: Array, length_unit: float, force_unit: float) -> Shape:
@@ -98,20 +125,6 @@ def shape_of(values: Array, s: Array, length_unit: float, force_unit: float) -> 
         moment=values[27:30].T * force_unit * length_unit,
         shear_extension=values[18:21].T,
         curvature=values[21:24].T / length_unit,
-    )
-
-
-def section_radii(model: Model, stretch: float) -> SectionRadii:
-    """Return the deformed radii at a stretch, for drawing."""
-    section = deform(
-        model.robot, model.material, [0.0] * model.robot.chamber_sets, stretch, model.coefficients, model.conventions
-    )
-    return SectionRadii(
-        outer=float(section.outer_radius),
-        lumen=float(section.lumen_radius),
-        chamber_circle=float(section.chamber_circle_radius),
-        chamber=float(section.chamber_radius),
-        bore=float(section.bore_radius),
     )
 
 
@@ -141,22 +154,14 @@ def pose_of(
         tilt=float(np.arctan2(np.hypot(axis[0], axis[1]), axis[2])),
         backbone_length=float(outputs["backbone_length"][0]),
         chamber_length=np.atleast_1d(outputs["chamber_lengths"]),
-        radii=section_radii(model, stretch),
+        radii=model.section.outline(model.numbers, stretch),
         shape=shape,
     )
 
 
 def pose_warnings(model: Model, pose: Pose) -> tuple[str, ...]:
     """Return what a designer should know of a solved pose: fitted range, touching chambers, stability, its body."""
-    found = []
-    low, high = model.material.fitted_stretch
-    if not low <= pose.stretch <= high:
-        found.append(
-            f"stretch {pose.stretch:.3f} is outside {low:g} to {high:g}, where {model.material.name} was fitted"
-        )
-    limit = touching_stretch(model.robot)
-    if pose.stretch > limit:
-        found.append(f"stretch {pose.stretch:.3f} is above {limit:.3f}, where neighbouring reinforced chambers touch")
+    found = model.section.warnings(pose.stretch)
     if np.min(pose.shape.shear_extension[:, 2]) <= 0:
         found.append("the load compresses the rod to nothing somewhere (v_z <= 0); the model does not hold there")
     if pose.stable is None:

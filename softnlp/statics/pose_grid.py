@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,9 +18,13 @@ from softnlp.nlp.transcription import method_named
 from softnlp.statics.compiled import RodEquations
 from softnlp.statics.condensed import case_solver
 from softnlp.statics.loadcase import LoadCase, load_case
+from softnlp.statics.single_shooting import AtStretch, Shot
 
 Array = NDArray[np.float64]
 
+HOPELESS = 1.0
+"""Estimated error of a given grid, in lengths, from which its solution is none of the rod."""
+_DEARER = 3  # an iteration on a neighbour's grid than on a coarse one, where the neighbour's is still tried first
 _ROUGH = 1e-2  # error of a grid whose word on stability does not count
 
 # Of an iteration, in intervals: beside its own, and of one of them.
@@ -93,16 +98,23 @@ def compiled_grid(equations: RodEquations, numerics: Numerics, intervals: int) -
     )
 
 
+def dearer(intervals: int, first: int, transcription: str = "multiple-shooting") -> bool:
+    """Whether an iteration on a neighbour's grid costs so much more than on a first one that this is tried instead."""
+    return iteration_cost(intervals, transcription) > _DEARER * iteration_cost(first, transcription)
+
+
 @dataclass(frozen=True, eq=False)
 class Solved:
     """A solution on a grid and what was found of it.
 
+    compiled : returns what is compiled for the grid, which is built when it is first asked for. intervals : of it.
     nodes : (18, K + 1) scaled states. limit : what they tend to on finer grids, where those begin. constants : what the
     field takes beside them. error : estimated tip position error over L_0. rotation_error : the same for the tip's
-    orientation [rad]. stable : no conjugate point.
+    orientation [rad]. stable : no conjugate point. shot : what came of single shooting, where that found it.
     """
 
-    grid: Grid
+    compiled: Callable[[], Grid]
+    intervals: int
     solution: Solution
     nodes: Array
     limit: Array
@@ -110,11 +122,12 @@ class Solved:
     error: float
     rotation_error: float
     stable: bool
+    shot: tuple[AtStretch, Shot] | None = None
 
     @property
-    def intervals(self) -> int:
-        """The number of intervals."""
-        return self.grid.intervals
+    def grid(self) -> Grid:
+        """What is compiled for its grid."""
+        return self.compiled()
 
     @property
     def is_rough(self) -> bool:

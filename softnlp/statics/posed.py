@@ -67,11 +67,8 @@ class Problem:
         found, start = {}, 0
         named = [(q.name, q.size) for q in self.compiled.free]
         for case in self.cases:
-            several = isinstance(case, Chain)
-            named += [
-                (f"{case.name}: {f'segment {k // 2 + 1} ' if several else ''}{symbol.name()}", symbol.numel())
-                for k, symbol in enumerate(case.symbols)
-            ]
+            sizes = [symbol.numel() for symbol in case.symbols]
+            named += [(f"{case.name}: {label}", size) for label, size in zip(case.labels, sizes, strict=True)]
         for name, size in named:
             found[name] = slice(start, start + size)
             start += size

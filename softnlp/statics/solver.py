@@ -15,40 +15,28 @@ from numpy.typing import NDArray
 
 from softnlp.base.status import Status
 from softnlp.model.numerics import Numerics, Transcribing
-from softnlp.model.quantities import Model
+from softnlp.model.quantities import LOADS, Model
 from softnlp.model.rod import STATE_SIZE, Loads
-from softnlp.nlp.solver import Solution, certificate, discretisation_correction, outputs
-from softnlp.nlp.transcription import method_named
-from softnlp.statics.attempts import LOADS, Attempt, Goal, Neighbour, Work, attempts, from_near
+from softnlp.nlp.solver import Solution, discretisation_correction
+from softnlp.statics.attempts import Attempt, Goal, Neighbour, Work, attempts, from_near
 from softnlp.statics.branch import BranchPoint, stretch_on_branch
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.compiled import RodEquations, rod_equations
-from softnlp.statics.loadcase import RodFunctions, unpack_section
-from softnlp.statics.pose import (
-    SHAPE_POINTS,
-    bending_angle,
-    between_nodes,
-    pose_of,
-    pose_warnings,
-    shape_of,
-    stability,
-)
-from softnlp.statics.pose_grid import TIP, Grid, Solved, compiled_grid, iteration_cost, next_size
+from softnlp.statics.grid_size import first_intervals, most_intervals, next_intervals
+from softnlp.statics.loadcase import RodFunctions
+from softnlp.statics.pose import Mapped, between_nodes
+from softnlp.statics.pose_grid import HOPELESS, TIP, Grid, Solved, compiled_grid, dearer, iteration_cost
+from softnlp.statics.pose_step import solved_step
+from softnlp.statics.proposed import proposed, residual
 from softnlp.statics.step import Step
 
 Array = NDArray[np.float64]
 
-FIRST_INTERVALS = {"multiple-shooting": 10, "collocation": 5}
-MOST_INTERVALS = 1810
-_MOST_COLLOCATION = 320  # as many points; order 8 needs no more
-_TURN = 0.25  # largest angle [rad] of the unloaded arc within one RK4 interval of a first grid
 SEARCHED_BY: Transcribing = "multiple-shooting"
-_DEARER = 3  # an iteration on a neighbour's grid than on a coarse one, where the neighbour's is still tried first
 _FINER = 4  # how much finer a grid is tried where a coarse one finds no solution
 # Work is counted in Runge-Kutta intervals of Newton iterations, some 0.07 ms each.
 _MOST_WORK, _KEPT_TO_SHOW = 9_000, 3_000  # to find one pose, and then to solve it on the grid that its accuracy needs
 _BY_IPOPT = 4  # so much more where IPOPT makes every step, which takes more of them
-_HOPELESS = 1.0  # estimated error of a given grid, in lengths, from which its solution is none of the rod
 _TO_SHOW = 4  # iterations on that grid, the error and stability counted
 # Without loads the exact answer is a circular arc; a solution is good enough to show it.
 UNLOADED_ACCURACY = 5e-9
@@ -91,7 +79,7 @@ class PoseSolver:
         return self.equations.functions
 
     @property
-    def shape(self) -> ca.Function:
+    def shape(self) -> Mapped:
         """The shape between nodes, see `shape_function`."""
         return self.equations.shape
 
@@ -118,7 +106,7 @@ class PoseSolver:
     @property
     def most_intervals(self) -> int:
         """The finest grid that refinement uses."""
-        return _MOST_COLLOCATION if self.numerics.transcription == "collocation" else MOST_INTERVALS
+        return most_intervals(self.numerics.transcription)
 
     def values(self, pressure: Array, loads: Loads) -> dict[str, Any]:
         """Return the quantities that a step sets."""
@@ -139,6 +127,9 @@ class PoseSolver:
         pressure = np.asarray(pressure, dtype=float)
         values = self.values(pressure, loads)
         column = self.column(values)
+        quick = self._proposed(column, loads, warm)
+        if quick is not None:
+            return self._closed(pressure, loads, quick, quick.solution.iterations, began)
         branch = stretch_on_branch(self.branch, column, pressure)
         if branch.status is not Status.SOLVED:
             return Step(pressure, branch.status, branch.message, solve_time=time.perf_counter() - began), None
@@ -155,7 +146,7 @@ class PoseSolver:
             own = found.grid.transcription == self.numerics.transcription
             chosen = own and found.intervals >= (given or 0)
             wanted = self.next_intervals(found.refinement_error, found.intervals, target) if chosen else first
-            hopeless = given is not None and not found.refinement_error <= _HOPELESS
+            hopeless = given is not None and not found.refinement_error <= HOPELESS
             enough = found.intervals >= most and found.refinement_error <= self.numerics.accuracy
             if (wanted is None and not hopeless) or enough:
                 return self._closed(pressure, loads, found, iterations, began)
@@ -175,6 +166,34 @@ class PoseSolver:
         message = status.advice + how_far
         return Step(pressure, status, message, residual=residual, iterations=iterations, solve_time=seconds), None
 
+    def _proposed(self, column: Array, loads: Loads, near: Solved | None) -> Solved | None:
+        """Return the pose that single shooting finds in machine code, where that is compiled and certain of it."""
+        numerics = self.numerics
+        if numerics.transcription != "multiple-shooting" or numerics.engine == "ipopt":
+            return None
+        single = self.equations.single_shooting() if self.model.section.by_sum else None
+        if single is None:
+            return None
+        nodes = None if near is None else near.nodes
+        found = proposed(single, numerics, column, self.target_accuracy(loads), nodes)
+        if found is None:
+            return None
+        at, shot = found
+        x = np.concatenate([[at.stretch], shot.nodes.T.ravel()])
+        intervals = shot.nodes.shape[1] - 1
+        return Solved(
+            compiled=lambda: self.grid(intervals),
+            intervals=intervals,
+            solution=Solution(x, column, residual(at, shot), shot.passes, "single shooting converged"),
+            nodes=shot.nodes,
+            limit=shot.nodes,
+            constants=at.constants,
+            error=shot.error,
+            rotation_error=shot.rotation_error,
+            stable=True,
+            shot=found,
+        )
+
     def _searched(
         self, values: dict[str, Any], branch: BranchPoint, near: Solved | None, work: Work, first: int, loaded: bool
     ) -> tuple[Solved | None, int, str]:
@@ -192,7 +211,7 @@ class PoseSolver:
         coarse = self.grid(size, name)
         if near is not None:
             grid = self.grid(max(near.intervals, first))
-            if grid.iteration_cost <= _DEARER * coarse.iteration_cost:
+            if not dearer(grid.intervals, coarse.intervals, self.numerics.transcription):
                 found, spent, _ = self._solve_on(grid, values, branch, near, work, from_near)
                 if found is not None and found.stable:
                     return found, spent, ""
@@ -207,29 +226,11 @@ class PoseSolver:
     def first_intervals(
         self, column: Array, stretch: float, arc_target: float | None = None, transcription: str | None = None
     ) -> int:
-        """Return a grid coarse enough to be quick and fine enough for the curl of the unloaded robot.
-
-        arc_target : for a robot without loads, the error to meet at once: RK4 turns a circular arc of angle a by
-        a (a / K)^4 / 120 too little, of which the tip's position shows about 0.6. transcription : as of `grid`.
-        """
-        name = transcription or self.numerics.transcription
-        first = FIRST_INTERVALS[name]
-        straight = np.asarray(self.functions.arc(column, stretch, 0.01)).ravel()
-        curl = 100 * float(np.hypot(straight[9], straight[10]))  # of the axis, R e3, over the first hundredth
-        curl = max(curl, self._turn_of_moment(column, stretch) / 2)  # half as finely: it is not there at first
-        turn = _TURN * FIRST_INTERVALS["multiple-shooting"] / first
-        wanted = max(first, curl / turn)
-        if arc_target is not None and name == "multiple-shooting":
-            wanted = max(wanted, curl * (0.6 * curl / (120 * arc_target)) ** 0.25)
-        return min(next_size(wanted), self.most_intervals)
-
-    def _turn_of_moment(self, column: Array, stretch: float) -> float:
-        """Return how far the dead tip moment alone would bend or twist the rod [rad]."""
+        """Return a first grid at a stretch, see `softnlp.statics.grid_size`. transcription : as of `grid`."""
         constants, _, units = (np.asarray(part).ravel() for part in self.functions.section(column, stretch))
-        after = self.model.robot.chamber_sets + 3  # the pressures and the tip force
-        section, scaled = unpack_section(constants), column[after : after + 3] / np.prod(units)
-        length = constants[len(section)]
-        return float(np.linalg.norm(scaled) * length / min(section.bending_x, section.bending_y, section.torsion))
+        after = self.model.sets + 3  # the pressures and the tip force
+        moment = column[after : after + 3] / np.prod(units)
+        return first_intervals(transcription or self.numerics.transcription, constants, moment, arc_target)
 
     def target_accuracy(self, loads: Loads) -> float:
         """Return the estimate to aim for: a third of the accuracy, since estimates are good to a factor of 3."""
@@ -240,11 +241,7 @@ class PoseSolver:
 
     def next_intervals(self, error: float, intervals: int, target: float) -> int | None:
         """Return the finer grid that should meet the target, or None where this one does or the grid is given."""
-        if self.numerics.intervals is not None or error <= target:
-            return None
-        order = method_named(self.numerics.transcription, 1).order
-        factor = 1.1 * (error / target) ** (1 / order)
-        return next_size(max(factor, 1.3) * intervals)
+        return next_intervals(self.numerics, error, intervals, target)
 
     def _solve_on(
         self,
@@ -336,7 +333,8 @@ class PoseSolver:
         if not np.all(np.isfinite(tip)):
             raise np.linalg.LinAlgError("its discretisation error is not finite")
         return Solved(
-            grid=grid,
+            compiled=lambda: grid,
+            intervals=grid.intervals,
             solution=solution,
             nodes=nodes,
             limit=grid.nodes(solution.x + correction),
@@ -350,45 +348,15 @@ class PoseSolver:
         self, pressure: Array, loads: Loads, found: Solved, iterations: int, began: float
     ) -> tuple[Step, Solved | None]:
         """Let IPOPT close a solution, where it takes part, and return its step."""
-        grid = found.grid
-        try:
-            solution = closed(grid.reference, found.solution, self.numerics, TIP)
-        except DisputedError as error:
-            seconds = time.perf_counter() - began
-            return Step(pressure, Status.DISPUTED, str(error), iterations=iterations, solve_time=seconds), None
-        if solution is not found.solution:
-            found = replace(found, solution=solution, nodes=grid.nodes(solution.x), constants=grid.constants(solution))
-        return self._finished(pressure, loads, found, iterations, began), found
-
-    def _finished(self, pressure: Array, loads: Loads, solved: Solved, iterations: int, began: float) -> Step:
-        """Turn the solution of a pose into a step in SI units, with its certificate."""
-        grid, solution = solved.grid, solved.solution
-        problem = grid.problem
-        result = outputs(problem, solution)
-        L_0, F_0 = (float(v) for v in np.asarray(grid.problem.units(solution.x, solution.p)).ravel())
-        s = np.linspace(0, 1, SHAPE_POINTS)
-        shape = shape_of(between_nodes(self.shape, solved.nodes, solved.constants, s), s, L_0, F_0)
-        unloaded_tip = np.asarray(self.functions.arc(solution.p, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
-        bending = bending_angle(self.shape, solved.nodes, solved.constants)
-        pose = pose_of(self.model, result, shape, bending, unloaded_tip, stability(loads, solved.stable))
-        warnings = list(pose_warnings(self.model, pose))
-        if solved.error > self.numerics.accuracy:
-            warnings.append(
-                f"estimated discretisation error {solved.error:.2g} of the length is above the accuracy asked for with "
-                f'{solved.intervals} intervals; set [solver] intervals = "auto" or a larger number'
-            )
-        return Step(
-            pressure=pressure,
-            status=Status.SOLVED,
-            message=Status.SOLVED.advice,
-            pose=pose,
-            residual=solution.residual,
-            certificate=certificate(problem, solution),
-            discretisation_error=solved.error,
-            intervals=solved.intervals,
-            iterations=iterations,
-            solve_time=time.perf_counter() - began,
-            warnings=tuple(warnings),
-            engine=self.numerics.engine,
-            ipopt=solution.ipopt,
-        )
+        if self.numerics.engine == "auto":
+            grid = found.grid
+            try:
+                solution = closed(grid.reference, found.solution, self.numerics, TIP)
+            except DisputedError as error:
+                seconds = time.perf_counter() - began
+                return Step(pressure, Status.DISPUTED, str(error), iterations=iterations, solve_time=seconds), None
+            if solution is not found.solution:
+                nodes, constants = grid.nodes(solution.x), grid.constants(solution)
+                found = replace(found, solution=solution, nodes=nodes, constants=constants, shot=None)
+        step = solved_step(self.equations, self.model, self.numerics, pressure, loads, found, iterations, began)
+        return step, found

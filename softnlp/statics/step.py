@@ -14,6 +14,7 @@ from softnlp.model.conventions import Coefficients, Conventions
 from softnlp.model.materials import Material
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
+from softnlp.model.section import SectionRadii as SectionRadii
 from softnlp.nlp.solver import EquationResidual, Ipopt
 from softnlp.statics.body import Fit, fit_of
 
@@ -45,25 +46,6 @@ class Shape:
     moment: Array
     shear_extension: Array
     curvature: Array
-
-
-@dataclass(frozen=True)
-class SectionRadii:
-    """Deformed section, Eqs. (22), (S2).
-
-    Attributes
-    ----------
-    outer, lumen, chamber_circle
-        r_r, r_i, r_cp [m].
-    chamber, bore
-        r_co, which the thread keeps, and r_ci [m].
-    """
-
-    outer: float
-    lumen: float
-    chamber_circle: float
-    chamber: float
-    bore: float
 
 
 STABLE_FLAGS = {"undefined": -1, "unstable": 0, "stable": 1}

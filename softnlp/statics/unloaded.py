@@ -12,7 +12,7 @@ from softnlp.model.quantities import quantities
 from softnlp.model.rod import STATE_SIZE
 from softnlp.nlp.case import Equation
 from softnlp.nlp.transcription import Transcribed
-from softnlp.statics.loadcase import LoadCase, RodFunctions, unpack_section
+from softnlp.statics.loadcase import LoadCase, RodFunctions
 
 _STRAIGHT = 1e-12  # bending angle [rad] below which its slope is cut off: a straight robot bends in no direction
 
@@ -23,14 +23,13 @@ def unloaded_case(name: str, functions: RodFunctions, given: Mapping[str, Quanti
     The outputs are those of `softnlp.statics.loadcase.load_case`; there are no states, so `transcribed` is empty.
     """
     model = functions.model
-    N = model.robot.chambers
+    N = model.chambers
     column = ca.vertcat(*(given[key].symbol for key in quantities(model)))
     stretch = ca.MX.sym("stretch")
     constants, balance, units = functions.section(column, stretch)
     L_0, F_0 = units[0], units[1]
     tip = functions.arc(column, stretch, 1.0)
-    section = unpack_section(constants)
-    u_x, u_y = section.pressure_moment_x / section.bending_x, section.pressure_moment_y / section.bending_y
+    u = functions.strains(tip[:STATE_SIZE], constants)[1]
 
     def integral(rates: ca.Function) -> ca.MX:
         return rates(tip, constants)  # the strains of an arc are constant
@@ -56,7 +55,7 @@ def unloaded_case(name: str, functions: RodFunctions, given: Mapping[str, Quanti
             "tip_position": tip[:3] * L_0,
             "tip_rotation": ca.reshape(tip[3:12], 3, 3),
             "chamber_lengths": along[:N] * L_0,
-            "bending_angle": stretch * ca.sqrt(u_x**2 + u_y**2 + _STRAIGHT**2),
+            "bending_angle": stretch * ca.sqrt(u[0] ** 2 + u[1] ** 2 + _STRAIGHT**2),
             "backbone_length": along[N + 1] * L_0,
         },
         length_unit=L_0,

@@ -17,6 +17,7 @@ from softnlp.model.contact_settings import CLOSURES, Closure, ContactSettings, r
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.statics.arc import unloaded_arc
+from softnlp.statics.loadcase import unpack_section
 from softnlp.statics.solver import PoseSolver
 
 Array = NDArray[np.float64]
@@ -130,7 +131,7 @@ def standing_wall(poses: PoseSolver, contact: ContactSettings, pressures: Array,
     if contact.wall_point is not None and contact.wall_normal is not None:
         return Wall(np.asarray(contact.wall_point, float), np.asarray(contact.wall_normal, float))
     largest = pressures[int(np.argmax(np.sum(pressures, axis=1)))]
-    rest = np.array([0.0, 0.0, float(poses.model.robot.length) + contact.tip_cap])
+    rest = np.array([0.0, 0.0, poses.model.length + contact.tip_cap])
     if loads.act:
         found = poses.solve(largest, loads)
         poses.ahead, pose = (poses.column(poses.values(largest, loads)), found), found[0].pose
@@ -153,8 +154,10 @@ def slipping_pressure(begin: Situation, end: Situation, sideways: list[tuple[flo
 
 def keeps_plane(plane: Array, c: Array, loads: Loads) -> bool:
     """Whether the section's constants c and the loads keep the rod in a plane of this normal."""
-    section_plane = abs(c[2] - c[3]) <= 1e-9 * abs(c[2]) or min(abs(plane[0]), abs(plane[1])) <= 1e-12
-    moment = np.array([c[6], c[7], 0.0])
+    section = unpack_section(c)
+    EI_x, EI_y = section.bending_x, section.bending_y
+    section_plane = abs(EI_x - EI_y) <= 1e-9 * abs(EI_x) or min(abs(plane[0]), abs(plane[1])) <= 1e-12
+    moment = np.array([section.pressure_moment_x, section.pressure_moment_y, 0.0])
     along = np.cross(plane, [0.0, 0.0, 1.0])
     up = np.array([0.0, 0.0, 1.0])
     pairs = [(moment, along), (np.asarray(loads.tip_moment, float), along)]

@@ -78,7 +78,7 @@ class MinimumStep:
 
         y, taken = x[x.size - functions.tip_unknowns :], p[n_c:]
         tip = x[x.size - functions.tip_unknowns - nx : x.size - functions.tip_unknowns]
-        e_L = float(functions.contact(tip, constants, y, taken, units)[1])
+        e_L = float(functions.contact(tip, constants, y, functions.tip_numbers(p), units)[1])
         lengths = -(taken[8 + N : 8 + 2 * N] @ system.directions[STATE_SIZE:, -1])
         slope = np.concatenate([lengths[:-1], np.zeros(functions.tip_unknowns)])
 
@@ -227,7 +227,8 @@ class Weighted:
         taken = p[self._functions.section.size1_in(0) :]
         units = self.problem.units(x, p)
         constants = self.problem.case_constants(x, p)
-        e_L = float(self._functions.contact(nodes[-1], constants, y, taken, units)[1])
+        a = self._functions.tip_numbers(p)
+        e_L = float(self._functions.contact(nodes[-1], constants, y, a, units)[1])
         N = nx - STATE_SIZE
         pressed = taken[8 + N : 8 + 2 * N]
         lengths = self._condensed.tip_moves(at_nodes, p)[STATE_SIZE:]

@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from softnlp.base.columns import DEG, OUTPUTS
 from softnlp.base.errors import InputError, nearest
 from softnlp.base.quantity import Quantity
-from softnlp.model.rod import RodSection
+from softnlp.model.section import RodSection
 from softnlp.nlp.implicit import ImplicitDerivatives
 from softnlp.nlp.problem import CompiledProblem
 from softnlp.nlp.solver import Engine, Solution
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.joint import joint_solution
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
-from softnlp.studies.force_inversion import joint_solution
 
 Array = NDArray[np.float64]
 

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import as_completed
 from dataclasses import dataclass, replace
 from math import isfinite, prod
-from multiprocessing.queues import Queue
-from multiprocessing.synchronize import Event
-from queue import Empty
 from typing import Any
 
 from softnlp.base.errors import InputError
-from softnlp.base.processes import begin_worker, process_context
+from softnlp.base.processes import worker_pool
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.model.materials import Material
@@ -22,15 +19,13 @@ from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.statics.wall import checked_contact
-from softnlp.studies.design_candidate import Candidate, Workshop, structure
+from softnlp.studies.design_candidate import Candidate, CandidateEvaluator
 from softnlp.studies.design_evaluate import Evaluator
 from softnlp.studies.design_task import MOST_ENUMERATED, DesignTask, Setting, check_task, with_choices
 from softnlp.studies.forward import checked_loads
 
 Progress = Callable[[int, Candidate], None]
-_CHUNK = 8  # candidates that a process is given at once; most of one structure, which is compiled once
 _SEED = 7  # of a search
-_PATIENCE = 0.2  # [s] without a candidate, after which it is asked whether a process has failed
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,19 +139,19 @@ def finished(setting: Setting, task: DesignTask, candidates: Sequence[Candidate]
 
 def _candidates(setting: Setting, task: DesignTask, workers: int) -> Iterator[Candidate]:
     """Yield every candidate as it is done."""
-    workshop = Workshop(setting, task)
+    evaluator = CandidateEvaluator(setting, task)
     if prod(len(values) for values in task.lists.values()) > MOST_ENUMERATED:
-        yield from searched(workshop)
+        yield from searched(evaluator)
         return
     every = list(enumerate(task.combinations(), start=1))
     if workers > 1:
         yield from _in_processes(setting, task, every, workers)
         return
     for number, combination in every:
-        yield workshop.candidate(number, combination)
+        yield evaluator.candidate(number, combination)
 
 
-def searched(workshop: Workshop) -> Iterator[Candidate]:
+def searched(evaluator: CandidateEvaluator) -> Iterator[Candidate]:
     """Yield the candidates of a search by optuna's tree-structured Parzen estimator; none twice, at most `trials`.
 
     A candidate that is not feasible counts as worse than every feasible one that was met before it.
@@ -175,7 +170,7 @@ def searched(workshop: Workshop) -> Iterator[Candidate]:
             key="choices",
         ) from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    task = workshop.task
+    task = evaluator.task
     study = optuna.create_study(
         direction="maximize" if task.maximise else "minimize", sampler=optuna.samplers.TPESampler(seed=_SEED)
     )
@@ -186,7 +181,7 @@ def searched(workshop: Workshop) -> Iterator[Candidate]:
         place = tuple(trial.suggest_categorical(name, list(range(len(values)))) for name, values in task.lists.items())
         if place not in met:
             combination = {name: values[k] for k, (name, values) in zip(place, task.lists.items(), strict=True)}
-            candidate = workshop.candidate(len(met) + 1, combination)
+            candidate = evaluator.candidate(len(met) + 1, combination)
             if candidate.is_feasible and isfinite(candidate.objective):
                 value = candidate.objective / task.objective.scale
                 worst = min(worst, task.sign * value)
@@ -200,48 +195,31 @@ def searched(workshop: Workshop) -> Iterator[Candidate]:
 def _in_processes(
     setting: Setting, task: DesignTask, every: Sequence[tuple[int, Mapping[str, Any]]], workers: int
 ) -> Iterator[Candidate]:
-    """Yield candidates as processes finish them, those of one structure together."""
-    grouped = sorted(every, key=lambda pair: structure(*with_choices(setting, pair[1])))
-    chunks = [grouped[k : k + _CHUNK] for k in range(0, len(grouped), _CHUNK)]
-    count = min(workers, len(chunks), os.cpu_count() or 1)
-    context = process_context()
-    found, stop = context.Queue(), context.Event()
-    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_begin, initargs=(found, stop))
+    """Yield candidates as processes finish them; those that share what is compiled are begun one after another."""
+
+    def kind(pair: tuple[int, Mapping[str, Any]]) -> tuple[int, int, str]:
+        robot, material = with_choices(setting, pair[1])
+        return robot.chamber_sets, robot.chambers_per_set, material.law.name
+
+    pool = worker_pool(min(workers, len(every), os.cpu_count() or 1), _Worker.begin, setting, task)
     try:
-        jobs = [pool.submit(_chunk, setting, task, chunk) for chunk in chunks]
-        left = len(every)
-        while left:
-            try:
-                candidate = found.get(timeout=_PATIENCE)
-            except Empty:
-                for job in jobs:
-                    if job.done():
-                        job.result()  # raises what ended it
-            else:
-                left -= 1
-                yield candidate
+        for done in as_completed([pool.submit(_Worker.candidate, *pair) for pair in sorted(every, key=kind)]):
+            yield done.result()
     finally:
-        stop.set()
         pool.shutdown(wait=True, cancel_futures=True)
 
 
 class _Worker:
-    """What a worker was told as it began: where candidates go, and what says that no more are wanted."""
+    """What a worker keeps between two candidates: an evaluator, whose programs are compiled once a structure."""
 
-    found: Queue[Candidate]
-    stop: Event
+    evaluator: CandidateEvaluator
 
+    @classmethod
+    def begin(cls, setting: Setting, task: DesignTask) -> None:
+        """Keep what was asked."""
+        cls.evaluator = CandidateEvaluator(setting, task)
 
-def _begin(found: Queue[Candidate], stop: Event) -> None:
-    begin_worker()
-    found.cancel_join_thread()  # a parent that stops reads no more
-    _Worker.found, _Worker.stop = found, stop
-
-
-def _chunk(setting: Setting, task: DesignTask, chunk: Sequence[tuple[int, Mapping[str, Any]]]) -> None:
-    """Send the candidates of a chunk, each as it is done."""
-    workshop = Workshop(setting, task)
-    for number, combination in chunk:
-        if _Worker.stop.is_set():
-            return
-        _Worker.found.put(workshop.candidate(number, combination))
+    @classmethod
+    def candidate(cls, number: int, combination: Mapping[str, Any]) -> Candidate:
+        """Return a candidate of the evaluator."""
+        return cls.evaluator.candidate(number, combination)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -17,7 +17,8 @@ from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.statics.step import Step
 from softnlp.studies.design_evaluate import Evaluation, Evaluator, broken_rules, missed, unmet
-from softnlp.studies.design_optimise import Active, Optimised, Optimiser
+from softnlp.studies.design_optimise import Optimiser, Outcome
+from softnlp.studies.design_problem import Active
 from softnlp.studies.design_task import SIZES, DesignTask, PressureSteps, Range, Setting, with_choices
 
 _FAILED = (Status.DIVERGED, Status.INACCURATE)
@@ -87,20 +88,19 @@ class Candidate:
         return self.status == "feasible"
 
 
-class Workshop:
-    """Judges candidates one after another; what is compiled for one structure (chambers, law) is kept for the next."""
+class CandidateEvaluator:
+    """Evaluates candidates one after another; what is compiled for one structure (chambers, law) is kept."""
 
     def __init__(self, setting: Setting, task: DesignTask) -> None:
         self.setting = setting
         self.task = task
-        self._made: dict[tuple[int, int, str], Optimiser] = {}
+        self._made: dict[Hashable, Optimiser] = {}
 
     def optimiser(self, model: Model) -> Optimiser:
-        """Return what is compiled for the structure of a model."""
-        key = structure(model.robot, model.material)
-        if key not in self._made:
-            self._made[key] = Optimiser(Evaluator(self.setting, self.task, model))
-        return self._made[key]
+        """Return what is compiled for the kind of a model."""
+        if model.kind not in self._made:
+            self._made[model.kind] = Optimiser(Evaluator(self.setting, self.task, model))
+        return self._made[model.kind]
 
     def candidate(self, number: int, combination: Mapping[str, Any]) -> Candidate:
         """Return a combination's candidate; never raises for one that cannot be made or solved."""
@@ -110,7 +110,7 @@ class Workshop:
         if self.task.ranges:
             found = self._optimised(model)
         elif reasons := broken_rules(robot, self.task):
-            found = Optimised(None, tuple(reasons))
+            found = Outcome(None, tuple(reasons))
         elif isinstance(self.task.pressure, Range):
             found = self._at_free_pressure(model, self.task.pressure)
         else:
@@ -119,7 +119,7 @@ class Workshop:
         made = _candidate(number, combination, model, found, self.task)
         return replace(made, solve_time=time.perf_counter() - began)
 
-    def _in_front(self, model: Model, found: Optimised) -> Optimised:
+    def _in_front(self, model: Model, found: Outcome) -> Outcome:
         """Return what was found, with a reason where the unbent tip starts behind a wall given by a point."""
         robot = found.found.model.robot if found.found else model.robot
         try:
@@ -128,12 +128,12 @@ class Workshop:
             return replace(found, reasons=(*found.reasons, error.message))
         return found
 
-    def _at_pressure(self, model: Model) -> Optimised:
+    def _at_pressure(self, model: Model) -> Outcome:
         """Judge a candidate of numbers at its pressure, or at the lowest step that meets everything."""
         evaluator = self.optimiser(model).evaluator
         if not isinstance(self.task.pressure, PressureSteps):
             found = evaluator.full(model, float(self.task.pressure))  # type: ignore[arg-type]
-            return Optimised(found, tuple(unmet(found, self.task)))
+            return Outcome(found, tuple(unmet(found, self.task)))
         nearest: tuple[float, Evaluation] | None = None
         ended = ""
         for pressure in self.task.pressure.values():
@@ -144,7 +144,7 @@ class Workshop:
             if not unmet(found, self.task):
                 found = evaluator.full(model, pressure)
                 if not (reasons := unmet(found, self.task)):
-                    return Optimised(found, ())
+                    return Outcome(found, ())
                 if not found.outputs:
                     ended = f"; at {pressure / 1e5:.4g} bar {reasons[0]}"
                     continue
@@ -152,51 +152,40 @@ class Workshop:
             if nearest is None or off < nearest[0]:
                 nearest = off, found
         if nearest is None:
-            return Optimised(None, (f"no step of the pressure has a solution{ended}",))
+            return Outcome(None, (f"no step of the pressure has a solution{ended}",))
         missing = "; ".join(unmet(nearest[1], self.task))
-        return Optimised(nearest[1], (f"no step of the pressure meets everything; nearest is {missing}{ended}",))
+        return Outcome(nearest[1], (f"no step of the pressure meets everything; nearest is {missing}{ended}",))
 
-    def _at_free_pressure(self, model: Model, pressure: Range) -> Optimised:
+    def _at_free_pressure(self, model: Model, pressure: Range) -> Outcome:
         """Optimise the pressure alone, unless one requirement is missed at every pressure."""
         optimiser = self.optimiser(model)
-        looked = [optimiser.evaluator.free(model, float(P)) for P in np.linspace(*_ends(pressure), _LEVELS)]
+        least = max(pressure.lower, pressure.upper / _LEVELS)  # not zero, where nothing bends
+        looked = [optimiser.evaluator.free(model, float(P)) for P in np.linspace(least, pressure.upper, _LEVELS)]
         missing = [
             (e, {name: off for name, _, off in missed(e.outputs, self.task.requirements)}) for e in looked if e.outputs
         ]
         if missing and set.intersection(*(set(names) for _, names in missing)):
             nearest = min(missing, key=lambda found: sum(found[1].values()))[0]
             reasons = "; ".join(unmet(nearest, self.task))
-            return Optimised(nearest, (f"no pressure meets everything; nearest is {reasons}",))
+            return Outcome(nearest, (f"no pressure meets everything; nearest is {reasons}",))
         return optimiser.best(model, pressure)
 
-    def _optimised(self, model: Model) -> Optimised:
+    def _optimised(self, model: Model) -> Outcome:
         """Optimise the dimensions, at the lowest step of the pressure where it comes in steps."""
         robot = model.robot
         if (robot.chambers_per_set - 1) * float(robot.chamber_angle) >= 2 * np.pi / robot.chamber_sets:
-            return Optimised(None, ("sets that interleave cannot be optimised; choose a smaller chamber_angle",))
-        optimiser, pressure = self.optimiser(model), self.task.pressure
-        if not isinstance(pressure, PressureSteps):
-            return optimiser.best(model, pressure)
-        found = Optimised(None, ("there is no step of the pressure",))
-        for P in pressure.values():
-            found = optimiser.best(model, P)
+            return Outcome(None, ("sets that interleave cannot be optimised; choose a smaller chamber_angle",))
+        pressure = self.task.pressure
+        found = Outcome(None, ("there is no step of the pressure",))
+        for P in pressure.values() if isinstance(pressure, PressureSteps) else [pressure]:
+            found = self.optimiser(model).best(model, P)
             if not found.reasons:
                 break
         return found
 
 
-def _ends(pressure: Range) -> tuple[float, float]:
-    """Return the pressures between which to look; not zero, where nothing bends."""
-    return max(pressure.lower, pressure.upper / _LEVELS), pressure.upper
-
-
-def structure(robot: Robot, material: Material) -> tuple[int, int, str]:
-    """Return what candidates must share to share what is compiled."""
-    return robot.chamber_sets, robot.chambers_per_set, material.law.name
-
-
 def _candidate(
-    number: int, combination: Mapping[str, Any], model: Model, found: Optimised, task: DesignTask
+    number: int, combination: Mapping[str, Any], model: Model, found: Outcome, task: DesignTask
 ) -> Candidate:
     """Put what was found of a combination together."""
     evaluation = found.found

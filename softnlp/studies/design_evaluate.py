@@ -18,10 +18,9 @@ from softnlp.model.rules import neighbours
 from softnlp.statics.arc import Arc, unloaded_arc
 from softnlp.statics.blocked_grid import Blocked
 from softnlp.statics.kept import blocked_solver, pose_solver
-from softnlp.statics.loadcase import RodFunctions
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.step import Pose, Step
-from softnlp.statics.wall import Wall, standing_wall
+from softnlp.statics.wall import Situation, Wall, standing_wall
 from softnlp.studies.design_task import OUTPUTS, DesignTask, Limits, Setting
 
 Array = NDArray[np.float64]
@@ -139,11 +138,6 @@ class Evaluator:
         self.solver = blocked_solver(model, numerics, setting.contact) if task.needs_force else None
         self.poses = self.solver.poses if self.solver else pose_solver(model, numerics)
 
-    @property
-    def functions(self) -> RodFunctions:
-        """The rod's functions with the tip conditions of the shape that is solved last."""
-        return self.solver.functions if self.solver else self.poses.functions
-
     def free(self, model: Model, pressure: float) -> Evaluation:
         """Return the free shape at a pressure [Pa]: in closed form without loads, else solved."""
         P = pressure * self.direction
@@ -173,6 +167,21 @@ class Evaluator:
         free = blocked.free.solved if blocked else None
         found = self._of_pose(model, pressure, known, step, step.contact.free, free)
         return replace(found, blocked=blocked, wall=wall)
+
+    def values(self, found: Evaluation) -> dict[str, Any]:
+        """Return every quantity of a solved design by name, SI."""
+        if self.solver is None:
+            return self.poses.with_model(found.model).values(found.pressure * self.direction, self.setting.loads)
+        pressed = np.array([float(k in self.task.sets) for k in found.model.robot.set_of_chamber])
+        solver = self.solver.with_model(found.model)
+        return solver.values(self._situation(found), pressed * (found.pressure > 0), np.zeros(0))
+
+    def plane(self, found: Evaluation) -> Array | None:
+        """Return the normal of the plane that the blocked shape of a design keeps to, if it keeps to one."""
+        return self.solver.with_model(found.model).plane(self._situation(found)) if self.solver else None
+
+    def _situation(self, found: Evaluation) -> Situation:
+        return Situation(found.pressure * self.direction, self.setting.loads, found.wall)
 
     def _of_pose(
         self, model: Model, pressure: float, known: dict[str, float], step: Step, pose: Pose | None, free: Solved | None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -13,102 +12,151 @@ from numpy.typing import NDArray
 
 from softnlp.base.quantity import quantity
 from softnlp.base.units import MILLIMETRE
-from softnlp.model.quantities import with_symbols
-from softnlp.model.robot import SELF_INTERSECTION, Robot
+from softnlp.model.body import Body, Segment
+from softnlp.model.quantities import Model, with_symbols
+from softnlp.model.robot import ROBOTS, SELF_INTERSECTION, Robot
 from softnlp.model.rules import rules
-from softnlp.nlp.optimality import Bounds, slopes
-from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
+from softnlp.nlp.problem import CompiledProblem, Constraint
+from softnlp.nlp.search import Start
+from softnlp.nlp.solver import Engine, Solution
 from softnlp.nlp.transcription import MultipleShooting
+from softnlp.statics.blocked_grid import transferred
+from softnlp.statics.case import case
 from softnlp.statics.condensed import CondensedSolver
-from softnlp.statics.loadcase import LoadCase, blocked_case, load_case
-from softnlp.statics.unloaded import unloaded_case
-from softnlp.studies.design_evaluate import Evaluator, chamber_gaps, free_outputs, robot_outputs
+from softnlp.statics.loadcase import LoadCase
+from softnlp.statics.pose import between_nodes
+from softnlp.statics.posed import problem
+from softnlp.studies.design_evaluate import Evaluation, Evaluator, chamber_gaps, free_outputs, robot_outputs
 from softnlp.studies.design_task import OUTPUTS, DesignTask, Range
 
 Array = NDArray[np.float64]
 
-PRESSURE = "applied pressure"
-OBJECTIVE_SCALE = "objective scale"
-FOLD_SCALE = "fold scale"
-FOLD = 0.02  # of the determinant of the robot at rest: below it the branch of the blocked shape is about to turn
-_ITERATIONS = 60
+HOLDS = 1e-7
+"""Scaled violation of a solved program."""
+
+_PRESSURE = "applied pressure"
+_OBJECTIVE_SCALE = "objective scale"
+_FOLD_SCALE = "fold scale"
+_FOLD = 0.02  # of the determinant of the robot at rest: below it the branch of the blocked shape is about to turn
 _TIGHTEST = 0.999  # of what a body can take; an answer at 1 would pass through itself
 _SLOPE = 1e-3  # of the scaled stretch balance: the branch from zero pressure ends where it vanishes
+_ACTIVE = 1e-6  # a limit is active where its scaled multiplier is above this
+_ITERATIONS = 60
+_OPTIONS = {"bound_relax_factor": 1e-10, "diverging_iterates_tol": 1e4, "mu_strategy": "adaptive"}
+
+
+@dataclass(frozen=True)
+class Active:
+    """A limit that holds the objective back.
+
+    Attributes
+    ----------
+    name
+        Of a choice, an output or a rule of manufacture.
+    side
+        "lower" or "upper".
+    limit
+        Its value [SI], nan where it has none of its own.
+    rate
+        What the objective gains for each unit by which the limit is loosened [SI].
+    """
+
+    name: str
+    side: str
+    limit: float
+    rate: float
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """Where the program ended. dimensions : those chosen, by name. pressure, objective : all SI."""
+
+    solution: Solution
+    dimensions: Mapping[str, float]
+    pressure: float
+    objective: float
+    active: tuple[Active, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class DesignProblem:
-    """The compiled program of one structure on one grid; material and what is not chosen are fixed values.
+    """The program of one structure on one grid; material and what is not chosen are fixed values.
 
-    cases : "free", and "blocked" where a force is asked. limits : of its inequality rows,
-    each with the constraint that it is of.
-    guard : (x, p) -> the determinant of the blocked tip equations, over a fixed value; it keeps
-    its sign on the branch. options : of IPOPT, which have the last word.
+    cases : "free", and "blocked" where a force is asked. engine : IPOPT.
     """
 
+    evaluator: Evaluator
     problem: CompiledProblem
     cases: tuple[LoadCase, ...]
-    limits: tuple[tuple[int, Constraint], ...]
-    guard: ca.Function | None
-    options: Mapping[str, Any]
+    engine: Engine
 
-    @property
-    def lower(self) -> Array:
-        """Lower limits of every row; the guard is the last one."""
-        return np.append(self.problem.lower_g, [FOLD] * (self.guard is not None))
+    def start(self, begun: Evaluation) -> Start:
+        """Return where the program begins at a solved design."""
+        compiled, objective = self.problem, self.evaluator.task.objective
+        values = self.evaluator.values(begun)
+        column = self.evaluator.poses.column(values)
+        values[_PRESSURE] = begun.pressure
+        values[_OBJECTIVE_SCALE] = max(abs(begun.outputs[objective.name]), objective.scale)
+        head = compiled.pack_free({q.name: values[q.name] for q in compiled.free})
+        known = {q.name: values[q.name] for q in compiled.fixed if q.name in values}
+        x, p = (
+            np.concatenate([head, *(self._guess(shape, begun, column) for shape in self.cases)]),
+            compiled.pack(known),
+        )
+        if len(self.cases) > 1:
+            straight = np.where(np.arange(column.size) < self.evaluator.direction.size, 0.0, column)
+            head = np.where([q.name == _PRESSURE for q in compiled.free], 0.0, head)
+            rest = np.concatenate([head, *(shape.arc(straight, 1.0) for shape in self.cases)])
+            at_start, at_rest = (float(compiled.residual(at, p)[-1]) for at in (x, rest))
+            # A start nearer to a fold than designs may be is inside its own limit.
+            size = np.copysign(min(abs(at_rest), abs(at_start) / (2 * _FOLD)), at_start)
+            p = compiled.pack({**known, _FOLD_SCALE: size})
+        return Start(self.engine, p, x)
 
-    @property
-    def upper(self) -> Array:
-        """Upper limits of every row."""
-        return np.append(self.problem.upper_g, [np.inf] * (self.guard is not None))
+    def _guess(self, shape: LoadCase, begun: Evaluation, column: Array) -> Array:
+        """Return the unknowns of a shape at a solved design; where there is none of it, the arc's."""
+        stretch, s, size = begun.outputs["stretch"], shape.transcribed.points, shape.functions.state_size
+        free, solver = begun.free, self.evaluator.solver
+        if shape.name == "blocked" and begun.blocked and solver:
+            return transferred(begun.blocked, shape, solver.equations.shape)
+        if shape.name == "free" and s.size and free:
+            states = between_nodes(self.evaluator.poses.shape, free.nodes, free.constants, s)[:size]
+            return np.concatenate([[stretch], states.T.ravel()])
+        return shape.arc(column, stretch)
 
-    @property
-    def bounds(self) -> Bounds:
-        """Bounds of the choices, the states and every row."""
-        return Bounds(self.problem.lower_x, self.problem.upper_x, self.lower, self.upper)
+    def optimum(self, solution: Solution) -> Optimum:
+        """Return the design at a solution."""
+        found = {name: float(value[0]) for name, value in self.problem.values(solution.x, solution.p).items()}
+        scale, ipopt, sign = found[_OBJECTIVE_SCALE], solution.ipopt, self.evaluator.task.sign
+        assert ipopt is not None
+        return Optimum(
+            solution,
+            {name: found[f"robot.{name}"] for name in self.evaluator.task.ranges},
+            found[_PRESSURE],
+            -sign * ipopt.objective * scale,
+            # f = -sign objective / scale and df/d(upper) = -lam, so loosening an upper limit gains sign scale lam.
+            tuple(self._active(ipopt.rows, ipopt.bounds, sign * scale)) if ipopt.rows.size else (),
+        )
 
-    @cached_property
-    def slopes(self) -> ca.Function:
-        """What the KKT error is judged by, the guard's row included."""
-        nlp = dict(self.problem.nlp)
-        if self.guard is not None:
-            nlp["g"] = ca.vertcat(nlp["g"], self.guard(nlp["x"], nlp["p"]))
-        return slopes(nlp)
+    def _active(self, lam_g: Array, lam_x: Array, unit: float) -> Iterator[Active]:
+        """Yield the limits with a multiplier, rows first, then bounds of the choices."""
+        compiled = self.problem
+        for limit, equation in zip(compiled.constraints, compiled.equations[-len(compiled.constraints) :], strict=True):
+            for row in equation.rows:
+                lam = float(lam_g[row])
+                if abs(lam) > _ACTIVE:
+                    bound = float((compiled.upper_g if lam > 0 else compiled.lower_g)[row] * limit.scale)
+                    value = bound if limit.name in OUTPUTS or limit.unit == "m" else np.nan
+                    yield Active(limit.name, _side(lam), value, unit * abs(lam) / limit.scale)
+        for q, entry in zip(compiled.free, lam_x, strict=False):
+            lam = float(entry)
+            if abs(lam) > _ACTIVE:
+                name = "pressure" if q.name == _PRESSURE else q.name.removeprefix("robot.")
+                yield Active(name, _side(lam), q.upper if lam > 0 else q.lower, unit * abs(lam) / q.scale)
 
-    @cached_property
-    def solver(self) -> ca.Function:
-        """IPOPT with the exact Hessian of all but the guard; multipliers are kept."""
-        nlp: dict[str, Any] = dict(self.problem.nlp)
-        x, p, f, g = (nlp[key] for key in "xpfg")
-        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", g.numel() + (self.guard is not None))
-        weighed = lam_f * f + ca.dot(lam_g[: g.numel()], g)
-        hessian = ca.triu(ca.hessian(weighed, x)[0])
-        J = ca.jacobian(g, x)
-        if self.guard is not None:
-            size = self.guard(x, p)
-            J, g = ca.vertcat(J, ca.jacobian(size, x)), ca.vertcat(g, size)
-        nlp["g"] = g
-        options: dict[str, Any] = {
-            "jac_g": ca.Function("jac_g", [x, p], [g, J]),
-            "hess_lag": ca.Function("hess_lag", [x, p, lam_f, lam_g], [hessian]),
-            "print_time": False,
-            "show_eval_warnings": False,
-            "ipopt": {
-                "print_level": 0,
-                "sb": "yes",
-                "tol": 1e-9,
-                "constr_viol_tol": 1e-9,
-                "acceptable_iter": 0,
-                "diverging_iterates_tol": 1e4,
-                "bound_relax_factor": 1e-10,
-                "nlp_scaling_method": "none",
-                "mu_strategy": "adaptive",
-                "max_iter": _ITERATIONS,
-                "max_wall_time": 60.0,
-                **self.options,
-            },
-        }
-        return ca.nlpsol("design", "ipopt", nlp, options)
+
+def _side(multiplier: float) -> str:
+    return "upper" if multiplier > 0 else "lower"
 
 
 def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) -> DesignProblem:
@@ -119,63 +167,57 @@ def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) ->
 
     plane : of symmetry, as for `CondensedSolver`, in which the blocked shape folds.
     """
-    task, functions = evaluator.task, evaluator.functions
-    declared = functions.declared(evaluator.poses.model)
-    free_lengths = declared.pop("contact.free_lengths", None)
-    for name, values in task.ranges.items():
-        key = f"robot.{name}"
-        declared[key] = replace(declared[key], lower=values.lower, upper=values.upper)
+    task, setting = evaluator.task, evaluator.setting
+    body = _body(evaluator.poses.model)
+    ranges = {f"robot.{name}": values for name, values in task.ranges.items()}
+    declared = body.quantities | {
+        key: replace(
+            body.quantities[key], scale=(values.lower + values.upper) / 2, lower=values.lower, upper=values.upper
+        )
+        for key, values in ranges.items()
+    }
     limits = task.pressure if isinstance(task.pressure, Range) else Range(0.0, np.inf)
-    applied = quantity(PRESSURE, "Pa", 1e5, scale=1e5, lower=limits.lower, upper=limits.upper)
-    pressed = applied.symbol * ca.DM(evaluator.direction)
-    given = {**declared, "pressure": replace(declared["pressure"], symbol=pressed)}
-    declared.pop("pressure")
+    applied = quantity(_PRESSURE, "Pa", 1e5, scale=1e5, lower=limits.lower, upper=limits.upper)
+    scale, fold = quantity(_OBJECTIVE_SCALE, "1", 1.0), quantity(_FOLD_SCALE, "1", 1.0)
+    robot = with_symbols(body.models[0], {key: q.symbol for key, q in declared.items()}).robot
+    given: dict[str, Any] = {key: declared[key] for key in ranges}
+    given["pressure"] = applied.symbol * ca.DM(evaluator.direction)
 
     method = MultipleShooting(intervals)
-    # The closed form takes the functions with chamber lengths in the state as well as those without.
-    if evaluator.setting.loads.act:
-        free_case = load_case("free", evaluator.poses.functions, given, method)
-    else:
-        free_case = unloaded_case("free", functions, given)
-    cases: list[LoadCase] = [free_case]
-    robot = with_symbols(functions.model, {name: q.symbol for name, q in given.items()}).robot
-    outputs = {**robot_outputs(robot), **free_outputs(free_case.outputs, robot.length), "pressure": applied.symbol}
-    outputs["chamber_gap"] = ca.vertcat(*chamber_gaps(robot, free_case.outputs["stretch"]))
-    if free_lengths is not None:
-        blocked = blocked_case("blocked", functions, given, free_case, method)
-        column = ca.vertcat(*(q.symbol for q in blocked.given.values()))
-        size = CondensedSolver(functions, method, plane).determinant_expression(ca.vertcat(*blocked.symbols), column)
-        fold = declared[FOLD_SCALE] = quantity(FOLD_SCALE, "1", 1.0)
-        cases.append(replace(blocked, outputs={**blocked.outputs, "determinant": size / fold.symbol}))
+    free = case("free", body, given=given, method=method if setting.loads.act else None)
+    assert isinstance(free, LoadCase)
+    outputs = {**robot_outputs(robot), **free_outputs(free.outputs, robot.length), "pressure": applied.symbol}
+    outputs["chamber_gap"] = ca.vertcat(*chamber_gaps(robot, free.outputs["stretch"]))
+    cases, rows = [free], [*_rules(robot, task), *_on_the_branch(free)]
+    if task.needs_force:
+        given["contact.free_lengths"] = free.outputs["chamber_lengths"]
+        blocked = case("blocked", body, given=given, wall=setting.contact.closure, method=method)
+        assert isinstance(blocked, LoadCase)
+        cases.append(blocked)
         outputs["blocked_force"] = blocked.outputs["tip_forces"][0]
+        rows += _against_the_wall(blocked, plane, fold.symbol)
+    rows += [*_bodies(free, robot, task.allow), *_required(outputs, evaluator)]
 
-    chosen = [f"robot.{name}" for name in task.ranges] + [PRESSURE] * isinstance(task.pressure, Range)
-    moved = ca.vertcat(*(q.symbol for q in [*declared.values(), applied] if q.name in chosen))
-    unknown = ca.vertcat(moved, *(symbol for case in cases for symbol in case.symbols))
-    rows = [*_rules(robot, task), *_guards(cases), *_bodies(cases[0], robot, task.allow)]
-    rows += _required(outputs, evaluator)
-    constraints = [row for row in rows if ca.depends_on(row.expression, unknown)]
-    scale = quantity(OBJECTIVE_SCALE, "1", 1.0)
-    problem = compile_problem(
-        [*declared.values(), applied, scale],
+    chosen = [*ranges, *[_PRESSURE] * isinstance(task.pressure, Range)]
+    moved = [q.symbol for q in (*declared.values(), applied) if q.name in chosen]
+    unknown = ca.vertcat(*moved, *(symbol for shape in cases for symbol in shape.symbols))
+    compiled = problem(
         cases,
+        given=[applied, scale, *[fold] * task.needs_force],
         free=chosen,
-        constraints=constraints,
+        constraints=[row for row in rows if ca.depends_on(row.expression, unknown)],
         objective=-task.sign * outputs[task.objective.name] / scale.symbol,
-    )
-    guard = _guard(problem) if len(cases) > 1 else None
-    sides = [c for c in constraints for _ in range(c.expression.numel())]
-    first = problem.lower_g.size - len(sides)
-    if guard is not None:
-        sides.append(Constraint("fold of the blocked shape", ca.MX(), FOLD, np.inf))
-    sided = tuple(enumerate(sides, start=first))
-    return DesignProblem(problem, tuple(cases), sided, guard, dict(evaluator.setting.numerics.ipopt))
+    ).compiled
+    options = {**_OPTIONS, **dict(setting.numerics.ipopt)}
+    engine = Engine(compiled, ipopt_only=True, max_iterations=_ITERATIONS, tolerance=1e-9, options=options)
+    return DesignProblem(evaluator, compiled, tuple(cases), engine)
 
 
-def _guard(problem: CompiledProblem) -> ca.Function:
-    """Return the blocked tip equations' determinant over its value at the start, by (x, p)."""
-    x, p = (problem.nlp[key] for key in "xp")
-    return ca.Function("guard", [x, p], [problem.outputs.call({"x": x, "p": p})["blocked_determinant"]])
+def _body(model: Model) -> Body:
+    """Return a body of the kind of a model that can be made, whatever the numbers: each of them is given later."""
+    counts = {name: getattr(model.robot, name) for name in ("chamber_sets", "chambers_per_set")}
+    made = replace(ROBOTS["D25L60"], **counts)
+    return Body([Segment(made, model.material)], model.coefficients, model.conventions)
 
 
 def _rules(robot: Robot, task: DesignTask) -> Iterator[Constraint]:
@@ -199,15 +241,23 @@ def _bodies(free: LoadCase, robot: Robot, allow: tuple[str, ...]) -> Iterator[Co
         yield Constraint(SELF_INTERSECTION, angle / (2 * np.pi), -np.inf, _TIGHTEST)
 
 
-def _guards(cases: list[LoadCase]) -> Iterator[Constraint]:
-    """Yield what keeps the program on the branch that begins at zero pressure, as far as inequalities can."""
-    free = cases[0]
+def _on_the_branch(free: LoadCase) -> Iterator[Constraint]:
+    """Yield what keeps the program on the stretch's branch from zero pressure, as far as inequalities can."""
     slope = ca.jacobian(free.residuals[0], free.symbols[0])
     yield Constraint("end of the stretch's branch", slope, _SLOPE, np.inf)
     yield Constraint("stiffness that loses its sign", free.constants[:5], 0.0, np.inf)
-    if len(cases) > 1:
-        F_b = cases[1].outputs["tip_forces"][0] / cases[1].force_unit
-        yield Constraint("contact", F_b, 0.0, np.inf)
+
+
+def _against_the_wall(blocked: LoadCase, plane: Array | None, fold: ca.MX) -> Iterator[Constraint]:
+    """Yield what keeps the blocked shape on its branch: it pushes, and the tip equations' determinant keeps its sign.
+
+    The derivatives of the determinant are second ones of the rod already.
+    """
+    assert isinstance(blocked.method, MultipleShooting)
+    yield Constraint("contact", blocked.outputs["tip_forces"][0] / blocked.force_unit, 0.0, np.inf)
+    solver = CondensedSolver(blocked.functions, blocked.method, plane)
+    size = solver.determinant_expression(ca.vertcat(*blocked.symbols), blocked.column)
+    yield Constraint("fold of the blocked shape", size / fold, _FOLD, np.inf, in_hessian=False)
 
 
 def _required(outputs: Mapping[str, Any], evaluator: Evaluator) -> Iterator[Constraint]:

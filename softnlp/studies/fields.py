@@ -29,12 +29,7 @@ def si_value(output: Output, step: Step) -> Any:
     """Return an output of a step in SI, None where it has none."""
     if output.group not in _KNOWN_OF_FAILED and solved_pose(step) is None:
         return None
-    found: Any = step
-    for name in output.place.split("."):
-        if found is None:
-            return None
-        found = found.get(name) if isinstance(found, dict) else getattr(found, name)
-    return found
+    return output.found(step)
 
 
 def value(output: Output, step: Step) -> Any:

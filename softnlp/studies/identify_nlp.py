@@ -23,10 +23,10 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.rod import Loads
 from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
-from softnlp.nlp.solver import FROM_SOLUTION, Engine
+from softnlp.nlp.solver import FROM_SOLUTION, Engine, Solution
 from softnlp.nlp.transcription import method_named
 from softnlp.statics.blocked_grid import Blocked
-from softnlp.statics.closing import DisputedError, disputed
+from softnlp.statics.closing import DisputedError, close
 from softnlp.statics.kept import blocked_solver, pose_solver
 from softnlp.statics.loadcase import LoadCase, blocked_case, load_case
 from softnlp.statics.pose_grid import Solved
@@ -215,16 +215,21 @@ def closed_fit(
             raise DisputedError(f"{Status.DISPUTED.advice}; {error.message}") from None
     problem = nlp.compiled()
     engine = Engine(problem, tolerance=TOLERANCE, options={**FROM_SOLUTION, **dict(numerics.ipopt)})
-    solution = engine.solve(nlp.packed(problem), nlp.start(problem, found.constants))
-    values = problem.free_values(solution.x)
-    constants = np.concatenate([values[name] for name in found.free.quantities])
     errors = found.uncertainty.standard_errors
-    close = np.fmax(_OF_ERROR * errors, numerics.accuracy * np.maximum(np.abs(found.constants), found.free.scale))
-    if solution.holds(numerics.tolerance) and bool(np.all(np.abs(constants - found.constants) <= close)):
-        return replace(found, engine=numerics.engine, ipopt=solution.ipopt)
-    keys = [file_name(name, found.material) for name in found.free.names]
-    here, there = (constants_text(keys, x, ".6g") for x in (found.constants, constants))
-    raise disputed(f"the search found {here} and IPOPT {there}", solution)
+    close_to = np.fmax(_OF_ERROR * errors, numerics.accuracy * np.maximum(np.abs(found.constants), found.free.scale))
+
+    def differs(solution: Solution) -> str:
+        values = problem.free_values(solution.x)
+        constants = np.concatenate([values[name] for name in found.free.quantities])
+        if solution.holds(numerics.tolerance) and bool(np.all(np.abs(constants - found.constants) <= close_to)):
+            return ""
+        keys = [file_name(name, found.material) for name in found.free.names]
+        here, there = (constants_text(keys, x, ".6g") for x in (found.constants, constants))
+        return f"the search found {here} and IPOPT {there}"
+
+    p, start = nlp.packed(problem), nlp.start(problem, found.constants)
+    solution = close(engine, Solution(start, p, 0.0, 0, ""), differs)
+    return replace(found, engine=numerics.engine, ipopt=solution.ipopt)
 
 
 def _pressing(data: Data, after: Array) -> Data:

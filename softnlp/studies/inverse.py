@@ -17,7 +17,7 @@ from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
 from softnlp.statics.step import Run, Step
 from softnlp.studies.forward import checked_loads, followed
-from softnlp.studies.inverse_solver import InverseSolver
+from softnlp.studies.inverse_solver import InverseKinematics
 from softnlp.studies.targets import InverseTask, Target
 
 Array = NDArray[np.float64]
@@ -87,14 +87,9 @@ def inverse(
     if method not in ("newton", "nlp"):
         raise InputError(f"expected 'newton' or 'nlp', got {method!r}", key="method")
     task = InverseTask(checked_targets(positions, directions), lower, upper, weight, tuple(allow))
-    solver = InverseSolver(Model(robot, material, coefficients, conventions), numerics, loads, task, method)
-    steps = follow_targets(solver, progress)
+    solver = InverseKinematics(Model(robot, material, coefficients, conventions), numerics, loads, task, method)
+    steps = followed(solver.nearest, task.targets, progress)
     return Run("inverse", robot, material, coefficients, conventions, loads, steps, title, warnings)
-
-
-def follow_targets(solver: InverseSolver, progress: Callable[[int, Step], None] | None) -> tuple[Step, ...]:
-    """Solve the targets of a solver's task in order, each begun from the last."""
-    return followed(solver.solve, solver.task.targets, progress)
 
 
 def checked_bounds(bounds: Any, sets: int) -> tuple[Array, Array]:

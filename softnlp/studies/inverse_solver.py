@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
@@ -22,39 +23,28 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.robot import SELF_INTERSECTION
 from softnlp.model.rod import Loads
-from softnlp.nlp.bounded import Limits, Map, Measured, could_gain, least_norm, nearest
 from softnlp.nlp.optimality import OPTIMAL, not_optimal
-from softnlp.statics.branch import stretch_on_branch
+from softnlp.nlp.places import best_first, in_rounds, pattern_search
+from softnlp.nlp.reduced import Point
+from softnlp.nlp.solver import FROM_SOLUTION
+from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.kept import pose_solver
-from softnlp.statics.pose_grid import Solved
+from softnlp.statics.pose_grid import TIP, Solved
 from softnlp.statics.step import Aimed, Step
-from softnlp.studies.derivatives import PoseDerivatives
-from softnlp.studies.inverse_nlp import Programs, moving_sets
-from softnlp.studies.targets import (
-    Aim,
-    ArcMap,
-    GridMap,
-    InverseTask,
-    Table,
-    Target,
-    TipMap,
-    TipPoint,
-    aim_of,
-    spread,
-    tabulated,
-)
+from softnlp.studies.inverse_problem import Tips, coarse_intervals, pressure_limits
+from softnlp.studies.targets import Aim, InverseTask, Target, aim_of
 
 Array = NDArray[np.float64]
+Start = tuple[Array, Point | Array | None, bool]
+"""Pressures z [bar], states nearby (None: those of the arc), and whether it is where the last target's search ended."""
 
-_ARCS, _POSES = 729, 64  # entries of the table of tips
 _STARTS = 4
 _COARSE_MET = 1e-7  # misfit of a coarse search that needs no better one [L_0]
 _ROUNDS = 4
-_FOLD_MARGIN = 1e-6  # of the last pressure with an equilibrium
 _SAME_SPOT = 1e-3  # of the cost: less is no nearer
 _JUMP = 0.3  # of the bounds: more is a jump along a path
 _SAME_PLACE = 1e-4  # [bar]
-_COMPASS = (0.25, 1e-3)  # first and last step of the search among stable poses, of the bounds
+_FIRST_MOVE, _LAST_MOVE = 0.25, 1e-3  # of the search among stable poses, of the bounds
 _MOST_POSES = 150  # that it solves
 _NO_BODY = "the target is met only by a shape that no body can take"
 
@@ -63,18 +53,19 @@ _NO_BODY = "the target is met only by a shape that no body can take"
 class Found:
     """Where a coarse search ended: the point, the curvature of its residuals, whether the target is met there.
 
-    continues : whether it began at the last target's pressure.
+    continues : whether it began at the last target's pressure. cost : the weighed misfit [L_0].
     """
 
-    point: Measured
-    second: Array | None
+    point: Point
+    second: Array
     met: bool
     continues: bool
+    cost: float
 
     @property
-    def cost(self) -> float:
-        """The weighed misfit [L_0]."""
-        return float(np.linalg.norm(self.point.r))
+    def rank(self) -> tuple[float, ...]:
+        """What is met comes first, by the pressures it takes, then what is nearest."""
+        return (not self.met, float(self.point.theta @ self.point.theta) if self.met else self.cost)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,8 +79,8 @@ class Reached:
     cost: float
 
 
-class InverseSolver:
-    """Solves targets of one task for one model under the same loads; what is compiled or tabulated is kept."""
+class InverseKinematics:
+    """Meets targets of one task for one model under the same loads; what is compiled or tabulated is kept."""
 
     def __init__(
         self, model: Model, numerics: Numerics, loads: Loads, task: InverseTask, method: Literal["newton", "nlp"]
@@ -98,28 +89,25 @@ class InverseSolver:
         self.poses = pose_solver(model, numerics.without_ipopt() if numerics.engine == "auto" else numerics)
         self.loads = loads
         self.task = task
-        self.limits, self.ends = self._limits()
-        self._derivatives = PoseDerivatives(self.poses)
+        self.limits, self._ended = pressure_limits(self.poses, task.lower, task.upper)
         self._method = "nlp" if numerics.engine == "ipopt" else method
-        self._programs = Programs(self.poses, loads, self.limits, numerics)
-        self._tables: dict[TipMap, Table] = {}
         self._intervals: int | None = None
-        self._arcs = ArcMap(self.poses)
-        self._coarse: TipMap = self._arcs
+        self._arcs = self._tips(None)
+        self._coarse = self._arcs
         if loads.act:
-            self._coarse = self._map(numerics.intervals or self._coarse_intervals())
+            self._coarse = self._tips(numerics.intervals or coarse_intervals(self.poses, self.limits))
 
-    def solve(self, target: Target, near: Reached | None) -> tuple[Step, Reached | None]:
+    def nearest(self, target: Target, near: Reached | None) -> tuple[Step, Reached | None]:
         """Find the pressure for one target, from the last one where there is one. Never raises for a hard target."""
         began = time.perf_counter()
         aim = aim_of(self.task, target, float(self.poses.model.robot.length))
-        if self.ends is not None and float(self.limits.lower.sum()) > self.limits.largest_sum:
-            lost = Step(self.task.lower, self.ends[0], self.ends[1], aimed=aim.aimed(None))
+        if self._ended is not None and float(self.limits.lower.sum()) > self.limits.largest_sum:
+            lost = Step(self.task.lower, self._ended.status, self._ended.message, aimed=aim.aimed(None))
             return replace(lost, solve_time=time.perf_counter() - began), None
         best: Reached | None = None
         rejected: Step | None = None
         chosen = None
-        for found in self._candidates(aim, near):
+        for found in self._ends(aim, near):
             judged = self._finished(aim, found)
             if isinstance(judged, Step):
                 rejected = judged
@@ -144,7 +132,7 @@ class InverseSolver:
                 warnings.append(not_optimal(left, "the search of pressures"))
         step = replace(best.step, aimed=aimed, warnings=tuple(warnings))
         if self._numerics.engine == "auto":
-            step = self._programs.closed(aim, best.solved, step, only_pose=rejected is not None, meets=met)
+            step = self._closed(aim, best.solved, step, only_pose=rejected is not None, meets=met)
         step = replace(step, solve_time=time.perf_counter() - began)
         if not step.status.has_solution:
             return step, None
@@ -152,137 +140,111 @@ class InverseSolver:
             step = replace(step, status=Status.OUT_OF_REACH, message=self._out_of_reach(aim, best, rejected))
         return step, best
 
-    def forget_table(self) -> None:
-        """Drop the tables of starts, for timing what they cost."""
-        self._tables.clear()
-
-    def _candidates(self, aim: Aim, near: Reached | None) -> Iterator[Found]:
-        """Yield where coarse searches end, best first; the first that meets the target at once if no choice is left.
+    def _ends(self, aim: Aim, near: Reached | None) -> Iterator[Found]:
+        """Return where coarse searches end, best first; the first that meets the target at once if no choice is left.
 
         With more sets than the target needs, every start is searched and the smallest pressures come first.
         """
-        redundant = self._redundant(aim)
-        ends: list[Found] = []
-        for start, continues in self._starts(aim, near):
-            found = self._search(aim, start, continues=continues)
-            if found.met and not redundant:
-                yield found
-            ends.append(found)
-        apart: list[Found] = []  # of those that end in one place the first stands for all
-        for found in ends:
-            if all(np.max(np.abs(found.point.z - other.point.z)) > _SAME_PLACE for other in apart):
-                apart.append(found)
-        apart.sort(key=lambda f: (not f.met, float(f.point.z @ f.point.z) if f.met else f.cost))
-        yield from (found for found in apart if redundant or not found.met)
+        return best_first(
+            self._starts(aim, near),
+            partial(self._search, aim),
+            enough=lambda found: found.met and not self._redundant(aim),
+            place=lambda found: found.point.theta,
+            same=_SAME_PLACE,
+            rank=lambda found: found.rank,
+        )
 
-    def _starts(self, aim: Aim, near: Reached | None) -> Iterator[tuple[TipPoint, bool]]:
-        """Yield tips of the coarse map: at the last pressure, which is told by True, then of the table."""
+    def _starts(self, aim: Aim, near: Reached | None) -> Iterator[Start]:
+        """Yield where to begin: at the last pressure, then at places of the table."""
         if near is not None:
-            point = self._coarse.of(near.solved) if isinstance(self._coarse, GridMap) else None
-            point = point or self._coarse.at(near.pressure, None)
-            if point is not None:
-                yield point, True
-        loaded = isinstance(self._coarse, GridMap)
-        if loaded:  # an arc is near enough to begin with, and costs nothing; most targets need no other start
-            arcs = self._tips(self._arcs)
-            for k in arcs.starts(aim, self.limits, 1):
-                if (point := self._coarse.at(arcs.pressures[k], None)) is not None:
-                    yield point, False
-        table = self._tips(self._coarse)
-        for k in table.starts(aim, self.limits, _STARTS):
-            point = table.points[k]
-            assert point is not None
-            yield point, False
+            yield near.pressure / BAR, self._coarse.moved(near.solved), True
+        if self._coarse is not self._arcs:
+            # an arc is near enough to begin with, and costs nothing; most targets need no other start
+            yield from ((arc.theta, None, False) for arc in self._arcs.nearest(self._arcs.program(aim), 1))
+        yield from ((tip.theta, tip, False) for tip in self._coarse.nearest(self._coarse.program(aim), _STARTS))
 
-    def _tips(self, tips: TipMap) -> Table:
-        """Return the tips of a map over the bounds."""
-        if tips not in self._tables:
-            most = _POSES if isinstance(tips, GridMap) else _ARCS
-            self._tables[tips] = tabulated(tips, spread(self.limits, most) * BAR)
-        return self._tables[tips]
-
-    def _search(self, aim: Aim, start: TipPoint, *, continues: bool) -> Found:
-        """Search on the coarse map from a tip."""
-        point, second, _ = nearest(self._measure(aim, self._coarse), aim.measured(start), self.limits)
+    def _search(self, aim: Aim, start: Start) -> Found | None:
+        """Search on the coarse map from a start; None where there is no tip."""
+        z, near, continues = start
+        program = self._coarse.program(aim)
+        begin = program.reduced.at(z, program.p, near)
+        if begin is None and near is not None:
+            begin = program.at(z)
+        if begin is None:
+            return None
+        point, second = program.searched(begin)
         met = float(np.linalg.norm(point.r)) <= _COARSE_MET
         if met and self._redundant(aim):
-            begin = aim.conditioned(point.memo)
-            least, second, _ = least_norm(self._measure(aim, self._coarse, met=True), begin, self.limits)
-            if float(np.linalg.norm(least.r)) <= _COARSE_MET:
-                point = aim.measured(least.memo)
-        return Found(point, second, met, continues)
+            strict = self._coarse.program(aim, meets=True)
+            least, second = strict.searched(strict.again(point))
+            least = program.again(least)
+            point = least if float(np.linalg.norm(least.r)) <= _COARSE_MET else point
+        return Found(point, second, met, continues, float(np.linalg.norm(point.r)))
 
     def _left(self, aim: Aim, reached: Reached, *, meets: bool) -> float:
         """Return what the first-order conditions leave at an answer, on its pose's grid; inf where it has no slope."""
-        point = self._map(reached.solved.intervals).of(reached.solved)
-        if point is None:
-            return float("inf")
-        return could_gain(aim.conditioned(point) if meets else aim.measured(point), self.limits, meets=meets)
+        tips = self._tips(reached.solved.intervals)
+        program = tips.program(aim, meets=meets)
+        point = program.at(reached.pressure / BAR, tips.moved(reached.solved))
+        return float("inf") if point is None else program.could_gain(point)
+
+    @cached_property
+    def _moving(self) -> int:
+        """How many sets the bounds let move."""
+        return int(np.sum(self.limits.upper > self.limits.lower))
 
     def _redundant(self, aim: Aim) -> bool:
         """Whether there are more pressures to choose than the target has conditions."""
-        return moving_sets(self.limits) > aim.conditions
-
-    def _measure(self, aim: Aim, tips: TipMap, *, met: bool = False) -> Map:
-        """Return the misfit by pressure on a map."""
-        of = aim.conditioned if met else aim.measured
-
-        def measure(z: Array, near: Measured) -> Measured | None:
-            point = tips.at(z * BAR, near.memo)
-            return None if point is None else of(point)
-
-        return measure
+        return self._moving > aim.conditions
 
     def _finished(self, aim: Aim, found: Found) -> Reached | Step:
         """Make a coarse answer exact on the grid of its pose and judge it; a step where there is no stable pose."""
-        pressure = found.point.z * BAR
         exact = 0.3 * self.poses.numerics.accuracy
-        if self._intervals is not None and isinstance(self._coarse, GridMap):
-            refined = self._refined(aim, found, self._intervals, self._coarse.solved(found.point.memo))
-            pressure = pressure if refined is None else refined
-        best: Reached | Step | None = None
-        for k in range(_ROUNDS):
-            step, solved = self.poses.solve(pressure, self.loads)
-            judged = self._judged(aim, pressure, step, solved)
-            if isinstance(judged, Step) or solved is None:
-                return best or judged
-            settled = isinstance(best, Reached) and judged.cost >= best.cost * (1 - 1e-9)
+        lost: list[Step] = []
+
+        def judge(pressure: Array) -> Reached | None:
+            judged = self._at(aim, pressure)
+            if isinstance(judged, Step):
+                lost.append(judged)
+                return None
+            return judged
+
+        def improve(judged: Reached, best: Reached | None) -> tuple[Reached, Array | None]:
+            settled = best is not None and judged.cost >= best.cost * (1 - 1e-9)
             # A later one is of the pose's own grid; among answers as near it has the smaller pressures.
-            if not isinstance(best, Reached) or judged.cost <= best.cost * (1 + 1e-6) + exact:
-                best = judged
-            found_already = isinstance(self._coarse, ArcMap) and judged.cost <= found.cost + exact
-            unasked = k == 0 and self._method == "nlp"  # the program has not been solved yet
-            if not unasked and (settled or found_already):
-                break
-            on_its_grid = self._intervals == solved.intervals or not self._redundant(aim)
-            if not unasked and judged.cost <= exact and on_its_grid:
-                break
-            self._intervals = solved.intervals
-            refined = self._refined(aim, found, solved.intervals, solved)
-            if refined is None or (not unasked and float(np.max(np.abs(refined - pressure))) < 1e-9 * BAR):
-                break
-            pressure = refined
-        assert best is not None
-        return best
+            better = judged if best is None or judged.cost <= best.cost * (1 + 1e-6) + exact else best
+            unasked = best is None and self._method == "nlp"  # the program has not been solved yet
+            intervals = judged.solved.intervals
+            found_already = self._coarse is self._arcs and judged.cost <= found.cost + exact
+            on_its_grid = self._intervals == intervals or not self._redundant(aim)
+            if not unasked and (settled or found_already or (judged.cost <= exact and on_its_grid)):
+                return better, None
+            self._intervals = intervals
+            refined = self._refined(aim, found, self._tips(intervals), judged.solved)
+            stays = refined is not None and float(np.max(np.abs(refined - judged.pressure))) < 1e-9 * BAR
+            return better, None if stays and not unasked else refined
 
-    def _refined(self, aim: Aim, found: Found, intervals: int, solved: Solved) -> Array | None:
+        pressure = found.point.theta * BAR
+        if self._intervals is not None and self._coarse is not self._arcs:
+            begin = self._coarse.solved(self._coarse.program(aim), found.point)
+            refined = self._refined(aim, found, self._tips(self._intervals), begin)
+            pressure = pressure if refined is None else refined
+        return in_rounds(pressure, judge, improve, _ROUNDS) or lost[0]
+
+    def _refined(self, aim: Aim, found: Found, tips: Tips, solved: Solved) -> Array | None:
         """Return the pressure found again on a grid, from a pose nearby; None where Newton is lost."""
-        tips = self._map(intervals)
-        point = tips.of(solved)
-        if point is None:
+        program = tips.program(aim, meets=found.met and self._redundant(aim))
+        begin = program.at(solved.solution.p[: self.task.lower.size] / BAR, tips.moved(solved))
+        if begin is None:
             return None
-        met = found.met and self._redundant(aim)
         if self._method == "nlp":
-            return self._programs.searched(aim, tips.intervals, point, meets=met)
-        start = aim.conditioned(point) if met else aim.measured(point)
-        search = least_norm if met else nearest
-        end, _, _ = search(
-            self._measure(aim, tips, met=met), start, self.limits, found.second, measured_curvature=False
-        )
-        return end.z * BAR
+            z = program.by_ipopt(begin)
+            return None if z is None else z * BAR
+        return program.searched(begin, found.second)[0].theta * BAR
 
-    def _judged(self, aim: Aim, pressure: Array, step: Step, solved: Solved | None) -> Reached | Step:
+    def _at(self, aim: Aim, pressure: Array) -> Reached | Step:
         """Return a stable pose that a body can take as an answer, else the step that says why there is none."""
+        step, solved = self.poses.solve(pressure, self.loads)
         if step.pose is None or solved is None:
             return step
         fit, message = step.pose.fit, ""
@@ -295,50 +257,56 @@ class InverseSolver:
         aimed = aim.aimed(step.pose)
         return Reached(pressure, step, solved, aimed, aim.cost(aimed))
 
-    def _meets(self, aim: Aim, reached: Reached) -> bool:
-        """Whether a pose is within the accuracy asked for: of L_0, and as many radians."""
-        accuracy = self.poses.numerics.accuracy
-        distance, angle = reached.aimed.distance, reached.aimed.angle
-        return (distance is None or distance <= accuracy * aim.length) and (angle is None or angle <= accuracy)
-
     def _searched(self, aim: Aim, best: Reached | None) -> Reached | None:
         """Search among stable poses without derivatives: where they end there is no slope to follow.
 
         It begins at the first stable pose of the table that is nearer than the best one known, or else at that one.
         """
-        span = (self.limits.upper - self.limits.lower) * BAR
         here = best
-        table = self._tips(self._coarse)
-        misfit = np.linalg.norm(aim.misfit(table.states), axis=0)
-        for k in table.starts(aim, self.limits, len(table.pressures)):
-            if best is not None and misfit[k] >= best.cost:
-                break
-            judged = self._at(aim, table.pressures[k])
+        program = self._coarse.program(aim)
+        for tip in self._coarse.nearest(program, below=np.inf if best is None else best.cost):
+            judged = self._at(aim, tip.theta * BAR)
             if isinstance(judged, Reached) and (best is None or judged.cost < best.cost):
                 here = judged
                 break
         if here is None:
             return None
-        size, last = _COMPASS
-        moves = np.vstack([np.eye(span.size), -np.eye(span.size)])
-        spent = 0
-        while size > last and spent < _MOST_POSES:
-            for move in moves:
-                z = self.limits.clip((here.pressure + size * move * span) / BAR)
-                if np.max(np.abs(z * BAR - here.pressure)) < 1e-6 * BAR:
-                    continue
-                judged = self._at(aim, z * BAR)
-                spent += 1
-                if isinstance(judged, Reached) and judged.cost < here.cost:
-                    here = judged
-                    break
-            else:
-                size /= 2
-        return here
+        reached = {(here.pressure / BAR).tobytes(): here}
 
-    def _at(self, aim: Aim, pressure: Array) -> Reached | Step:
-        step, solved = self.poses.solve(pressure, self.loads)
-        return self._judged(aim, pressure, step, solved)
+        def cost(z: Array) -> float:
+            judged = self._at(aim, z * BAR)
+            if isinstance(judged, Step):
+                return np.inf
+            reached[z.tobytes()] = judged
+            return judged.cost
+
+        start = here.pressure / BAR, here.cost
+        z = pattern_search(start, cost, self.limits, first=_FIRST_MOVE, last=_LAST_MOVE, most=_MOST_POSES)
+        return reached[z.tobytes()]
+
+    def _closed(self, aim: Aim, solved: Solved, step: Step, *, only_pose: bool, meets: bool) -> Step:
+        """Return the step of an answer with IPOPT's word on the program that was searched, or `disputed`.
+
+        only_pose : its pose at its pressures is closed, where the answer is the nearest of those that a body can take:
+        stability and self-intersection are no rows of the program. So is a target that fewer sets meet than it has
+        conditions: its misfit is flat where it is zero.
+        """
+        pose, whole = solved.solution, None
+        if not (only_pose or self._moving == 0 or (meets and self._moving < aim.conditions)):
+            program = self._tips(solved.intervals).program(aim, meets=meets)
+            start = replace(pose, x=np.concatenate([step.pressure / BAR, pose.x]), p=program.p)
+            whole = program.engine(**FROM_SOLUTION), start
+        try:
+            found = closed(solved.grid.reference, pose, self._numerics, TIP, whole)
+        except DisputedError as error:
+            return Step(step.pressure, Status.DISPUTED, str(error), iterations=step.iterations, aimed=aim.aimed(None))
+        return replace(step, engine=self._numerics.engine, ipopt=found.ipopt)
+
+    def _meets(self, aim: Aim, reached: Reached) -> bool:
+        """Whether a pose is within the accuracy asked for: of L_0, and as many radians."""
+        accuracy = self.poses.numerics.accuracy
+        distance, angle = reached.aimed.distance, reached.aimed.angle
+        return (distance is None or distance <= accuracy * aim.length) and (angle is None or angle <= accuracy)
 
     def _jumped(self, best: Reached, chosen: Found | None, near: Reached | None) -> list[str]:
         """Return a warning where the answer does not continue the one before."""
@@ -360,38 +328,11 @@ class InverseSolver:
         assert best.aimed.tip_position is not None
         tip = ", ".join(f"{x / MILLIMETRE + 0.0:.2f}" for x in np.round(best.aimed.tip_position, 8))
         text = f"{Status.OUT_OF_REACH.advice}; the nearest tip is {' and '.join(left)}, at ({tip}) mm"
-        if self.ends is not None and best.pressure.sum() > 0.999 * self.limits.largest_sum * BAR:
-            text += f"; pressures end where the stretch does ({self.ends[0].value})"
+        if self._ended is not None and best.pressure.sum() > 0.999 * self.limits.largest_sum * BAR:
+            text += f"; pressures end where the stretch does ({self._ended.status.value})"
         if rejected is not None and rejected.message.startswith(_NO_BODY):
             return f"{text}; nearer, {rejected.message}"
         return text if rejected is None else f"{text}; nearer equilibria are not stable or not found"
 
-    def _map(self, intervals: int) -> GridMap:
-        return GridMap(self._derivatives, intervals, self.loads)  # what is compiled is kept with the poses
-
-    def _limits(self) -> tuple[Limits, tuple[Status, str] | None]:
-        """Return the bounds and the largest sum of pressures that has an equilibrium, with what ends it.
-
-        The stretch balance holds the pressures by their sum alone; the stiffnesses may tell sets apart, so the
-        least sum of the bounds' corners is taken.
-        """
-        lower, upper = self.task.lower, self.task.upper
-        largest, ends = float(np.sum(upper)), None
-        corners = [upper, *(np.where(np.arange(upper.size) == k, upper.sum(), 0.0) for k in range(upper.size))]
-        for corner in corners:
-            branch = stretch_on_branch(self.poses.branch, self.poses.column({"pressure": corner}), corner)
-            if not branch.status.has_solution and branch.fraction * corner.sum() < largest:
-                largest = (1 - _FOLD_MARGIN) * branch.fraction * float(corner.sum())
-                ends = (branch.status, branch.message)
-        return Limits(lower / BAR, upper / BAR, largest / BAR), ends
-
-    def _coarse_intervals(self) -> int:
-        """Return a grid that holds the most curled unloaded arc within the bounds."""
-        top = self.limits.largest_sum
-        most = 0
-        for k in range(self.task.upper.size):
-            z = self.limits.clip(np.where(np.arange(self.task.upper.size) == k, min(self.limits.upper[k], top), 0.0))
-            column = self.poses.column({"pressure": z * BAR})
-            branch = stretch_on_branch(self.poses.branch, column, z * BAR)
-            most = max(most, self.poses.first_intervals(column, branch.stretch))
-        return most
+    def _tips(self, intervals: int | None) -> Tips:
+        return Tips(self.poses, self.loads, self.limits, self._numerics, intervals)

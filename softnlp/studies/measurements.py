@@ -252,6 +252,17 @@ class TensileTask:
     notes: tuple[str, ...] = ()
 
     @property
+    def data_stretch(self) -> tuple[float, float]:
+        """The least and the largest stretch of the points [1]."""
+        return float(np.min(self.stretch)), float(np.max(self.stretch))
+
+    @property
+    def about(self) -> str:
+        """How many points there are, and their stretches, in words."""
+        low, high = self.data_stretch
+        return f"{self.stretch.size} points, stretch {low:.4g} to {high:.4g}"
+
+    @property
     def left_out(self) -> str:
         """What is said of points that the range asked for leaves out, "" where there is none."""
         asked = self.stretch_range

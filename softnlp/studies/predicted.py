@@ -19,14 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.status import Status
-from softnlp.model import rod
 from softnlp.model.rod import Loads
 from softnlp.nlp.implicit import ImplicitDerivatives
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
 from softnlp.statics.body import Fit
 from softnlp.statics.branch import stretch_on_branch
-from softnlp.statics.loadcase import stretch_imbalance, stretch_near, unpack_section
+from softnlp.statics.loadcase import stretch_imbalance, stretch_near
 from softnlp.statics.pose_grid import Solved, pose_distance
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
@@ -134,8 +133,8 @@ def _arc_function(solver: PoseSolver, names: Sequence[str]) -> ca.Function:
     column, stretch = ca.SX.sym("quantities", functions.section.size1_in(0)), ca.SX.sym("stretch")
     c, balance, units = functions.section(column, stretch)
     state = functions.arc(column, stretch, 1.0)
-    L_0, N = units[0], functions.model.robot.chambers
-    _, u = rod.strains(state, unpack_section(c))
+    L_0, N = units[0], functions.model.chambers
+    u = functions.strains(state, c)[1]
     angle = stretch * ca.sqrt(u[0] ** 2 + u[1] ** 2 + _NO_CURVATURE)
     lengths = functions.lengths(state, c)[:N] * L_0
     seen = ca.vertcat(state[:3] * L_0, angle, (stretch - 1) * L_0, lengths, state[3:12])

@@ -50,7 +50,7 @@ class LawFit:
     misfit
         Of the engineering stress: rmse in Pa, mape in %.
     fitted_stretch
-        (2,) range of the data with 1 [1].
+        (2,) range of the data widened to 1, where the stress of every law is 0 by construction [1].
     unstable_from
         First stretch at which the tangent modulus is not positive [1], None where there is none up to 1.5 times the
         measured extension.
@@ -158,9 +158,10 @@ class TensileFit:
 
     @property
     def best(self) -> LawFit | None:
-        """The material with the smallest spread, None where no law gave one."""
+        """The material with the smallest spread, of those whose constants are determined where there are any."""
         usable = [fit for fit in self.fits.values() if fit.material is not None]
-        return min(usable, key=lambda fit: fit.spread) if usable else None
+        sure = [fit for fit in usable if False not in fit.determined.values()]
+        return min(sure or usable, key=lambda fit: fit.spread, default=None)
 
 
 def fit_tensile(

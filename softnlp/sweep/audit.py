@@ -16,7 +16,7 @@ from softnlp.batch.poses import STATUSES, Lane
 from softnlp.sweep.journal import Journal
 
 EVERY = 1000
-"""One of so many poses that the batch solved is audited, at least one of a chunk."""
+"""One of so many poses that the batch solved is audited, counted through all chunks; at least one of a sweep."""
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,12 @@ def audit(plan: Plan, journal: Journal, stop: Callable[[], bool] | None = None) 
         return Audit()
     solver: Alone | None = None
     solved = STATUSES.index(Status.SOLVED)
-    audited, largest, disputed = 0, 0.0, []
+    audited, largest, disputed, ahead = 0, 0.0, [], 0  # ahead : how many solved poses come before the next audited one
     for block in journal.blocks():
         rows = block.rows[(block.rows["lane"] == Lane.BATCH) & (block.rows["status"] == solved)]
-        for row in rows[::EVERY]:
+        chosen = rows[ahead::EVERY]
+        ahead += EVERY * chosen.size - rows.size
+        for row in chosen:
             if stop is not None and stop():
                 return None
             solver = solver or Alone(plan, plan.numerics)

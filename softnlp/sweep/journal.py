@@ -224,8 +224,8 @@ class Journal:
         if not resume:
             count = self._file.execute("SELECT count(*) FROM chunk").fetchone()[0]
             raise self._error(
-                f"a sweep has begun here ({count} of {_chunks_of(found)} chunks are solved); --resume continues it, "
-                "another --out leaves it alone, or remove this file to begin again"
+                f"a sweep has begun here ({count} of {_chunks_of(found)} chunks are solved); resume=True continues it, "
+                "another folder leaves it alone, or remove this file to begin again"
             )
         version = found.get("softnlp")
         if version != told["softnlp"]:
@@ -288,7 +288,7 @@ class Journal:
 
     def _reason(self, error: sqlite3.Error) -> str:
         name = getattr(error, "sqlite_errorname", "") or ""
-        kept = f"{self.poses} poses are kept, and --resume goes on from them"
+        kept = f"{self.poses} poses are kept, and resume=True goes on from them"
         if name.startswith(("SQLITE_BUSY", "SQLITE_LOCKED")):
             return "another sweep is writing here; wait for it, or choose another folder"
         if name == "SQLITE_FULL":

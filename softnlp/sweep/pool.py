@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from softnlp.base.errors import InputError
-from softnlp.base.processes import begin_worker, process_context
+from softnlp.base.processes import process_context, worker_pool
 from softnlp.base.reading import one_line
 from softnlp.batch.chunk import ChunkSolver
 from softnlp.batch.plan import Plan
@@ -67,8 +67,7 @@ def _kept(source: Plan | PlanFile, fingerprint: str) -> ChunkSolver:
 
 
 def prepare(plan: Plan, fingerprint: str) -> None:
-    """Begin a worker of a process pool, and keep the plan."""
-    begin_worker()
+    """Keep the plan in a worker of a process pool."""
     _plans[fingerprint] = plan
 
 
@@ -123,10 +122,9 @@ class ProcessCrew(Crew):
         self._executor.shutdown(wait=True, cancel_futures=True)
 
     def _start(self) -> ProcessPoolExecutor:
-        context = process_context()
-        if context.get_start_method() == "fork":
+        if process_context().get_start_method() == "fork":
             keep(*self._given)  # what is made here need not be made by each of them
-        return ProcessPoolExecutor(self._workers, mp_context=context, initializer=prepare, initargs=self._given)
+        return worker_pool(self._workers, prepare, *self._given)
 
 
 @contextmanager
@@ -149,7 +147,7 @@ def executor_crew(executor: Executor, plan: Plan, fingerprint: str) -> Iterator[
     client = getattr(executor, "_client", None)
     if client is not None and hasattr(client, "scatter"):
         if not (threads := sum(client.nthreads().values())):
-            raise InputError("the Dask cluster has no workers", key="--cluster")
+            raise InputError("the Dask cluster has no workers", key="executor")
         scattered = client.scatter(plan, broadcast=True, hash=False)
         yield Crew(executor, scattered, fingerprint, 3 * threads + 2)
         return

@@ -35,7 +35,7 @@ CSV_FILE = "workspace.csv"
 
 _FEW_CHUNKS = 2  # are solved here: a pool of processes would take longer to start
 _MOST_DEATHS = 3
-_KEPT = "what was solved is kept, and --resume goes on from there"
+_KEPT = "what was solved is kept, and resume=True goes on from there"
 _PATIENCE = 0.1  # [s] between two looks at whether to stop
 
 

@@ -24,11 +24,6 @@ from softnlp.statics.step import Run, Shape
 from softnlp.studies.fields import value
 
 NOTHING = "–"
-_STABILITY = {
-    True: "",
-    False: " The equilibrium is not stable.",
-    None: " Its stability is undefined: a dead tip moment has no potential.",
-}
 _ALONG: Mapping[str, Output] = {
     "curvature": OUTPUTS["curvature"],
     "strain": OUTPUTS["shear_extension"],
@@ -235,7 +230,6 @@ def certificate_words(run: Run) -> str:
     step = run.steps[0]
     if not step.status.has_solution or step.residual is None:
         return f"{step.status.value.replace('_', ' ').capitalize()}: {step.message}."
-    stable = "" if step.pose is None else _STABILITY[step.pose.stable]
     error = "" if step.discretisation_error is None else f", tip within {step.discretisation_error:.0e} L₀"
     lead = "Solved" if step.status.value == "solved" else "No contact: the robot does not reach the wall"
-    return f"{lead}, residual {step.residual:.0e}{error}, {step.intervals} intervals.{stable}"
+    return f"{lead}, residual {step.residual:.0e}{error}, {step.intervals} intervals."

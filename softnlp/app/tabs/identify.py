@@ -60,19 +60,21 @@ def identify_tab(stage: Stage) -> None:
         return "tensile" if session.table("tensile") and not session.table("measurements") else "measurements"
 
     def choose(chosen: str | None) -> None:
-        """Put the tables of the other kind aside, and take out those that were put aside before."""
+        """Show a kind, with its table where that was put aside; without one the scenario stays as it is."""
         if chosen is None:
             return
         for name, box in boxes.items():
             box.set_visibility(name == chosen)
-        other = "tensile" if chosen == "measurements" else "measurements"
-        table = session.table(other)
-        if table:
-            aside[other] = table
-            session.document.replace(other, None)
         if chosen in aside and not session.table(chosen):
-            session.document.replace(chosen, aside[chosen])
-        session.reread()
+            session.change_all(chosen, aside[chosen])
+
+    def settle() -> None:
+        """Put the table of the other kind aside, now that the chosen one has a table."""
+        chosen = str(kinds.value)
+        other = "tensile" if chosen == "measurements" else "measurements"
+        if session.table(chosen) and session.table(other):
+            aside[other] = session.table(other)
+            session.change_all(other, None)
 
     with ui.column().classes("w-full gap-3 pt-2"):
         kinds = controls.toggle({"measurements": "Robots", "tensile": "Tensile test"}, "identify.kind", kind())
@@ -85,6 +87,7 @@ def identify_tab(stage: Stage) -> None:
             tensile_part(session)
     for name, box in boxes.items():
         box.set_visibility(name == kind())
+    session.on_scenario(settle)
     kinds.on_value_change(lambda event: choose(event.value))
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from nicegui import ui
 
-from softnlp.app.controls import button, named
+from softnlp.app.controls import button, dismiss_refusals, named, refuse
 from softnlp.app.files import zipped
 from softnlp.app.session import Stage
 from softnlp.app.theme import darkness, on_dark
@@ -55,10 +55,11 @@ def scenario_tab(stage: Stage) -> None:
         if editor.value == session.text():
             return True
         try:
-            session.open(editor.value or "", session.name)
+            session.open(editor.value or "", session.file_name)
         except SoftnlpError as error:
-            ui.notify(str(error), type="negative", close_button="Close", timeout=0, multi_line=True)
+            refuse(str(error))
             return False
+        dismiss_refusals()
         return True
 
     async def start() -> None:

@@ -168,7 +168,7 @@ class _StepSlider:
     def __init__(self, session: Session) -> None:
         self._session = session
         with ui.row().classes("w-full items-center gap-3 pr-3 no-wrap") as self._row:
-            self._label = ui.label("").classes("text-sm shrink-0")
+            self._label = ui.label("").classes("text-sm shrink-0").mark("sequence.shown")
             self._slider = ui.slider(min=1, max=2, value=1, on_change=self._moved).props("snap dense")
             controls.named(self._slider, "sequence.step")
         session.follow(self._refresh)
@@ -181,22 +181,28 @@ class _StepSlider:
         count = self._count()
         self._row.set_visibility(count > 1)
         self._slider.props(f"max={max(count, 2)}")
-        self._label.set_text(f"Step {min(int(self._slider.value), count)} of {count}")
+        self._follow()
 
     def _follow(self) -> None:
-        """Move to the step that another control has shown."""
-        session = self._session
-        if not session.follows_file or session.scenario is None or self._count() < 2:
+        """Say which step the page shows, and move there; a pose of other controls is none."""
+        session, count = self._session, self._count()
+        if session.scenario is None or count < 2:
             return
-        same = (session.scenario.pressures == session.pressure).all(axis=1)
-        if same.any() and not same[min(int(self._slider.value), len(same)) - 1]:
-            self._slider.set_value(int(same.argmax()) + 1)
+        rows, at = session.scenario.pressures, min(int(self._slider.value), count) - 1
+        alike = session.follows_file and rows.shape[1] == len(session.pressure)
+        same = (rows == session.pressure).all(axis=1) if alike else np.zeros(count, bool)
+        if not same.any():
+            self._label.set_text(f"{count} steps")
+            return
+        if not same[at]:
+            at = int(same.argmax())
+            self._slider.set_value(at + 1)
+        self._label.set_text(f"Step {at + 1} of {count}")
 
     def _moved(self) -> None:
         count = self._count()
         if count > 1 and self._session.problem is None:
             self._session.show_step(min(int(self._slider.value), count) - 1)
-            self._label.set_text(f"Step {int(self._slider.value)} of {count}")
 
 
 class _Results:

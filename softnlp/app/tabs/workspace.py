@@ -17,7 +17,7 @@ from softnlp.app.controls import button, heading, named, number, number_field, s
 from softnlp.app.parts import NumberTable, number_text, study_row
 from softnlp.app.session import Session, Stage
 from softnlp.base.columns import ONE, OUTPUTS
-from softnlp.base.errors import InputError
+from softnlp.base.errors import InputError, reworded
 from softnlp.base.processes import processors
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.figures.space import shown
@@ -89,6 +89,7 @@ def _source(session: Session) -> None:
         document = session.document
         if wanted != document.sweeps_wall:
             document.sweeps_wall = wanted
+            session.use()
             if wanted and not document.table("contact"):
                 document.replace("contact", {"closure": "compliant"})
             session.reread()
@@ -248,9 +249,10 @@ def sweep(asked: Scenario, folder: Path, workers: int, progress: Progress) -> Sw
             return
 
     about = {"title": asked.title, "scenario": asked.text, "warnings": json.dumps(asked.warnings)}
-    news = run_sweep(
-        plan, place, workers=workers, resume=True, progress=report, stop=lambda: progress.stopping, about=about
-    )
+    with reworded({"resume=True goes on": "another run goes on"}):
+        news = run_sweep(
+            plan, place, workers=workers, resume=True, progress=report, stop=lambda: progress.stopping, about=about
+        )
     if news.stopped:
         return Swept(asked, news, None, None)
     workspace = load_workspace(place / WORKSPACE_FILE)

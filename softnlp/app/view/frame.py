@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 Layout = tuple[int, tuple[float, ...]]
 
 ARROW = 0.3  # length of every arrow, of L_0; its label says how much
+_ROUND = 1.7  # least size of a moment's arrow, of the radius of the body that it goes round
 _NOTHING = (0.0, 0.0, 0.0)
 
 
@@ -47,7 +48,8 @@ class Tube:
 class Arrow:
     """A load.
 
-    kind : "force", "moment", "wall" or "gravity". start, vector : (3,) [mm]. label : with its size and unit.
+    kind : "force", "moment", "wall" or "gravity". start, vector : (3,) [mm]; a moment's arrow turns about its vector.
+    label : with its size and unit.
     inwards : whether it ends where it acts, so that there is room for the label at its start.
     """
 
@@ -149,7 +151,8 @@ def _arrows(
         ("wall", push, 1.0, "wall {:.3g} N", contact, True),
     ):
         if vector.any():
-            step = ARROW * robot.length / MILLIMETRE * _unit(vector)
+            length = max(ARROW * robot.length, _ROUND * body.radii.outer if kind == "moment" else 0.0)
+            step = length / MILLIMETRE * _unit(vector)
             start = at / MILLIMETRE - (step if inwards else 0)
             found.append(Arrow(kind, start, step, text.format(np.linalg.norm(vector) / unit), inwards))
     return tuple(found)

@@ -6,9 +6,9 @@ import numpy as np
 
 from softnlp.base.arrays import Array
 from softnlp.model.robot import Robot
+from softnlp.model.round_chambers import radii
 from softnlp.results import Body
 from softnlp.statics.body import turns
-from softnlp.statics.step import SectionRadii
 
 _SMALL_TURN = 1e-4  # below it a series is more accurate than the quotient [rad]
 
@@ -33,14 +33,7 @@ def natural_body(robot: Robot, stations: int = 2) -> Body:
     """Return the body as it is cast: straight along +z, of length L_0, with the radii of no pressure."""
     position = np.zeros((stations, 3))
     position[:, 2] = np.linspace(0.0, robot.length, stations)
-    radii = SectionRadii(
-        outer=robot.outer_radius,
-        lumen=robot.lumen_radius,
-        chamber_circle=robot.chamber_circle_radius,
-        chamber=robot.chamber_radius,
-        bore=robot.bore_radius,
-    )
-    return Body(position, np.tile(np.eye(3), (stations, 1, 1)), radii)
+    return Body(position, np.tile(np.eye(3), (stations, 1, 1)), radii(robot, 1.0))
 
 
 def resampled(body: Body, stations: int) -> Body:

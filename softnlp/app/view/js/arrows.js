@@ -1,21 +1,33 @@
 // Loads as arrows with their size beside, made once for each kind and moved after that; and the frame of the tip.
+// A moment is an arrow bent round its axis, by the rule of the right hand, wide enough to go round the body.
 import { THREE } from "nicegui-scene";
 import { Label } from "./label.js";
 
 const UP = new THREE.Vector3(0, 1, 0);
+const SHAFT = 0.022;
+const TURN = 1.6 * Math.PI; // of a moment's arrow
+const BEND = 0.7; // its radius
+const AROUND = Array.from({ length: 12 }, (_, k) => [
+  1.9 * BEND * Math.cos((k * Math.PI) / 6),
+  0,
+  1.9 * BEND * Math.sin((k * Math.PI) / 6),
+]);
 
 class Arrow {
-  constructor(doubled) {
+  constructor(bent) {
+    this.bent = bent;
     this.group = new THREE.Group();
     this.material = new THREE.MeshBasicMaterial();
-    this.shaft = new THREE.Mesh(new THREE.CylinderGeometry(0.022, 0.022, 1, 12), this.material);
-    this.heads = Array.from({ length: doubled ? 2 : 1 }, () => {
-      const head = new THREE.Mesh(new THREE.ConeGeometry(0.075, 0.24, 20), this.material);
-      this.group.add(head);
-      return head;
-    });
-    this.group.add(this.shaft);
-    this.label = new Label({ size: 13, weight: 600, inFront: true });
+    const shaft = bent
+      ? new THREE.TorusGeometry(BEND, SHAFT, 10, 48, TURN).rotateX(-Math.PI / 2)
+      : new THREE.CylinderGeometry(SHAFT, SHAFT, 0.8, 12).translate(0, 0.4, 0);
+    const head = new THREE.Mesh(new THREE.ConeGeometry(0.075, 0.24, 20), this.material);
+    if (bent) {
+      head.position.set(BEND * Math.cos(TURN), 0, -BEND * Math.sin(TURN));
+      head.quaternion.setFromUnitVectors(UP, new THREE.Vector3(-Math.sin(TURN), 0, -Math.cos(TURN)));
+    } else head.position.y = 0.88;
+    this.group.add(new THREE.Mesh(shaft, this.material), head);
+    this.label = new Label({ size: 13, weight: 600, inFront: true, rank: 0 });
   }
 
   place({ start, vector, label, inwards }, colour, halo) {
@@ -24,12 +36,15 @@ class Arrow {
     this.group.position.set(...start);
     this.group.quaternion.setFromUnitVectors(UP, along.clone().normalize());
     this.group.scale.setScalar(length);
-    this.shaft.scale.y = 0.8;
-    this.shaft.position.y = 0.4;
-    this.heads.forEach((head, k) => (head.position.y = 0.88 - 0.18 * k));
     this.material.color.set(colour);
     this.label.write(label, colour, halo);
-    this.label.sprite.position.copy(along.multiplyScalar(inwards ? -0.12 : 1.12)).add(this.group.position);
+    const ends = this.bent ? AROUND : [[0, inwards ? -0.12 : 1.12, 0]];
+    const places = ends.map((end) =>
+      new THREE.Vector3(...end).multiplyScalar(length).applyQuaternion(this.group.quaternion).add(this.group.position),
+    );
+    // Beside a bent arrow on the side away from the body, which is that away from the base's axis.
+    places.sort((a, b) => Math.hypot(b.x, b.y) - Math.hypot(a.x, a.y));
+    this.label.sprite.position.copy(places[0]);
   }
 
   show(visible) {
@@ -72,7 +87,7 @@ export class TipFrame {
     lines.renderOrder = 5;
     this.group.add(lines);
     this.letters = ["x", "y", "z"].map((name) => {
-      const label = new Label({ size: 12, inFront: true });
+      const label = new Label({ size: 12, inFront: true, rank: 1 });
       label.name = name;
       labels.add(label);
       this.group.add(label.sprite);

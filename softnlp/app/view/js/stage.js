@@ -3,6 +3,7 @@ import { OrbitControls, THREE } from "nicegui-scene";
 import { Arrows, TipFrame } from "./arrows.js";
 import { Body, Ghost, readRobot } from "./body.js";
 import { stationFrames } from "./expand.js";
+import { spread } from "./label.js";
 import { Marks } from "./marks.js";
 import { Surroundings } from "./surroundings.js";
 import { followTheme } from "./theme.js";
@@ -173,6 +174,9 @@ export class Stage {
   render(ratio) {
     if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
     this.light.position.copy(this.camera.position).addScaledVector(this.camera.up, this.camera.position.length());
+    this.scene.updateMatrixWorld();
+    this.camera.updateMatrixWorld();
+    spread(this.labels, this.camera, this.element.clientWidth, this.element.clientHeight);
     this.renderer.render(this.scene, this.camera);
   }
 

@@ -1,6 +1,6 @@
 // What stands still: ground grid with its scale in millimetres, base plate, base frame, and the number of each set.
 import { THREE } from "nicegui-scene";
-import { Label } from "./label.js";
+import { LAST, Label } from "./label.js";
 
 const TICKS = 3.2; // numbers along the natural length, at most
 const PLATE = 0.1; // thickness of the base plate, of D_r; it stands on the ground, so that the base is at z = 0
@@ -52,7 +52,7 @@ export class Surroundings {
 
   // Numbers stand beside their edge by their own size, which is the screen's, so that they never meet it.
   ticks(step, half, length) {
-    const grey = { colour: this.theme.grey, size: 12 };
+    const grey = { colour: this.theme.grey, size: 12, rank: LAST };
     const out = 0.03 * length;
     const z = this.floor;
     const below = [0.5, 0.9];
@@ -63,8 +63,9 @@ export class Surroundings {
       this.write(text, [at, -half - out, z], { ...grey, anchor: below });
       if (at > -half) this.write(text, [half + out, at, z], { ...grey, anchor: right });
     }
-    this.write("x [mm]", [0, -half - out, z], { ...grey, anchor: [0.5, 1.9] });
-    this.write("y [mm]", [half + out, 0, z], { ...grey, anchor: [-0.55, 0.6] });
+    const title = { ...grey, rank: LAST - 1 };
+    this.write("x [mm]", [0, -half - out, z], { ...title, anchor: [0.5, 1.9] });
+    this.write("y [mm]", [half + out, 0, z], { ...title, anchor: [-0.55, 0.6] });
     // A ruler upright in the far corner.
     const top = step * Math.ceil((1.2 * length) / step);
     const ruler = [-half, half, z, -half, half, top];
@@ -72,7 +73,7 @@ export class Surroundings {
       ruler.push(-half, half, at, -half - out, half, at);
       this.write(`${Number(at.toPrecision(6))}`, [-half - out, half, at], { ...grey, anchor: left });
     }
-    this.write("z [mm]", [-half, half, top], { ...grey, anchor: [0.5, -0.4] });
+    this.write("z [mm]", [-half, half, top], { ...title, anchor: [0.5, -0.4] });
     this.lines(ruler, this.theme.gridStrong, 1);
   }
 
@@ -114,11 +115,10 @@ export class Surroundings {
   }
 
   // anchor: the point of the text that stands at the place, from its lower left (0, 0) to its upper right (1, 1).
-  write(text, place, { colour, size, weight = 400, anchor = [0.5, 0.5] }) {
-    const label = new Label({ size, weight });
+  write(text, place, { colour, ...look }) {
+    const label = new Label(look);
     label.write(text, colour, this.theme.halo);
     label.sprite.position.set(...place);
-    label.sprite.center.set(...anchor);
     this.group.add(label.sprite);
     this.labels.add(label);
     (this.own ??= []).push(label);

@@ -7,17 +7,17 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.batch.interpreted import Interpreted, padded
-from softnlp.batch.ir import LIBRARY, llvm_text
-from softnlp.batch.jit import Machine, can_compile, compiled
-from softnlp.batch.kernels import WIDTH, Kernels
+from softnlp.native.interpreted import Interpreted, padded
+from softnlp.native.ir import LANES, LIBRARY, llvm_text
+from softnlp.native.jit import Machine, can_compile, compiled
+from softnlp.native.kernels import WIDTH, Kernels
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 
 class Shooting(Protocol):
-    """Runs `softnlp.batch.kernels.Kernels`."""
+    """Runs `softnlp.native.kernels.Kernels`."""
 
     def run(self, step: str, intervals: Counts, data: Array, state: Array) -> Array:
         """Return the states at the tip.
@@ -46,14 +46,44 @@ class Compiled:
             self._code.call(f"shoot_{step}", state.shape[1], counts, np.ascontiguousarray(data), reached)
         return reached
 
+    def run_one(self, step: str, intervals: int, data: Array, state: Array) -> Array:
+        """Return the state at the tip of one pose; data, state : (fields,)."""
+        reached = _side_by_side(state)
+        self._code.call(f"shoot_{step}", LANES, np.array([intervals], np.int64), _side_by_side(data), reached)
+        found: Array = reached[:, 0]
+        return found
+
+    def trace_one(self, step: str, intervals: int, data: Array, state: Array) -> Array:
+        """Return the states (intervals + 1, fields) of one pose from base to tip; data, state : (fields,)."""
+        reached = _side_by_side(state)
+        path = np.empty((intervals + 1, *reached.shape))
+        path[0] = reached
+        counts = np.array([intervals], np.int64)
+        self._code.call(f"trace_{step}", LANES, counts, _side_by_side(data), reached, path[1:])
+        found: Array = path[:, :, 0]
+        return found
+
+    def run_each(self, step: str, intervals: int, data: Array, state: Array) -> Array:
+        """Return the states (fields, n) of n poses on one grid; data, state : (fields, n), any number of them."""
+        n = state.shape[1]
+        given, reached = (np.array(padded(part, -n % LANES), order="C") for part in (data, state))
+        counts = np.full(-(-n // WIDTH), intervals, np.int64)
+        self._code.call(f"shoot_{step}", given.shape[1], counts, given, reached)
+        return reached[:, :n]
+
     def apply(self, name: str, given: Array) -> Array:
         """Return a map's columns, see `Shooting`."""
         poses = given.shape[1]
-        whole = np.ascontiguousarray(padded(given, -poses % WIDTH))
+        whole = np.ascontiguousarray(padded(given, -poses % LANES))
         found = np.empty((self._rows[name], whole.shape[1]))
         if poses:
             self._code.call(f"apply_{name}", whole.shape[1], whole, found)
         return found[:, :poses]
+
+
+def _side_by_side(column: Array) -> Array:
+    """Return a column as often as one instruction takes it."""
+    return np.repeat(column[:, None], LANES, axis=1)
 
 
 def shooting(kernels: Kernels) -> Shooting:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -54,8 +54,10 @@ class Step:
 class Kernels:
     """What is done to many poses.
 
-    steps : by name. maps : by name, functions of one column to another.
+    steps : by name. maps : by name, functions of one column to another. traced : names of steps whose states on the
+    way can be asked for.
     """
 
     steps: Mapping[str, Step]
     maps: Mapping[str, ca.Function]
+    traced: Sequence[str] = ()

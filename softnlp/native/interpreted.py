@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.batch.kernels import B_ENDS, B_MIDDLE, WIDTH, Kernels, Step
+from softnlp.native.kernels import B_ENDS, B_MIDDLE, WIDTH, Kernels, Step
 
 Array = NDArray[np.float64]
 
@@ -130,7 +130,7 @@ class Interpreted:
         self._maps = {name: function.map(_COLUMNS) for name, function in kernels.maps.items()}
 
     def run(self, step: str, intervals: NDArray[np.int64], data: Array, state: Array) -> Array:
-        """Return the states at the tip, see `softnlp.batch.shooting.Shooting`."""
+        """Return the states at the tip, see `softnlp.native.shooting.Shooting`."""
         reached = np.array(state)
         each = np.repeat(intervals, WIDTH)
         order = np.argsort(-each, kind="stable")  # the poses under way are always the first ones
@@ -151,7 +151,7 @@ class Interpreted:
         return reached
 
     def apply(self, name: str, given: Array) -> Array:
-        """Return a map's columns, see `softnlp.batch.shooting.Shooting`."""
+        """Return a map's columns, see `softnlp.native.shooting.Shooting`."""
         poses = given.shape[1]
         whole = padded(given, -poses % _COLUMNS)
         blocks = [self._maps[name](whole[:, first : first + _COLUMNS]) for first in range(0, whole.shape[1], _COLUMNS)]

@@ -11,10 +11,11 @@ from collections.abc import Iterable
 
 import casadi as ca
 
-from softnlp.batch.kernels import B_ENDS, B_MIDDLE, WIDTH, Kernels, Step
+from softnlp.native.kernels import B_ENDS, B_MIDDLE, WIDTH, Kernels, Step
 
-_LANES = 4
-_V = f"<{_LANES} x double>"
+LANES = 4
+"""Poses to an instruction."""
+_V = f"<{LANES} x double>"
 _LIBRARY = {
     ca.OP_EXP: "exp",
     ca.OP_EXPM1: "expm1",
@@ -43,7 +44,7 @@ LIBRARY = tuple(sorted(set(_LIBRARY.values())))
 def splat(value: float) -> str:
     """Return a vector constant."""
     bits = struct.unpack("<Q", struct.pack("<d", value))[0]
-    return f"<{', '.join([f'double 0x{bits:016X}'] * _LANES)}>"
+    return f"<{', '.join([f'double 0x{bits:016X}'] * LANES)}>"
 
 
 _ZERO, _ONE = splat(0.0), splat(1.0)
@@ -149,6 +150,7 @@ def llvm_text(kernels: Kernels) -> str | None:
     """Return a module with shoot_NAME(poses, intervals, data, state) for steps and apply_NAME(poses, given, found).
 
     poses is a multiple of `WIDTH`, intervals has an entry for each group of them, arrays are (rows, poses) of doubles.
+    A step that is traced has trace_NAME(poses, intervals, data, state, path) too, path (intervals, rows, poses).
     None where a function holds an operation that has no translation.
     """
     parts: list[str | None] = [_HEAD, _MOVES, *(_lane_by_lane(name) for name in LIBRARY)]
@@ -156,6 +158,8 @@ def llvm_text(kernels: Kernels) -> str | None:
         for part, function in step.functions.items():
             parts.append(_function(f"{name}_{part}", function))
         parts.append(_shoot(name, step))
+        if name in kernels.traced:
+            parts.append(_shoot(name, step, traced=True))
     for name, function in kernels.maps.items():
         parts += [_function(name, function), _apply(name, function)]
     made = [part for part in parts if part is not None]
@@ -168,7 +172,7 @@ def _lane_by_lane(name: str) -> str:
     lines = [f"declare double @{name}({', '.join('double' for _ in takes)})"]
     lines.append(f"define internal {_V} @all_{name}({', '.join(f'{_V} %{t}' for t in takes)}) {{")
     before = "poison"
-    for k in range(_LANES):
+    for k in range(LANES):
         lines += [f"  %{t}{k} = extractelement {_V} %{t}, i32 {k}" for t in takes]
         lines.append(f"  %r{k} = call double @{name}({', '.join(f'double %{t}{k}' for t in takes)})")
         lines.append(f"  %v{k} = insertelement {_V} {before}, double %r{k}, i32 {k}")
@@ -200,7 +204,7 @@ def _function(name: str, function: ca.Function) -> str | None:
         elif operation in _CHOICES:
             how, compared, yes, no = (part.format(*words) for part in _CHOICES[operation])
             lines.append(f"  %c{k} = fcmp {how} {_V} {compared}")
-            lines.append(f"  %v{k} = select <{_LANES} x i1> %c{k}, {_V} {yes}, {_V} {no}")
+            lines.append(f"  %v{k} = select <{LANES} x i1> %c{k}, {_V} {yes}, {_V} {no}")
         elif operation in _OPERATIONS:
             lines.append(f"  %v{k} = {_OPERATIONS[operation].format(*words, V=_V)}")
         else:
@@ -215,7 +219,7 @@ def _room(sizes: dict[str, int]) -> str:
 
 
 def _loop(body: Iterable[str]) -> str:
-    """Return a loop over the poses, `_LANES` at a time; first is the number of the first of them."""
+    """Return a loop over the poses, `LANES` at a time; first is the number of the first of them."""
     return "\n".join(
         [
             "  br label %some",
@@ -224,7 +228,7 @@ def _loop(body: Iterable[str]) -> str:
             *body,
             "  br label %last",
             "last:",
-            f"  %onward = add i64 %first, {_LANES}",
+            f"  %onward = add i64 %first, {LANES}",
             "  %left = icmp slt i64 %onward, %poses",
             "  br i1 %left, label %some, label %end",
             "end:",
@@ -255,12 +259,12 @@ def _all(word: str, value: str) -> list[str]:
     """Return a vector of one number."""
     return [
         f"  %{word}_0 = insertelement {_V} poison, double %{value}, i32 0",
-        f"  %{word} = shufflevector {_V} %{word}_0, {_V} poison, <{_LANES} x i32> zeroinitializer",
+        f"  %{word} = shufflevector {_V} %{word}_0, {_V} poison, <{LANES} x i32> zeroinitializer",
     ]
 
 
-def _shoot(name: str, step: Step) -> str:
-    """Return the loop over poses and intervals of a step."""
+def _shoot(name: str, step: Step, *, traced: bool = False) -> str:
+    """Return the loop over poses and intervals of a step. traced : the state behind each interval is kept."""
     n, m = step.integrated, step.state
     same = f"  call void @copy(i64 {m}, ptr %here, ptr %x)"
     begin = same if step.begin is None else f"  call void @{name}_begin(ptr %here, ptr %data, ptr %at, ptr %x)"
@@ -275,10 +279,19 @@ def _shoot(name: str, step: Step) -> str:
     def moved(by: str, k: str) -> str:
         return f"  call void @moved(i64 {n}, ptr %x, {_V} %{by}, ptr %{k}, ptr %stage)"
 
+    head = f"define void @shoot_{name}(i64 %poses, ptr %intervals, ptr %in, ptr %state) {{\nentry:\n"
+    if traced:
+        head = f"define void @trace_{name}(i64 %poses, ptr %intervals, ptr %in, ptr %state, ptr %path) {{\nentry:\n"
+        ends += [
+            f"  %size = mul i64 %poses, {m}",
+            "  %block = mul i64 %k, %size",
+            "  %kept = getelementptr double, ptr %path, i64 %block",
+            f"  call void @given(i64 {m}, i64 %poses, i64 %first, ptr %here, ptr %kept)",
+        ]
     rooms = {"data": step.data, "here": m, "after": m, "at": 1, "middle": 1, "far": 1, "long": 1}
     rooms |= dict.fromkeys(("x", "stage", "reached", "k1", "k2", "k3", "k4"), n)
     return (
-        f"define void @shoot_{name}(i64 %poses, ptr %intervals, ptr %in, ptr %state) {{\nentry:\n"
+        head
         + _room(rooms)
         + "\n"
         + _loop(

@@ -1,8 +1,9 @@
 """The stretch of many poses at once, where the branch from zero pressure is plain to see.
 
-Every chamber has the same bore, so the balance of Eq. (10) depends on the sum of the pressures alone, and solved for
+Where every chamber has the same bore the balance of Eq. (10) depends on the sum of the pressures alone, and solved for
 that sum it is a curve over the stretch. Up to the first stretch where the curve turns or the unpressurised section
-loses a stiffness (pressure only adds to them) a root is on the branch; beyond it `softnlp.statics.branch` decides.
+loses a stiffness (pressure only adds to them) a root is on the branch; beyond it `softnlp.statics.branch` decides. All
+poses of other sections, see `softnlp.model.section.Section.by_sum`, are left to the single solver.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.units import BAR
-from softnlp.batch.shooting import Shooting
+from softnlp.native.shooting import Shooting
 from softnlp.statics.branch import SILICONE, branch_function
 from softnlp.statics.loadcase import RodFunctions
 
@@ -51,8 +52,8 @@ class Stretches:
         self._shooting = shooting
         model = functions.model
         self._shared = shared
-        self._sets = model.robot.chamber_sets
-        self._stiffens = min(model.coefficients.elongation, model.coefficients.bending) >= 0
+        self._sets = model.sets
+        self._by_sum = model.section.by_sum
         self._grid = np.linspace(1.0, _LARGEST[shared], _SAMPLES[shared])
         self._curve: tuple[Array, Array] | None = None
 
@@ -61,7 +62,7 @@ class Stretches:
         n = columns.shape[1]
         total = columns[: self._sets].sum(axis=0)
         stretch = np.full(n, np.nan)
-        if not self._stiffens:
+        if not self._by_sum:
             return stretch, np.zeros(n, bool)
         if self._shared:
             if self._curve is None:

@@ -17,11 +17,15 @@ class Machine:
 
     def __init__(self, engine: Any) -> None:
         self._engine = engine
+        self._functions: dict[str, Any] = {}
 
     def call(self, name: str, poses: int, *arrays: Any) -> None:
         """Call a function by name with a number and arrays of NumPy, contiguous."""
-        types = [ctypes.c_int64, *(ctypes.c_void_p for _ in arrays)]
-        function = ctypes.CFUNCTYPE(None, *types)(self._engine.get_function_address(name))
+        function = self._functions.get(name)
+        if function is None:
+            types = [ctypes.c_int64, *(ctypes.c_void_p for _ in arrays)]
+            function = ctypes.CFUNCTYPE(None, *types)(self._engine.get_function_address(name))
+            self._functions[name] = function
         function(poses, *(array.ctypes.data for array in arrays))
 
 

@@ -14,11 +14,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
-from softnlp.batch.kernels import Step
 from softnlp.model import rod
+from softnlp.native.kernels import Step
 from softnlp.nlp.transcription import RK4
-from softnlp.statics.loadcase import RodFunctions, unpack_section
+from softnlp.statics.loadcase import RodFunctions, whole_weight
+
+Array = NDArray[np.float64]
 
 POSITION, ROTATION, MOMENT = slice(0, 3), slice(3, 12), slice(12, 15)
 STATE = 15
@@ -49,8 +53,7 @@ def reduced_rod(functions: RodFunctions) -> ReducedRod:
     nc = functions.field.size1_in(1)
     data, s, h = ca.SX.sym("data", nc + 6), ca.SX.sym("s"), ca.SX.sym("h")
     c, force, moment = data[:nc], data[nc : nc + 3], data[nc + 3 :]
-    section = unpack_section(c)
-    weight = c[len(rod.RodSection._fields)] * ca.vertcat(section.load_x, section.load_y, section.load_z)
+    weight = whole_weight(c)
 
     def full(state: Any, at: Any) -> Any:
         """Return [p, R, N, M] with the force in closed form."""
@@ -71,6 +74,17 @@ def reduced_rod(functions: RodFunctions) -> ReducedRod:
             ca.vertcat(full(state, 1), rod.tip_balance(full(state, 1), force, moment)),
         ),
     )
+
+
+def base_state(base: Array) -> Array:
+    """Return the state at the base for M(0), with its derivatives by M(0)."""
+    state = np.zeros((4 * STATE + 1, base.shape[1]))
+    state[[3, 7, 11]] = 1.0
+    state[MOMENT] = base
+    for j in range(3):
+        state[STATE * (j + 1) + MOMENT.start + j] = 1.0
+    state[4 * STATE] = np.inf
+    return state
 
 
 def function(name: str, given: list[Any], result: Any) -> ca.Function:
@@ -120,7 +134,7 @@ def checked(functions: RodFunctions, full: Any, state: Any, rates: Any, given: l
     old = ca.SX.sym("old", before.numel())
     x = ca.vertcat(state, y, integrals)
     gap, curvature, there = old[n], old[before.numel() - 1], full(state, s + h)
-    sharper = larger_curvature(curvature, [full(old[:n], s), there], c)
+    sharper = larger_curvature(functions, curvature, [full(old[:n], s), there], c)
     return Step(
         rates=function("rates", [x, data, s], ca.vertcat(rates, functions.field(y, c), gained)),
         begin=function("begin", [before, data, s], ca.vertcat(state, full(state, s), integrals)),
@@ -143,9 +157,9 @@ def smallest_minor(S: Any) -> Any:
     return ca.fmin(S[0, 0], ca.fmin(second, third))
 
 
-def larger_curvature(known: Any, states: list[Any], c: Any) -> Any:
+def larger_curvature(functions: RodFunctions, known: Any, states: list[Any], c: Any) -> Any:
     """Return the largest of a curvature and those of the axis at states, per its deformed length."""
     for x in states:
-        v, u = rod.strains(x, unpack_section(c))
+        v, u = functions.strains(x[: rod.STATE_SIZE], c)
         known = ca.fmax(known, ca.sqrt(u[0] ** 2 + u[1] ** 2) / v[2])
     return known
