@@ -17,7 +17,9 @@ from softnlp.nlp.solver import FROM_SOLUTION, EquationResidual, Solution, certif
 from softnlp.statics.case import pose_entries
 from softnlp.statics.chain import Chain
 from softnlp.statics.condensed import linear_solver
+from softnlp.statics.guards import grid_error, off_branch, require_in_range
 from softnlp.statics.posed import Problem, followed
+from softnlp.statics.solver import HOPELESS
 
 Array = NDArray[np.float64]
 EngineName = Literal["auto", "ipopt", "newton"]
@@ -35,7 +37,8 @@ class Answer:
         As solved.
     status, message
         "solved" where every equation, constraint and bound holds, evaluated again, and, where something is minimised,
-        the first-order conditions do.
+        the first-order conditions do. What no robot can be is named as `softnlp.forward` names it: "no_equilibrium",
+        "unstable_material", "inaccurate" for a grid that does not show the rod.
     values
         (entries,) every quantity by name, free or fixed [SI].
     outputs
@@ -48,6 +51,8 @@ class Answer:
         nothing is minimised by an engine that has them [1].
     solution
         x, p and the engine's word.
+    discretisation_error
+        Estimated, of positions [L_0] and directions [1]: the grid is given, and not refined. None without a solution.
     """
 
     problem: Problem
@@ -58,6 +63,7 @@ class Answer:
     residuals: tuple[EquationResidual, ...]
     multipliers: Mapping[str, Array]
     solution: Solution
+    discretisation_error: float | None = None
 
     def __getitem__(self, name: str) -> Array:
         """Return a quantity or an output by name [SI] (entries,). Raises `KeyError` that names what is near."""
@@ -127,13 +133,13 @@ def solve(
     Raises
     ------
     IllPosedError
-        For names that are not quantities of the problem, and values of another size.
+        For names that are not quantities of the problem, and values of another size or that are not finite.
     InputError
-        For another engine.
+        For another engine, and pressures or loads outside the ranges of `softnlp.forward`.
     """
     if engine not in get_args(EngineName):
         raise InputError(f"expected one of {', '.join(get_args(EngineName))}, got {engine!r}", key="engine")
-    values = dict(values or {})
+    values = _numbers(values or {})
     compiled = problem.compiled
     p = compiled.pack(values)
     if isinstance(start, Answer):
@@ -141,7 +147,8 @@ def solve(
             raise IllPosedError("expected an answer of the same problem to start from")
         x = start.solution.x
     else:
-        x = problem._start(values, start or {})
+        x = problem._start(values, _numbers(start or {}))
+    require_in_range(problem, x, p)
     square, options = compiled.is_square, dict(ipopt or {})
     if engine == "newton" and not square:
         reduced = problem._kept("reduced", lambda: Reduced(compiled, linear_solver, problem.residuals))
@@ -151,8 +158,9 @@ def solve(
     if engine == "ipopt" or not square:
         return _judged(problem, problem._engine(ipopt_only=True, options=options).solve(p, x), tolerance)
     proposed = problem._engine(options=options).solve(p, x)
-    if not proposed.holds(tolerance):
-        return _judged(problem, proposed, tolerance)
+    answer = _judged(problem, proposed, tolerance)
+    if answer.status is not Status.SOLVED:
+        return answer
     found = problem._engine(ipopt_only=True, options={**FROM_SOLUTION, **options}).closed(proposed)
     answer = _judged(problem, found, tolerance)
     away = float(np.max(np.abs(found.x - proposed.x)))
@@ -185,8 +193,8 @@ def follow(
     Returns
     -------
     tuple
-        Answers (steps + 1,) with the start; fewer where the path ends before, the last one then with the status "fold"
-        and without outputs.
+        Answers (steps + 1,) with the start; fewer where the path ends before, the last one then with the status "fold",
+        or that of a point which no robot can be, and without outputs.
 
     Raises
     ------
@@ -197,10 +205,11 @@ def follow(
         raise IllPosedError("a path begins at a solution of this problem, which has as many equations as unknowns")
     if steps < 1:
         raise InputError(f"expected at least one step, got {steps}", key="steps")
-    compiled = problem.compiled
+    compiled, values = problem.compiled, _numbers(values)
     fixed = {q.name: start.values[q.name] for q in compiled.fixed}
     compiled.pack(values)  # for its errors
     begin, end = compiled.pack(fixed), compiled.pack({**fixed, **values})
+    require_in_range(problem, start.solution.x, end)
     entries = _pose_entries(problem)
     answers = [start]
     for k in range(steps):
@@ -217,7 +226,22 @@ def follow(
             answers.append(replace(answer, status=Status.FOLD, message=message, outputs={}))
             break
         answers.append(answer)
+        if answer.status is not Status.SOLVED:
+            break
     return tuple(answers)
+
+
+def _numbers(values: Mapping[str, Any]) -> dict[str, Array]:
+    """Return values by name as finite numbers, or raise `IllPosedError`."""
+    found = {}
+    for name, value in values.items():
+        try:
+            found[name] = np.asarray(value, float)
+        except (TypeError, ValueError):
+            found[name] = np.array(np.nan)
+        if not np.all(np.isfinite(found[name])):
+            raise IllPosedError(f"'{name}' takes finite numbers, got {value!r}")
+    return found
 
 
 def _pose_entries(problem: Problem) -> NDArray[np.intp]:
@@ -232,9 +256,17 @@ def _judged(problem: Problem, solution: Solution, tolerance: float) -> Answer:
     """Return an answer by what its residual and first-order conditions say, evaluated again."""
     compiled = problem.compiled
     status, message = Status.SOLVED, Status.SOLVED.advice
-    if not solution.holds(tolerance):
+    holds = solution.holds(tolerance)
+    refusal = off_branch(problem, solution) if holds or not compiled.free else None
+    error = grid_error(problem, solution, _pose_entries(problem)) if holds else None
+    if not holds and (refusal is None or refusal[0] is Status.DIVERGED):
         status = Status.DIVERGED
         message = f"no solution was found ({solution.engine_status}); start nearer, or follow a path from a solution"
+    elif refusal is not None:
+        status, message = refusal
+    elif error is not None and error > HOPELESS:
+        status = Status.INACCURATE
+        message = f"the grid does not show the rod: its estimated error is {error:.2g} L_0; take more intervals"
     elif compiled.has_objective and not solution.optimal:
         status, message = Status.NOT_OPTIMAL, not_optimal(solution.kkt, solution.engine_status)
     values = dict(compiled.free_values(solution.x))
@@ -255,4 +287,5 @@ def _judged(problem: Problem, solution: Solution, tolerance: float) -> Answer:
         residuals=certificate(compiled, solution),
         multipliers=multipliers,
         solution=solution,
+        discretisation_error=error,
     )

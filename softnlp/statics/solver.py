@@ -48,7 +48,7 @@ _FINER = 4  # how much finer a grid is tried where a coarse one finds no solutio
 # Work is counted in Runge-Kutta intervals of Newton iterations, some 0.07 ms each.
 _MOST_WORK, _KEPT_TO_SHOW = 9_000, 3_000  # to find one pose, and then to solve it on the grid that its accuracy needs
 _BY_IPOPT = 4  # so much more where IPOPT makes every step, which takes more of them
-_HOPELESS = 1.0  # estimated error of a given grid, in lengths, from which its solution is none of the rod
+HOPELESS = 1.0  # estimated error of a given grid, in lengths, from which its solution is none of the rod
 _TO_SHOW = 4  # iterations on that grid, the error and stability counted
 # Without loads the exact answer is a circular arc; a solution is good enough to show it.
 UNLOADED_ACCURACY = 5e-9
@@ -155,7 +155,7 @@ class PoseSolver:
             own = found.grid.transcription == self.numerics.transcription
             chosen = own and found.intervals >= (given or 0)
             wanted = self.next_intervals(found.refinement_error, found.intervals, target) if chosen else first
-            hopeless = given is not None and not found.refinement_error <= _HOPELESS
+            hopeless = given is not None and not found.refinement_error <= HOPELESS
             enough = found.intervals >= most and found.refinement_error <= self.numerics.accuracy
             if (wanted is None and not hopeless) or enough:
                 return self._closed(pressure, loads, found, iterations, began)
