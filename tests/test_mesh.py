@@ -123,6 +123,16 @@ def test_a_bore_at_the_surface_leaves_no_solid() -> None:
         mould_body(arm, holes="thread")
 
 
+def test_a_shape_of_negative_length_leaves_no_solid() -> None:
+    arm = robot("D25L60")
+    body = natural_body(arm)
+    backwards = Body(body.position * [1, 1, -1], body.rotation, body.radii)
+    with pytest.raises(InputError, match="negative length"):
+        body_solid(arm, backwards, 8)
+    with pytest.raises(InputError, match="negative length"):
+        cores(arm, backwards, 8)
+
+
 def test_a_body_through_itself_is_said() -> None:
     arm = robot("D25L60")
     long = replace(arm, length=0.4)

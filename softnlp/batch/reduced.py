@@ -22,6 +22,7 @@ from softnlp.statics.loadcase import RodFunctions, unpack_section
 
 POSITION, ROTATION, MOMENT = slice(0, 3), slice(3, 12), slice(12, 15)
 STATE = 15
+_LEAST = 1e-300  # which changes no curvature, and divided by 0 is infinite
 _TURNING = slice(3, 15)  # rotation and moment; nothing depends on the position
 
 
@@ -144,8 +145,8 @@ def smallest_minor(S: Any) -> Any:
 
 
 def larger_curvature(known: Any, states: list[Any], c: Any) -> Any:
-    """Return the largest of a curvature and those of the axis at states, per its deformed length."""
+    """Return the largest of a curvature and those of the axis at states, per its deformed length; inf if v_z <= 0."""
     for x in states:
         v, u = rod.strains(x, unpack_section(c))
-        known = ca.fmax(known, ca.sqrt(u[0] ** 2 + u[1] ** 2) / v[2])
+        known = ca.fmax(known, (ca.sqrt(u[0] ** 2 + u[1] ** 2) + _LEAST) / ca.fmax(v[2], 0))
     return known

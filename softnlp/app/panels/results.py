@@ -236,6 +236,8 @@ def certificate_words(run: Run) -> str:
     if not step.status.has_solution or step.residual is None:
         return f"{step.status.value.replace('_', ' ').capitalize()}: {step.message}."
     stable = "" if step.pose is None else _STABILITY[step.pose.stable]
+    if step.pose is not None and step.pose.fit.inside_out:
+        stable = " The load compresses the rod to nothing."
     error = "" if step.discretisation_error is None else f", tip within {step.discretisation_error:.0e} L₀"
     lead = "Solved" if step.status.value == "solved" else "No contact: the robot does not reach the wall"
     return f"{lead}, residual {step.residual:.0e}{error}, {step.intervals} intervals.{stable}"
