@@ -20,7 +20,7 @@ from softnlp.model.materials import Material
 from softnlp.scenario.data import Read, Scenario
 from softnlp.scenario.schema import FileName, Label, Positive, Table
 from softnlp.studies.measurements import TensileTask
-from softnlp.studies.plausibility import Check, area_check
+from softnlp.studies.plausibility import Check, area_check, percent_check, true_checks
 
 if TYPE_CHECKING:  # imported where needed: to read a scenario takes none of them
     from softnlp.studies.tensile import LawFit, TensileFit
@@ -134,6 +134,8 @@ def _curve(columns: Columns, table: TensileTable) -> tuple[Array, Array, tuple[C
         name, of_stress = _first(columns, _STRETCHES), _first(columns, _STRESSES)
         factor, zero = _STRETCHES[name]
         stretch, stress = zero + factor * columns.numbers(name), columns.numbers(of_stress) * _STRESSES[of_stress]
+        checks = (percent_check(stretch),) if name == "strain_percent" else ()
+        checks += true_checks(stretch, stress) if table.stress == "true" else ()
     else:
         raise InputError(
             f"{columns.file}: expected columns stretch, stress_MPa or displacement_mm, force_N; it has "
@@ -197,9 +199,10 @@ def run_tensile(scenario: Scenario) -> TensileFit:
             density=task.density,
             start=task.start,
             numerics=scenario.numerics,
+            read=task.checks,
         )
     fits = {name: replace(law, warnings=(*law.warnings, *_further(task, law))) for name, law in fit.fits.items()}
-    return replace(fit, fits=fits, checks=(*task.checks, *fit.checks))
+    return replace(fit, fits=fits)
 
 
 def _further(task: TensileTask, fit: LawFit) -> tuple[str, ...]:
