@@ -413,6 +413,85 @@ def test_values_and_starts_are_finite_numbers(value: Any) -> None:
         solve(posed_pose(), {"pressure": value})
 
 
+@pytest.mark.parametrize("scale", [1e7, 1e12, 1e300])
+def test_a_scale_hides_no_violation(scale: float) -> None:
+    """Over the scale an angle of 0 keeps a least angle of 60 degrees to any tolerance."""
+    body = Body([Segment(D25, SOFT)])
+    pose = case("pose", body, method=MultipleShooting(6))
+    rule = Constraint("angle", pose.outputs["bending_angle"], 60 * DEGREE, np.inf, unit="rad", scale=scale)
+    cost = ca.sumsqr(body.quantities["pressure"].symbol / BAR)
+    found = solve(problem([pose], free=["pressure"], constraints=[rule], objective=cost))
+    assert (found.status, found.outputs) == (Status.DIVERGED, {})
+    assert "constraint 'angle' is off by" in found.message
+    assert "scale" in found.message
+
+
+def test_a_scale_that_is_only_large_is_taken() -> None:
+    """Newton's method meets an equation to round-off, whatever it is divided by; one of slope 0 at its root too."""
+    body = Body([Segment(D25, SOFT)])
+    pose = case("pose", body, method=SHOOTING)
+    idle = Constraint("idle", body.quantities["pressure"].symbol[1:], unit="Pa", scale=BAR)
+    off = pose.outputs["bending_angle"] - 60 * DEGREE
+    for scale, error in ((1e6, off), (1.0, off**2)):
+        angle = Constraint("angle", error, unit="rad", scale=scale)
+        posed = problem([pose], free=["pressure"], constraints=[angle, idle])
+        found = solve(posed, start={"pressure": [0.9 * BAR, 0, 0]}, engine="newton", tolerance=1e-6)
+        assert found.status is Status.SOLVED
+        assert found["bending_angle"][0] == pytest.approx(60 * DEGREE, abs=1e-3)
+
+
+P_BODY = Body([Segment(D25, SOFT)])
+POSE = case("pose", P_BODY, method=MultipleShooting(3))
+ANGLE = POSE.outputs["bending_angle"]
+
+
+@pytest.mark.parametrize(
+    ("constraint", "said"),
+    [
+        ((None, ANGLE, 1, 2), "expected a name for each constraint, got None"),
+        (("", ANGLE, 1, 2), "expected a name for each constraint, got ''"),
+        (("a", 0.5, 0, 1), "constraint 'a': expected an expression of CasADi's MX, got 0.5"),
+        (("a", None, 0, 1), "got None"),
+        (("a", ca.SX.sym("q"), 0, 1), "got one of SX"),
+        (("a", ca.MX(0, 1), 0, 1), "at least one entry"),
+        (("a", ca.MX.sym("q"), 0, 1), "constraint 'a': 'q' is no quantity of the cases"),
+        (("a", ANGLE, "1", 2), "constraint 'a': expected bounds that are numbers, got '1'"),
+        (("a", ANGLE, None, 2), "got None"),
+        (("a", ANGLE, [[1], [1, 2]], 2), "expected bounds that are numbers"),
+        (("a", ANGLE, np.inf, np.inf), "no number lies between its bounds"),
+        (("a", ANGLE, -np.inf, -np.inf), "no number lies between its bounds"),
+        (("a", ANGLE, 1, 2, "rad", "x"), "expected a scale above 0, got 'x'"),
+        (("a", ANGLE, 1, 2, "rad", None), "expected a scale above 0, got None"),
+        (("a", ANGLE, 1, 2, "rad", True), "expected a scale above 0, got True"),
+        (("stretch balance", ANGLE, 1, 2), "two constraints or equations are named 'stretch balance'"),
+        (("bounds", ANGLE, 1, 2), "named 'bounds'"),
+        (("twice", ANGLE, 1, 2), "two constraints or equations are named 'twice'"),
+    ],
+)
+def test_a_constraint_that_cannot_be_meant_is_refused(constraint: tuple[Any, ...], said: str) -> None:
+    rules = [Constraint("twice", ANGLE, 0, 2), Constraint(*constraint)]
+    with pytest.raises(IllPosedError, match=said):
+        problem([POSE], free=["pressure"], constraints=rules, objective=ca.sumsqr(POSE.outputs["tip_position"]))
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"objective": ca.SX(1)}, "objective: expected an expression of CasADi's MX, got one of SX"),
+        ({"objective": ca.MX.sym("q")}, "objective: 'q' is no quantity"),
+        ({"objective": POSE.outputs["tip_position"]}, "objective: expected one number to minimise, got 3"),
+        ({"residuals": [ANGLE, ca.MX.sym("q")]}, "residual: 'q' is no quantity"),
+        ({"residuals": [0.5]}, "residual: expected an expression"),
+    ],
+)
+def test_what_is_minimised_is_known(asked: dict[str, Any], said: str) -> None:
+    with pytest.raises(IllPosedError, match=said):
+        problem([POSE], free=["pressure"], **asked)
+    foreign = case("pose", P_BODY, given={"pressure": 2 * ca.MX.sym("q", 3)}, method=MultipleShooting(3))
+    with pytest.raises(IllPosedError, match="case 'pose': 'q' is no quantity"):
+        problem([foreign])
+
+
 def test_what_cannot_be_posed_is_refused_by_name() -> None:
     body = Body([Segment(D25, SOFT)])
     with pytest.raises(IllPosedError, match="'presure' is not a quantity of this case; did you mean 'pressure'"):

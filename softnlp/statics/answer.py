@@ -17,8 +17,8 @@ from softnlp.nlp.solver import FROM_SOLUTION, EquationResidual, Solution, certif
 from softnlp.statics.case import pose_entries
 from softnlp.statics.chain import Chain
 from softnlp.statics.condensed import linear_solver
-from softnlp.statics.guards import grid_error, off_branch, require_in_range
-from softnlp.statics.posed import Problem, followed
+from softnlp.statics.guards import grid_error, hidden, off_branch, require_in_range
+from softnlp.statics.posed import BOUNDS, Problem, followed
 from softnlp.statics.solver import HOPELESS
 
 Array = NDArray[np.float64]
@@ -152,17 +152,17 @@ def solve(
     square, options = compiled.is_square, dict(ipopt or {})
     if engine == "newton" and not square:
         reduced = problem._kept("reduced", lambda: Reduced(compiled, linear_solver, problem.residuals))
-        return _judged(problem, reduced.minimise(p, x), tolerance)
+        return _judged(problem, reduced.minimise(p, x), x, tolerance)
     if engine == "newton":
-        return _judged(problem, problem._engine(newton_only=True).solve(p, x), tolerance)
+        return _judged(problem, problem._engine(newton_only=True).solve(p, x), x, tolerance)
     if engine == "ipopt" or not square:
-        return _judged(problem, problem._engine(ipopt_only=True, options=options).solve(p, x), tolerance)
+        return _judged(problem, problem._engine(ipopt_only=True, options=options).solve(p, x), x, tolerance)
     proposed = problem._engine(options=options).solve(p, x)
-    answer = _judged(problem, proposed, tolerance)
+    answer = _judged(problem, proposed, x, tolerance)
     if answer.status is not Status.SOLVED:
         return answer
     found = problem._engine(ipopt_only=True, options={**FROM_SOLUTION, **options}).closed(proposed)
-    answer = _judged(problem, found, tolerance)
+    answer = _judged(problem, found, x, tolerance)
     away = float(np.max(np.abs(found.x - proposed.x)))
     if away <= _CLOSE and answer.status is Status.SOLVED:
         return answer
@@ -220,7 +220,7 @@ def follow(
             answers[-1].solution.x,
             entries,
         )
-        answer = _judged(problem, found.solution, tolerance)
+        answer = _judged(problem, found.solution, answers[-1].solution.x, tolerance)
         if not found.arrived:
             message = f"{Status.FOLD.advice}; it was followed for {100 * (k + found.fraction) / steps:.3g} % of the way"
             answers.append(replace(answer, status=Status.FOLD, message=message, outputs={}))
@@ -252,32 +252,35 @@ def _pose_entries(problem: Problem) -> NDArray[np.intp]:
     return np.concatenate(found)
 
 
-def _judged(problem: Problem, solution: Solution, tolerance: float) -> Answer:
-    """Return an answer by what its residual and first-order conditions say, evaluated again."""
+def _judged(problem: Problem, solution: Solution, start: Array, tolerance: float) -> Answer:
+    """Return an answer by what its residual and first-order conditions say, evaluated again; start : x before it."""
     compiled = problem.compiled
     status, message = Status.SOLVED, Status.SOLVED.advice
     holds = solution.holds(tolerance)
     refusal = off_branch(problem, solution) if holds or not compiled.free else None
     error = grid_error(problem, solution, _pose_entries(problem)) if holds else None
+    off = hidden(compiled, solution, start) if holds else ""
     if not holds and (refusal is None or refusal[0] is Status.DIVERGED):
         status = Status.DIVERGED
         message = f"no solution was found ({solution.engine_status}); start nearer, or follow a path from a solution"
     elif refusal is not None:
         status, message = refusal
+    elif off:
+        status, message = Status.DIVERGED, f"no solution was found: {off}"
     elif error is not None and error > HOPELESS:
         status = Status.INACCURATE
         message = f"the grid does not show the rod: its estimated error is {error:.2g} L_0; take more intervals"
     elif compiled.has_objective and not solution.optimal:
         status, message = Status.NOT_OPTIMAL, not_optimal(solution.kkt, solution.engine_status)
     values = dict(compiled.free_values(solution.x))
-    start = 0
+    at = 0
     for q in compiled.fixed:
-        values[q.name] = solution.p[start : start + q.size]
-        start += q.size
+        values[q.name] = solution.p[at : at + q.size]
+        at += q.size
     multipliers: dict[str, Array] = {}
     if compiled.has_objective and solution.ipopt is not None and solution.ipopt.rows.size:
         multipliers = {e.name: solution.ipopt.rows[e.rows] for e in compiled.equations}
-        multipliers["bounds"] = solution.ipopt.bounds[: compiled.free_size]
+        multipliers[BOUNDS] = solution.ipopt.bounds[: compiled.free_size]
     return Answer(
         problem=problem,
         status=status,

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from softnlp.base.errors import InputError
 from softnlp.base.ranges import FORCE, GRAVITY, MOMENT, PRESSURE, Range
 from softnlp.base.status import Status
-from softnlp.nlp.solver import Solution, discretisation_correction
+from softnlp.nlp.problem import CompiledProblem
+from softnlp.nlp.solver import Solution, certificate, discretisation_correction
 from softnlp.statics.branch import stretch_on_branch
 from softnlp.statics.case import rods
 from softnlp.statics.chain import Chain
@@ -29,6 +30,7 @@ LIMITS: Mapping[str, Range] = {"pressure": PRESSURE, "tip_force": FORCE, "tip_mo
 """The ranges of what acts on a robot, by key; directions do not matter."""
 
 _ROUNDING = 1e-6  # in the unit of files: by how much an engine may leave a bound
+_COUNTS = 1e-6  # of what a constraint is about
 _SAME_STRETCH = 1e-3  # two roots are further apart, but next to where the branch ends, where they are one
 
 
@@ -65,6 +67,32 @@ def grid_error(problem: Problem, solution: Solution, entries: NDArray[np.intp]) 
     except (np.linalg.LinAlgError, RuntimeError):  # of a singular Jacobian
         return float("inf")
     return float(error) if np.isfinite(error) else float("inf")
+
+
+def hidden(compiled: CompiledProblem, solution: Solution, start: Array) -> str:
+    """Return which constraint is off by what counts in its own unit, though not over its scale; "" where none is.
+
+    What counts is a millionth of its bounds, and of how much it changes with an unknown, there or at the start x.
+    """
+    count = len(compiled.constraints)
+    if not count:
+        return ""
+    slopes = [np.abs(np.asarray(compiled.jacobian(at, solution.p))).max(axis=1) for at in (solution.x, start)]
+    lines = zip(
+        compiled.constraints, certificate(compiled, solution)[-count:], compiled.equations[-count:], strict=True
+    )
+    for constraint, line, equation in lines:
+        scale = line.value / line.scaled if line.scaled else 0.0
+        bounds = np.abs(np.append(np.ravel(constraint.lower), np.ravel(constraint.upper)))
+        typical = float(
+            np.fmax.reduce([*bounds[np.isfinite(bounds)], *(scale * s[equation.rows].max() for s in slopes)])
+        )
+        if line.value > _COUNTS * typical:
+            return (
+                f"constraint '{constraint.name}' is off by {line.value:.3g} {line.unit}, which its scale of "
+                f"{scale:.3g} {line.unit} hides; take one of about {typical:.1g}"
+            )
+    return ""
 
 
 def _case_off_branch(case: LoadCase | Chain, values: Mapping[str, Array], x: Array) -> tuple[Status, str] | None:
