@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.errors import IllPosedError, nearest
-from softnlp.base.quantity import Quantity
+from softnlp.base.quantity import Quantity, expression
 from softnlp.nlp.case import Case, Equation
 from softnlp.nlp.optimality import Bounds, slopes
 
@@ -99,14 +99,6 @@ class Constraint:
         if bound.size not in (1, entries):
             raise IllPosedError(f"constraint '{self.name}': expected one bound, or {entries}")
         return np.broadcast_to(bound.astype(float).ravel(), (entries,))
-
-
-def expression(given: Any, what: str) -> ca.MX:
-    """Return an expression, or raise `IllPosedError` that says of what it is none of CasADi's MX."""
-    if not isinstance(given, ca.MX):
-        kind = f"one of {type(given).__name__}" if isinstance(given, ca.SX | ca.DM) else repr(given)
-        raise IllPosedError(f"{what}: expected an expression of CasADi's MX, got {kind}")
-    return given
 
 
 @dataclass(frozen=True, eq=False)
