@@ -13,7 +13,7 @@ from queue import Empty
 from typing import Any
 
 from softnlp.base.errors import InputError
-from softnlp.base.processes import begin_worker, process_context
+from softnlp.base.processes import begin_worker, process_context, require_workers
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.model.materials import Material
@@ -116,8 +116,9 @@ def design(
     Raises
     ------
     InputError
-        For a task that cannot be meant, or a search without optuna.
+        For a task or a number of workers that cannot be meant, or a search without optuna.
     """
+    require_workers(workers)
     setting = Setting(
         robot, material, coefficients, conventions, checked_loads(loads), checked_contact(contact), numerics
     )
