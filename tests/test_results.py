@@ -385,6 +385,11 @@ def test_save_where_nothing_can_be_written(tmp_path: Path) -> None:
     (tmp_path / "out" / "table.csv").mkdir(parents=True)
     with pytest.raises(InputError, match=r"table\.csv: cannot be written: Is a directory"):
         save(run, tmp_path / "out")
+    (tmp_path / "late" / "results.json").mkdir(parents=True)
+    with pytest.raises(InputError, match=r"results\.json: cannot be written: Is a directory"):
+        save(run, tmp_path / "late")
+    for folder in ("out", "late"):  # nothing of it is written
+        assert len(list((tmp_path / folder).iterdir())) == 1
     with pytest.raises(InputError, match="cannot be written: No such file"):
         write_table(run, tmp_path / "nowhere" / "t.csv")
     with pytest.raises(InputError, match="null"):

@@ -268,6 +268,9 @@ def write_files(
     every = {**contents, "versions.json": json.dumps(versions(), indent=2) + "\n"}
     if scenario_text is not None:
         every["scenario.toml"] = scenario_text
+    for name in every:  # before the first of them is written
+        if (folder / name).is_dir():
+            raise InputError("cannot be written: Is a directory", source=str(folder / name))
     return [
         write_whole(folder / name, found.encode() if isinstance(found, str) else found) for name, found in every.items()
     ]

@@ -13,7 +13,7 @@ from pydantic import Field
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import Columns, read_columns
 from softnlp.base.errors import InputError, located, of_table
-from softnlp.base.ranges import noise_note
+from softnlp.base.ranges import noise_note, unit_note
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import Coefficients
 from softnlp.model.materials import Material
@@ -121,7 +121,8 @@ def _robots(given: Read, table: MeasurementsTable) -> RobotTask:
         made.append(_measurements(rows, given.file.sigma))
         cells.append(tuple(tuple(_cell(c, k, column) for column in header) for c, k in rows.places))
     free, bounds = _free(table, given.material)
-    return RobotTask(tuple(made), free, bounds, header, tuple(cells), noise_note(np.concatenate(readings)))
+    every = np.concatenate(readings)
+    return RobotTask(tuple(made), free, bounds, header, tuple(cells), (*noise_note(every), *unit_note(every)))
 
 
 def _cell(columns: Columns, row: int, name: str) -> str:
