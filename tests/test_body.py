@@ -4,12 +4,30 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
+from softnlp.batch.reduced import larger_curvature
 
-from softnlp import BAR, DEGREE, forward, material, robot
+from softnlp import (
+    BAR,
+    DEGREE,
+    ContactSettings,
+    Loads,
+    Numerics,
+    Status,
+    force_against_offset,
+    forward,
+    inverse,
+    material,
+    robot,
+)
+from softnlp.batch.chunk import ChunkSolver
+from softnlp.batch.plan import Plan
+from softnlp.model.quantities import Model
 from softnlp.results import to_dataset, to_json
 from softnlp.statics.body import Fit, fit_of, overlapping
+from softnlp.statics.loadcase import rod_functions
 
 
 def helix(turn: float, radius: float, pitch: float = 0.0, points: int = 61) -> tuple[np.ndarray, np.ndarray]:
@@ -77,6 +95,73 @@ def test_turns_of_a_helix_meet_where_they_are_less_than_two_radii_apart(pitch: f
 def test_a_straight_body_fits() -> None:
     position = np.column_stack([np.zeros((61, 2)), np.linspace(0, 50, 61)])
     assert fit_of(position, np.tile(np.eye(3), (61, 1, 1)), 1.0) == Fit(0.0, False)
+
+
+def test_an_axis_that_runs_backwards_has_negative_length() -> None:
+    """Also straight, without any curvature, and where it only stands still on the way."""
+    height = np.linspace(0, 50, 61)
+    for z in (-height, np.where(height < 25, height, 50 - height), np.minimum(height, 25)):
+        fit = fit_of(np.column_stack([np.zeros((61, 2)), z]), np.tile(np.eye(3), (61, 1, 1)), 1.0)
+        assert fit.inside_out
+        assert fit.self_intersecting
+        assert "negative length" in fit.warnings[0]
+
+
+@pytest.mark.parametrize("tightness", [1e2, 1e3, 4e300, np.inf])
+def test_a_warning_is_short_whatever_the_curvature(tightness: float) -> None:
+    assert all(len(words) < 200 for words in Fit(tightness, False).warnings)
+
+
+@pytest.mark.parametrize(
+    ("force", "inside_out"), [((0, 0, -20.0), False), ((0, 0, -100.0), True), ((5.0, 0, -60.0), True)]
+)
+def test_a_rod_turned_inside_out_is_never_stable(force: tuple[float, float, float], inside_out: bool) -> None:
+    short = replace(robot("D25L60"), length=8e-3)
+    silicone, loads = material("Ecoflex 00-50"), Loads(tip_force=force)
+    run = forward(short, silicone, [[0.0, 0, 0]], loads=loads)
+    pose = run.steps[0].pose
+    assert pose is not None
+    assert (pose.shape.shear_extension[:, 2].min() <= 0) == inside_out
+    told = to_json(run)["steps"][0]
+    assert (told["stable"], told["self_intersecting"]) == ((None, True) if inside_out else (True, False))
+    assert any("(v_z <= 0); the model" in words for words in run.steps[0].warnings) == inside_out
+    assert any("(v_z)" in words for words in run.steps[0].warnings) == (not inside_out)
+    rows = (
+        ChunkSolver(
+            Plan(Model(short, silicone), loads, Numerics(), None, ("pressure",), np.zeros((1, 3)), np.arange(1))
+        )
+        .solve(0)
+        .rows
+    )
+    assert (rows["stable"][0], rows["self_intersecting"][0]) == ((-1, 1) if inside_out else (1, 0))
+    if force == (0, 0, -100.0):
+        found = inverse(short, silicone, positions=[pose.tip_position], bounds=(0.0, 0.1 * BAR), loads=loads).steps[0]
+        assert found.status is Status.OUT_OF_REACH
+
+
+def test_many_poses_at_once_know_an_axis_that_runs_backwards() -> None:
+    """By nodes: the curvature is infinite where v_z <= 0, without any bend too, and that of the axis elsewhere."""
+    functions = rod_functions(Model(robot("D25L60"), material("Ecoflex 00-50")))
+    x, c = ca.SX.sym("x", 18), ca.SX.sym("c", functions.field.size1_in(1))
+    largest = ca.Function("largest", [x, c], [larger_curvature(ca.SX(0), [x], c)])
+    column = np.concatenate([q.nominal for q in functions.declared().values()])
+    constants, _, _ = functions.section(column, 1.0)
+    state = np.asarray(functions.arc(column, 1.0, 0.5)).ravel()
+    axial = float(constants[1])  # EA over EI / L_0^2
+    for part, moment in ((0.0, 0.5), (0.9, 0.5), (1.1, 0.5), (1.1, 0.0)):
+        state[14], state[15] = -part * axial, moment
+        found = float(largest(state, constants))
+        bend = moment / float(constants[2])
+        assert found == (np.inf if part > 1 else pytest.approx(bend / (1 - part), rel=1e-9))
+
+
+def test_a_wall_that_presses_a_robot_through_itself_leaves_no_stable_shape() -> None:
+    contact = ContactSettings(wall_point=(0, 0, 8e-3), wall_normal=(0, 0, -1), closure="free")
+    short = replace(robot("D25L60"), length=8e-3)
+    step = force_against_offset(short, material("Ecoflex 00-50"), [0.1 * BAR] * 3, [9e-3], contact).steps[0]
+    assert step.pose is not None
+    assert step.pose.fit.inside_out
+    assert step.pose.stable is None
 
 
 @pytest.mark.parametrize("tightness", [0.89, 0.9, 0.99, 1.0, 1.14])

@@ -123,6 +123,23 @@ def test_a_bore_at_the_surface_leaves_no_solid() -> None:
         mould_body(arm, holes="thread")
 
 
+def test_the_command_says_what_it_took_a_reading_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = '[robot]\nname = "D25L60"\n[material]\nname = "Ecoflex 00-50"\nmodel = "mooney-rivlin"\n'
+    (tmp_path / "s.toml").write_text(f'study = "forward"\n{table}[pressure]\nsequence_bar = [[-0.003, 0.2, 0]]\n')
+    assert main(["mesh", str(tmp_path / "s.toml"), "--facets", "8", "--out", str(tmp_path / "s.stl")]) == 0
+    assert "1 pressure reading below 0, the lowest -0.003 bar, taken as 0" in capsys.readouterr().err
+
+
+def test_a_shape_of_negative_length_leaves_no_solid() -> None:
+    arm = robot("D25L60")
+    body = natural_body(arm)
+    backwards = Body(body.position * [1, 1, -1], body.rotation, body.radii)
+    with pytest.raises(InputError, match="negative length"):
+        body_solid(arm, backwards, 8)
+    with pytest.raises(InputError, match="negative length"):
+        cores(arm, backwards, 8)
+
+
 def test_a_body_through_itself_is_said() -> None:
     arm = robot("D25L60")
     long = replace(arm, length=0.4)

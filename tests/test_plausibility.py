@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from softnlp import fit_tensile, load_materials, material
 from softnlp.cli import main
 from softnlp.scenario.read import load_scenario
 from softnlp.studies.measurements import TensileTask
-from softnlp.studies.plausibility import Check, area_check, curve_checks, law_checks, messages
+from softnlp.studies.plausibility import Check, agreed, area_check, curve_checks, law_checks, messages
 
 STRETCH = np.linspace(1, 3, 41)
 SILICONES = [(s, law) for s, entry in load_materials().items() for law in entry.models if law != "linear"]
@@ -60,6 +61,41 @@ def test_soft_and_stiff_ones_with_noise_pass(modulus: float) -> None:
     for part in (0.01, 0.05, 0.1):
         assert verdict(STRETCH, stress + part * np.max(stress) * random.standard_normal(41)) != "failed"
     assert verdict(STRETCH, stress) == "passed"
+
+
+@pytest.mark.parametrize(("silicone", "law"), SILICONES)
+def test_no_silicone_looks_slack_and_slack_is_measured(silicone: str, law: str) -> None:
+    random = np.random.default_rng(3)
+    x = np.linspace(1, 2, 31)
+    made = material(silicone, law)
+    for slack in (0.0, 0.08, 0.2):
+        stress = np.asarray(made.engineering_stress(np.maximum(x - slack, 1)))
+        stress += 0.01 * np.max(stress) * random.standard_normal(x.size)
+        checks = {c.name.split(",")[0]: c for c in curve_checks(x, stress)}
+        value, verdict = (checks["slack"].value, checks["slack"].verdict) if "slack" in checks else (0.0, "passed")
+        assert value == pytest.approx(slack, abs=0.035)
+        assert verdict == ("failed" if slack > 0.1 else "warned" if slack else "passed")
+        assert not any("true stress" in c.message for c in checks.values())
+
+
+def test_noise_is_not_named_as_something_else() -> None:
+    """20 kPa on a silicone of 58 kPa at a stretch of 2: the growth at 1 cannot be told from it."""
+    x = np.linspace(1, 2, 21)
+    for seed in range(8):
+        noise = 2e4 * np.random.default_rng(seed).standard_normal(x.size)
+        said = messages(curve_checks(x, 1e6 * neo_hookean(x) + noise), "warned")
+        assert not any("true stress" in words or "inf" in words for words in said)
+
+
+def test_two_checks_that_one_mistake_explains_fail_together() -> None:
+    low, high = (
+        Check("cross-section", 1.0, (2, 3), (0, 9), ""),
+        Check("shear modulus of the data", 5.0, (1, 2), (0, 9), ""),
+    )
+    assert [c.verdict for c in (low, high)] == ["warned", "warned"]
+    assert [c.verdict for c in agreed((low, high))] == ["failed", "failed"]
+    assert [c.verdict for c in agreed((low, replace(high, value=0.5)))] == ["warned", "warned"]
+    assert [c.verdict for c in agreed((low, replace(high, value=1.5)))] == ["warned", "passed"]
 
 
 def test_a_stiff_rubber_of_some_megapascals_is_only_warned_of() -> None:
@@ -128,6 +164,16 @@ WRONG = {
     "micrometres": ("displacement_mm,force_N", (D, F), SPECIMEN.replace("2", "2000"), 2, "thickness_mm", "microm"),
     "preload": ("stretch,stress_MPa", (X, Y + 0.01), "", 3, "stress at stretch 1", "not tared"),
     "sign": ("stretch,stress_MPa", (X, -Y), "", 3, "shear modulus of the data is -0.031", "sign"),
+    "fraction": ("strain_percent,stress_MPa", (2 * (X - 1), Y), "", 3, "strain_percent is 1.02", "name it strain"),
+    "fraction to 3": ("strain_percent,stress_MPa", (4 * (X - 1), Y), "", 3, "strain_percent is 1.04", "name it strain"),
+    "inches": ("displacement_mm,force_N", (D / 25.4, F), SPECIMEN, 3, "largest stretch is 1.039", "or in inches"),
+    "cm": ("displacement_mm,force_N", (0.05 * D, F), SPECIMEN, 3, "largest stretch is 1.05", "growth", "in cm or"),
+    "radius": (
+        *("displacement_mm,force_N", (D, F), SPECIMEN.replace("6", "0.4").replace("2", "0.2"), 3),
+        "cross-section",
+    ),
+    "slack": ("stretch,stress_MPa", (X, neo_hookean(np.maximum(X - 0.15, 1))), "", 3, "begins at a stretch of 1.15"),
+    "long slack": ("stretch,stress_MPa", (X, neo_hookean(np.maximum(X - 0.4, 1))), "", 3, "begins at a stretch of 1.4"),
     "break": ("stretch,stress_MPa", (np.append(X, [2.1, 2.2, 2.3]), np.append(Y, [0, 0, 0])), "", 3, "R^2", "[1, 2]"),
 }
 
@@ -162,7 +208,20 @@ WARNED = {
     "true stress": ("stretch,stress_MPa", (X, X * Y), "", "true stress"),
     "cycles": ("stretch,stress_MPa", (CYCLES, np.concatenate([Y, 0.8 * Y[::-1], 0.9 * Y])), "", "load cycles"),
     "1 mm2": ("displacement_mm,force_N", (D, F), "gauge_length_mm = 30\nwidth_mm = 1\nthickness_mm = 1", "left at 1"),
-    "fraction": ("strain_percent,stress_MPa", (2 * (X - 1), Y), "", "strain_percent"),
+    "gram-force": ("displacement_mm,force_N", (D, 102 * F), SPECIMEN, "gram-force"),
+    "no true stress": ("stretch,stress_MPa", (X, Y), 'stress = "true"', "engineering stress"),
+    "a little slack": (
+        "stretch,stress_MPa",
+        (X, neo_hookean(np.maximum(X - 0.06, 1))),
+        "",
+        "begins at a stretch of 1.06",
+    ),
+    "short": (
+        "stretch,stress_MPa",
+        (1 + 0.04 * (X - 1), neo_hookean(1 + 0.04 * (X - 1))),
+        "",
+        "largest stretch is 1.04",
+    ),
 }
 
 

@@ -16,6 +16,7 @@ from softnlp import (
     DEGREE,
     MILLIMETRE,
     Body,
+    Coefficients,
     Collocation,
     Constraint,
     IllPosedError,
@@ -24,6 +25,7 @@ from softnlp import (
     Material,
     MultipleShooting,
     Numerics,
+    Robot,
     RobotError,
     Segment,
     Status,
@@ -287,6 +289,207 @@ def test_what_has_no_solution_has_no_outputs() -> None:
     assert "no solution was found" in found.message
     with pytest.raises(KeyError, match="no quantity or output is named 'tip_positon'"):
         found["tip_positon"]
+
+
+# A robot that meets every rule and loses GJ from 0.667 bar on.
+TWISTER = Robot(
+    name="twister",
+    outer_diameter=22.52 * MILLIMETRE,
+    lumen_diameter=9.61 * MILLIMETRE,
+    chamber_circle_diameter=16.06 * MILLIMETRE,
+    chamber_diameter=4.85 * MILLIMETRE,
+    chamber_wall=0.64 * MILLIMETRE,
+    length=60 * MILLIMETRE,
+    chamber_sets=4,
+    chambers_per_set=2,
+    chamber_angle=45 * DEGREE,
+)
+
+
+@pytest.mark.parametrize("engine", ["auto", "newton", "ipopt"])
+def test_no_engine_solves_past_a_stiffness_that_lost_its_sign(engine: Any) -> None:
+    """As `forward` says it, whether the pressure is given or found, in a chain and in one case of two."""
+    high = [0.86 * BAR] * 4
+    said = forward(TWISTER, SOFT, [high]).steps[0]
+    body = Body([Segment(TWISTER, SOFT)])
+    pose = case("pose", body, method=SHOOTING)
+    found = solve(problem([pose]), {"pressure": high}, engine=engine)
+    assert (found.status, found.message) == (said.status, said.message)
+    assert found.status is Status.UNSTABLE_MATERIAL
+    assert found.outputs == {}
+    P = body.quantities["pressure"].symbol
+    long = Constraint("long", pose.outputs["backbone_length"], 1.99 * TWISTER.length, np.inf, unit="m", scale=0.06)
+    posed = problem([pose], free=["pressure"], constraints=[long], objective=ca.sumsqr(P / BAR))
+    found = solve(posed, start={"pressure": [0.5 * BAR] * 4}, engine=engine)
+    assert (found.status, found.outputs) == (Status.UNSTABLE_MATERIAL, {})
+    if engine == "newton":
+        chain = problem([case("pose", Body([Segment(D25, SOFT), Segment(TWISTER, SOFT)]), method=SHOOTING)])
+        found = solve(chain, {"pressure": [0.0] * 3 + high}, engine=engine)
+        assert (found.status, found.message) == (said.status, f"segment 2: {said.message}")
+        two = problem([pose, case("other", Body([Segment(TWISTER, SOFT)], name="other"), method=SHOOTING)])
+        found = solve(two, {"other.pressure": high}, engine=engine)
+        assert (found.status, found.message) == (said.status, f"other: {said.message}")
+
+
+def test_a_path_ends_where_a_stiffness_loses_its_sign() -> None:
+    posed = problem([case("pose", Body([Segment(TWISTER, SOFT)]), method=SHOOTING)])
+    first = solve(posed, {"pressure": [0.3 * BAR] * 4}, engine="newton")
+    path = follow(posed, first, {"pressure": [1.0 * BAR] * 4}, steps=7)
+    assert [a.status for a in path[:-1]] == [Status.SOLVED] * 4  # to 0.6 bar
+    assert (len(path), path[-1].status) == (5, Status.UNSTABLE_MATERIAL)
+
+
+def test_a_grid_that_does_not_show_the_rod_is_no_solution() -> None:
+    """Ten intervals put the tip of a curl of 15 turns at 45 m."""
+    found = solve(posed_pose(MultipleShooting(10)), {"pressure": [20 * BAR, 0, 0]}, engine="newton")
+    assert (found.status, found.outputs) == (Status.INACCURATE, {})
+    assert "take more intervals" in found.message
+    loaded = {**LOADS, "pressure": PRESSURE}
+    coarse, fine = (solve(posed_pose(MultipleShooting(K)), loaded, engine="newton") for K in (10, 80))
+    assert coarse.discretisation_error is not None
+    error = float(np.linalg.norm(coarse["tip_position"] - fine["tip_position"])) / D25.length
+    assert error / 3 < coarse.discretisation_error < 3 * error
+
+
+def test_another_root_of_the_stretch_is_no_solution() -> None:
+    """A law that weakens has two stretches at a pressure; only one is reached from zero pressure."""
+    weak = Material("weak", formula_law("weak", "a * (stretch - 1) * exp(-(stretch - 1))", ["a"]), {"a": 0.05})
+    body = Body([Segment(D25, weak)], coefficients=Coefficients(elongation=0.0))
+    posed = problem([case("pose", body, method=None)])
+    low = {"pressure": [0.1 * BAR] * 3}
+    near = solve(posed, low, engine="newton")
+    assert near.status is Status.SOLVED
+    far = replace(near, solution=replace(near.solution, x=np.array([4.0])))
+    other = solve(posed, low, far, engine="newton")
+    assert other.solution.holds(1e-9)
+    assert other.solution.x[0] > 2
+    assert (other.status, other.outputs) == (Status.DIVERGED, {})
+    assert "on the branch from zero pressure, where the stretch is 1.0" in other.message
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("pressure", [500 * BAR, 0, 0], "at most 100 bar, got 500 bar"),
+        ("pressure", [-0.5 * BAR, 0, 0], "expected at least 0 and at most 100 bar, got -0.5 bar"),
+        ("tip_force", [0, 0, -1e5], "at most 10000 N, got 100000 N"),
+        ("tip_moment", [0, 2e3, 0], "at most 1e"),
+        ("gravity", [0, 0, 1e4], "at most 1000"),
+    ],
+)
+def test_what_acts_is_within_its_range(key: str, value: Any, said: str) -> None:
+    posed = posed_pose()
+    start = solve(posed, {"pressure": PRESSURE}, engine="newton")
+    with pytest.raises(InputError, match=f"{key}: .*{said}"):
+        solve(posed, {key: value})
+    with pytest.raises(InputError, match=f"{key}: .*{said}"):
+        follow(posed, start, {key: value})
+    factor = quantity("factor", "1", 1.0)  # as an expression too
+    given = {key: factor.symbol * ca.DM(np.asarray(value, float))}
+    with pytest.raises(InputError, match=key):
+        solve(problem([case("pose", Body([Segment(D25, SOFT)]), given=given, method=SHOOTING)], given=[factor]))
+
+
+def test_a_pressure_that_is_found_is_within_its_range() -> None:
+    """Freed, its expression may be what no regulator gives."""
+    body = Body([Segment(D25, SOFT)])
+    factor = quantity("factor", "1", 0.1)
+    pose = case("pose", body, given={"pressure": ca.vertcat(factor.symbol * BAR, 0, 0)}, method=SHOOTING)
+    aside = Constraint("aside", pose.outputs["tip_position"][0] - 5 * MILLIMETRE, unit="m", scale=0.06)
+    found = solve(problem([pose], given=[factor], free=["factor"], constraints=[aside]), engine="newton")
+    assert (found.status, found.outputs) == (Status.DIVERGED, {})
+    assert "pressure: expected at least 0" in found.message
+
+
+@pytest.mark.parametrize("value", [[np.nan, 0, 0], [np.inf, 0, 0], ["a", 0, 0], "x"])
+def test_values_and_starts_are_finite_numbers(value: Any) -> None:
+    body = Body([Segment(D25, SOFT)])
+    pose = case("pose", body, method=SHOOTING)
+    angle = Constraint("angle", pose.outputs["bending_angle"], 1, 2)
+    posed = problem([pose], free=["pressure"], constraints=[angle], objective=ca.sumsqr(pose.outputs["tip_position"]))
+    with pytest.raises(IllPosedError, match="'pressure' takes finite numbers"):
+        solve(posed, start={"pressure": value})
+    with pytest.raises(IllPosedError, match="'pressure' takes finite numbers"):
+        solve(posed_pose(), {"pressure": value})
+
+
+@pytest.mark.parametrize("scale", [1e7, 1e12, 1e300])
+def test_a_scale_hides_no_violation(scale: float) -> None:
+    """Over the scale an angle of 0 keeps a least angle of 60 degrees to any tolerance."""
+    body = Body([Segment(D25, SOFT)])
+    pose = case("pose", body, method=MultipleShooting(6))
+    rule = Constraint("angle", pose.outputs["bending_angle"], 60 * DEGREE, np.inf, unit="rad", scale=scale)
+    cost = ca.sumsqr(body.quantities["pressure"].symbol / BAR)
+    found = solve(problem([pose], free=["pressure"], constraints=[rule], objective=cost))
+    assert (found.status, found.outputs) == (Status.DIVERGED, {})
+    assert "constraint 'angle' is off by" in found.message
+    assert "scale" in found.message
+
+
+def test_a_scale_that_is_only_large_is_taken() -> None:
+    """Newton's method meets an equation to round-off, whatever it is divided by; one of slope 0 at its root too."""
+    body = Body([Segment(D25, SOFT)])
+    pose = case("pose", body, method=SHOOTING)
+    idle = Constraint("idle", body.quantities["pressure"].symbol[1:], unit="Pa", scale=BAR)
+    off = pose.outputs["bending_angle"] - 60 * DEGREE
+    for scale, error in ((1e6, off), (1.0, off**2)):
+        angle = Constraint("angle", error, unit="rad", scale=scale)
+        posed = problem([pose], free=["pressure"], constraints=[angle, idle])
+        found = solve(posed, start={"pressure": [0.9 * BAR, 0, 0]}, engine="newton", tolerance=1e-6)
+        assert found.status is Status.SOLVED
+        assert found["bending_angle"][0] == pytest.approx(60 * DEGREE, abs=1e-3)
+
+
+P_BODY = Body([Segment(D25, SOFT)])
+POSE = case("pose", P_BODY, method=MultipleShooting(3))
+ANGLE = POSE.outputs["bending_angle"]
+
+
+@pytest.mark.parametrize(
+    ("constraint", "said"),
+    [
+        ((None, ANGLE, 1, 2), "expected a name for each constraint, got None"),
+        (("", ANGLE, 1, 2), "expected a name for each constraint, got ''"),
+        (("a", 0.5, 0, 1), "constraint 'a': expected an expression of CasADi's MX, got 0.5"),
+        (("a", None, 0, 1), "got None"),
+        (("a", ca.SX.sym("q"), 0, 1), "got one of SX"),
+        (("a", ca.MX(0, 1), 0, 1), "at least one entry"),
+        (("a", ca.MX.sym("q"), 0, 1), "constraint 'a': 'q' is no quantity of the cases"),
+        (("a", ANGLE, "1", 2), "constraint 'a': expected bounds that are numbers, got '1'"),
+        (("a", ANGLE, None, 2), "got None"),
+        (("a", ANGLE, [[1], [1, 2]], 2), "expected bounds that are numbers"),
+        (("a", ANGLE, np.inf, np.inf), "no number lies between its bounds"),
+        (("a", ANGLE, -np.inf, -np.inf), "no number lies between its bounds"),
+        (("a", ANGLE, 1, 2, "rad", "x"), "expected a scale above 0, got 'x'"),
+        (("a", ANGLE, 1, 2, "rad", None), "expected a scale above 0, got None"),
+        (("a", ANGLE, 1, 2, "rad", True), "expected a scale above 0, got True"),
+        (("stretch balance", ANGLE, 1, 2), "two constraints or equations are named 'stretch balance'"),
+        (("bounds", ANGLE, 1, 2), "named 'bounds'"),
+        (("twice", ANGLE, 1, 2), "two constraints or equations are named 'twice'"),
+    ],
+)
+def test_a_constraint_that_cannot_be_meant_is_refused(constraint: tuple[Any, ...], said: str) -> None:
+    rules = [Constraint("twice", ANGLE, 0, 2), Constraint(*constraint)]
+    with pytest.raises(IllPosedError, match=said):
+        problem([POSE], free=["pressure"], constraints=rules, objective=ca.sumsqr(POSE.outputs["tip_position"]))
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"objective": ca.SX(1)}, "objective: expected an expression of CasADi's MX, got one of SX"),
+        ({"objective": ca.MX.sym("q")}, "objective: 'q' is no quantity"),
+        ({"objective": POSE.outputs["tip_position"]}, "objective: expected one number to minimise, got 3"),
+        ({"residuals": [ANGLE, ca.MX.sym("q")]}, "residual: 'q' is no quantity"),
+        ({"residuals": [0.5]}, "residual: expected an expression"),
+    ],
+)
+def test_what_is_minimised_is_known(asked: dict[str, Any], said: str) -> None:
+    with pytest.raises(IllPosedError, match=said):
+        problem([POSE], free=["pressure"], **asked)
+    foreign = case("pose", P_BODY, given={"pressure": 2 * ca.MX.sym("q", 3)}, method=MultipleShooting(3))
+    with pytest.raises(IllPosedError, match="case 'pose': 'q' is no quantity"):
+        problem([foreign])
 
 
 def test_what_cannot_be_posed_is_refused_by_name() -> None:

@@ -7,11 +7,14 @@ import sys
 import threading
 from multiprocessing import spawn
 from pathlib import Path
+from typing import Any
 
 import pytest
 from sweeps import HEAD, QUICK
 
+from softnlp import InputError, load_scenario, run_design, run_scenario, run_sweep
 from softnlp.base import processes
+from softnlp.scenario.read import scenario_from_text
 
 LIGHT = """
 import threading, time
@@ -85,3 +88,17 @@ def test_processes_that_others_start_meanwhile_are_told_their_main(monkeypatch: 
     ask("after")
     assert told["ours"] == set()
     assert told["before"] == told["theirs"] == told["after"] != set()
+
+
+@pytest.mark.parametrize("workers", ["2", None, 0, -1, 2.5, True, 1_000_000, [2]])
+def test_what_is_no_number_of_workers_is_refused_before_anything_is_done(workers: Any, tmp_path: Path) -> None:
+    design_scenario = load_scenario(Path(__file__).parents[1] / "scenarios" / "design" / "laparoscope_paper.toml")
+    swept = scenario_from_text(TABLES, str(tmp_path / "s.toml"))
+    for call in (
+        lambda: run_design(design_scenario, workers=workers),
+        lambda: run_sweep(swept, tmp_path / "o", workers=workers),
+        lambda: run_scenario(swept, workers=workers),
+    ):
+        with pytest.raises(InputError, match="workers: expected a whole number from 1 to 1024, got "):
+            call()
+    assert not (tmp_path / "o").exists()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from softnlp.base.ranges import FORCE, RANGES, READING, Range, noise_note, range
 from softnlp.base.ranges import PRESSURE as PRESSURES
 from softnlp.cli import main
 from softnlp.model.laws import LAWS
+from softnlp.model.robot import ROBOTS, check
 from softnlp.scenario.compare import compare_task
 from softnlp.scenario.read import load_scenario, scenario_from_text
 from softnlp.studies.measurements import RobotTask
@@ -203,3 +205,55 @@ def test_noise_in_measurements(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("number", "shown"), [(100.0001, "100.0001"), (100.00000000001, "100.00000000001")])
 def test_a_number_refused_is_not_shown_as_one_that_is_expected(number: float, shown: str) -> None:
     assert PRESSURES.refusal(number).startswith(f"expected at least 0 and at most 100 bar, got {shown} bar")
+
+
+# --- a number in another unit -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        ("sequence_bar = [[0.5, 50, 0]]", "a pressure of 50 bar looks like kPa: 50 kPa are 0.5 bar"),
+        ("ramp = { sets = [1], to_bar = 15, steps = 2 }", "a pressure of 15 bar looks like kPa: 15 kPa are 0.15 bar"),
+        ("file = 'p.csv'", "a pressure of 100 bar looks like kPa: 100 kPa are 1 bar"),
+        ("sequence_bar = [[0.5, 10, 0]]", None),
+    ],
+)
+def test_a_pressure_in_kilopascals_is_told_of(source: str, said: str | None, tmp_path: Path) -> None:
+    (tmp_path / "p.csv").write_text(f"{HEADER}\n100,0,0\n0.5,1,0\n")
+    found = scenario_from_text(scenario(pressure=f"[pressure]\n{source}\n"), tmp_path / "s.toml")
+    assert list(found.warnings) == ([said] if said else [])
+
+
+def test_it_is_told_of_bounds_and_levels_too(tmp_path: Path) -> None:
+    text = scenario(top="study = 'workspace'\n", pressure="[workspace]\nlevels = 2\nto_bar = 50\n")
+    assert scenario_from_text(text, tmp_path / "s.toml").warnings == (
+        "a pressure of 50 bar looks like kPa: 50 kPa are 0.5 bar",
+    )
+
+
+@pytest.mark.parametrize(("length", "said"), [(0.06e-3, "length 0.06 mm"), (60.0, "length 60000 mm"), (1e-3, "")])
+def test_a_length_in_another_unit_is_told_of(length: float, said: str) -> None:
+    found = check(replace(ROBOTS["D25L60"], length=length))
+    assert [words.split(" is outside")[0] for words in found] == ([said] if said else [])
+    if said:
+        assert found[0].endswith("is outside 1 mm to 1000 mm: check its unit, mm in files")
+
+
+def test_a_file_name_that_is_blank_or_an_escape_says_so(tmp_path: Path) -> None:
+    for source, said in (
+        ('file = " "', r"\[pressure\] file: expected a path, got ' '"),
+        (r'file = "data\u0041.csv"', r"dataA\.csv: no such file; a backslash .* begins an escape"),
+        ("file = 'dataA.csv'", r"dataA\.csv: no such file$"),
+    ):
+        with pytest.raises(InputError, match=said):
+            scenario_from_text(scenario(pressure=f"[pressure]\n{source}\n"), tmp_path / "s.toml")
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_columns_that_are_not_separated_by_commas_are_named(separator: str, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(f"stretch{separator}stress_MPa\n1,0{separator}0,0\n1,5{separator}0,03\n")
+    with pytest.raises(
+        InputError, match=r"t\.csv: expected columns separated by commas, and a decimal point .*stretch"
+    ):
+        scenario_from_text('study = "identify"\n[tensile]\nfile = "t.csv"\n', tmp_path / "s.toml")

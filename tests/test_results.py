@@ -35,8 +35,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
+from softnlp import load_scenario, run_scenario
 from softnlp.base.errors import InputError
 from softnlp.base.status import Status
+from softnlp.cli import main
 from softnlp.model.contact_settings import ClosureWeights, ContactSettings
 from softnlp.model.materials import Material, formula_law, material_from_table
 from softnlp.model.robot import DIMENSIONS, robot
@@ -383,6 +385,11 @@ def test_save_where_nothing_can_be_written(tmp_path: Path) -> None:
     (tmp_path / "out" / "table.csv").mkdir(parents=True)
     with pytest.raises(InputError, match=r"table\.csv: cannot be written: Is a directory"):
         save(run, tmp_path / "out")
+    (tmp_path / "late" / "results.json").mkdir(parents=True)
+    with pytest.raises(InputError, match=r"results\.json: cannot be written: Is a directory"):
+        save(run, tmp_path / "late")
+    for folder in ("out", "late"):  # nothing of it is written
+        assert len(list((tmp_path / folder).iterdir())) == 1
     with pytest.raises(InputError, match="cannot be written: No such file"):
         write_table(run, tmp_path / "nowhere" / "t.csv")
     with pytest.raises(InputError, match="null"):
@@ -695,3 +702,36 @@ assert not {"xarray", "matplotlib.pyplot"} & sys.modules.keys()
     here = Path(__file__).parent
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(here), str(here.parent)])}
     subprocess.run([sys.executable, "-c", code], check=True, env=environment)
+
+
+@pytest.mark.parametrize("name", ["identify/tensile", "identify/measured_angles", "design/laparoscope_paper"])
+def test_the_document_of_any_study_is_what_its_command_prints(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    file = Path(__file__).parents[1] / "scenarios" / f"{name}.toml"
+    asked = load_scenario(file)
+    found = run_scenario(asked)
+    document = to_json(found, asked)
+    main([asked.study, str(file), "--json"])
+    told = json.loads(capsys.readouterr().out)
+    assert list(document) == list(told)
+    assert json.loads(json.dumps(document, allow_nan=False)).get("laws") == told.get("laws")
+    for take in (to_dataset, lambda r: save(r, "never")):
+        with pytest.raises(InputError, match=r"takes a run, got .*; softnlp.to_json takes it"):
+            take(found)
+    assert not Path("never").exists()
+
+
+def test_a_document_names_what_it_cannot_be_made_of() -> None:
+    folder = Path(__file__).parents[1] / "scenarios"
+    tensile = load_scenario(folder / "identify" / "tensile.toml")
+    fit = run_scenario(tensile)
+    with pytest.raises(InputError, match="takes a scenario of study 'identify', got a value of type NoneType"):
+        to_json(fit)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="scenario of this fit"):
+        to_json(fit, load_scenario(folder / "identify" / "measured_angles.toml"))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="takes a run, got a value of type str"):
+        to_json("results.json")  # type: ignore[arg-type]
+    cloud = run_scenario(load_scenario(folder / "workspace" / "D25L60_sequence.toml"))
+    with pytest.raises(
+        InputError, match=r"softnlp.to_json takes a run, got .*Workspace; it is a netCDF file already: /"
+    ):
+        to_json(cloud)  # type: ignore[arg-type]

@@ -167,10 +167,11 @@ _EVERY = (
     # --- of the pose
     Output("stretch", ONE, "axial stretch from the pressure balance, Eq. (23)", group="pose",
            title="Stretch from pressure", form=".3f", page=".5f"),
-    Output("stable", ONE, "no conjugate point on the rod; undefined under a dead tip moment and without a solution",
+    Output("stable", ONE, "no conjugate point on the rod; undefined under a dead tip moment, in a rod "
+           "compressed to nothing and without a solution",
            group="pose"),
     Output("self_intersecting", ONE,
-           "curvature times outer radius reaches 1, or parts of the body lie inside each other", group="pose",
+           "curvature times outer radius reaches 1, v_z <= 0, or parts of the body lie inside each other", group="pose",
            of="pose.fit.self_intersecting"),
     Output("tip_position", MM, "tip position in the world frame", _X, "pose", short=_TIP, title="Tip {}"),
     Output("tip_displacement", MM, "tip position against the shape at the same pressure without gravity or tip load",

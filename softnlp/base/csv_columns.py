@@ -100,7 +100,8 @@ def _columns(label: str, rows: list[tuple[int, list[str]]], needed: Collection[s
         raise InputError(f"expected a header and rows of numbers, at least one row, got {got}")
     header = tuple(one_line(name.strip(), LONGEST_NAME) for name in rows[0][1])
     if len(header) == 1 and re.search(r"[;\t]", rows[0][1][0].strip()):
-        raise InputError(f"expected columns separated by commas, got {shown(rows[0][1][0])}")
+        got = shown(rows[0][1][0].strip())
+        raise InputError(f"expected columns separated by commas, and a decimal point in numbers, got {got}")
     for name in header:
         if name and header.count(name) > 1:
             raise InputError(f"expected each column once, got {shown(name)} {header.count(name)} times")

@@ -12,9 +12,20 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import connection, parent_process, spawn
 from multiprocessing.context import BaseContext, SpawnContext, SpawnProcess
+from numbers import Integral
 from typing import Any
 
+from softnlp.base.errors import InputError
+
+MOST_WORKERS = 1024
+
 _launching = threading.Lock()
+
+
+def require_workers(workers: Any) -> None:
+    """Raise `InputError` for what is no number of processes."""
+    if isinstance(workers, bool) or not isinstance(workers, Integral) or not 1 <= int(workers) <= MOST_WORKERS:
+        raise InputError(f"expected a whole number from 1 to {MOST_WORKERS}, got {workers!r}", key="workers")
 
 
 def process_context() -> BaseContext:

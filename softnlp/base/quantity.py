@@ -9,6 +9,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.errors import IllPosedError
+
 Array = NDArray[np.float64]
 _INF = float("inf")
 
@@ -72,3 +74,11 @@ def quantity(
     """
     value = np.atleast_1d(np.asarray(nominal, dtype=float)).ravel()
     return Quantity(name, unit, ca.MX.sym(name, value.size), value, scale, lower, upper)
+
+
+def expression(given: Any, what: str) -> ca.MX:
+    """Return an expression, or raise `IllPosedError` that says of what it is none of CasADi's MX."""
+    if not isinstance(given, ca.MX):
+        kind = f"one of {type(given).__name__}" if isinstance(given, ca.SX | ca.DM) else repr(given)
+        raise IllPosedError(f"{what}: expected an expression of CasADi's MX, got {kind}")
+    return given

@@ -7,7 +7,7 @@ by its key, or by the unit in which its key ends.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import inf
 from typing import Any
@@ -22,6 +22,7 @@ from softnlp.base.units import BAR, MEGAPASCAL, MILLIMETRE, NEWTON_MILLIMETRE
 Array = NDArray[np.float64]
 
 LOWEST_READING_BAR = -0.05  # of a regulator that is off: noise
+HIGHEST_USUAL_BAR = 10.0  # soft robots of silicone take a bar or two
 
 
 @dataclass(frozen=True)
@@ -160,12 +161,31 @@ def noise_note(readings_bar: Array) -> tuple[str, ...]:
     )
 
 
-def numbers_outside(value: Any, keys: Sequence[int | str] = ()) -> list[tuple[tuple[int | str, ...], Any, str]]:
+def unit_note(readings_bar: Array) -> tuple[str, ...]:
+    """Return one warning where the largest pressure looks like kPa, or none; nan is no pressure."""
+    largest = float(np.fmax.reduce(readings_bar, axis=None, initial=0.0))
+    if largest <= HIGHEST_USUAL_BAR:
+        return ()
+    return (f"a pressure of {largest:g} bar looks like kPa: {largest:g} kPa are {largest / 100:g} bar",)
+
+
+def file_unit_note(data: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the warning of `unit_note` for the pressures in the tables of a file."""
+    found = [float(value) for _, value, limits in _numbers(data) if limits in (PRESSURE, READING)]
+    return unit_note(np.array(found))
+
+
+def numbers_outside(data: Mapping[str, Any]) -> list[tuple[tuple[int | str, ...], Any, str]]:
     """Return place, number and what to say of each finite number in the tables of a file that is outside its range."""
+    return [(keys, value, limits.refusal(value)) for keys, value, limits in _numbers(data) if not limits.holds(value)]
+
+
+def _numbers(value: Any, keys: tuple[int | str, ...] = ()) -> Iterator[tuple[tuple[int | str, ...], Any, Range]]:
+    """Yield place, number and range of each finite number in the tables of a file that has a range."""
     if isinstance(value, Mapping | list):
-        parts = value.items() if isinstance(value, Mapping) else enumerate(value)
-        return [found for key, part in parts for found in numbers_outside(part, (*keys, key))]
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < inf:
-        return []
-    limits = range_of(*(key for key in keys if isinstance(key, str)))
-    return [] if limits is None or limits.holds(value) else [(tuple(keys), value, limits.refusal(value))]
+        for key, part in value.items() if isinstance(value, Mapping) else enumerate(value):
+            yield from _numbers(part, (*keys, key))
+    elif not isinstance(value, bool) and isinstance(value, int | float) and abs(value) < inf:
+        limits = range_of(*(key for key in keys if isinstance(key, str)))
+        if limits is not None:
+            yield keys, value, limits

@@ -106,11 +106,14 @@ def _fill_blocked(rows: Rows, poses: BlockedPoses, gap: Array, through: Mask) ->
 def _fill_together(
     rows: Rows, poses: Poses | BlockedPoses, tip: Array, lengths: Array, angle: Array, backbone: Array
 ) -> None:
-    """Put what poses with and without a wall share into their rows; both are stable for certain. tip : [p, R, ...]."""
+    """Put what poses with and without a wall share into their rows; tip : [p, R, ...].
+
+    All are stable for certain, but where the rod is compressed to nothing.
+    """
     where, shot, L_0 = poses.numbers, poses.shot, poses.sections.length_unit
     rows["status"][where] = STATUSES.index(Status.SOLVED)
     rows["lane"][where] = Lane.BATCH
-    rows["stable"][where] = 1
+    rows["stable"][where] = np.where(np.isinf(shot.curvature), stable_flag(None), stable_flag(True))
     rows["intervals"][where] = shot.intervals
     rows["iterations"][where] = shot.iterations
     rows["stretch"][where] = poses.sections.stretch

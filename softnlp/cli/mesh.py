@@ -135,6 +135,8 @@ def _view_of(path: Path, step: int | None) -> tuple[RunView | None, int]:
             key="study",
         )
     number = _number(step, asked.step_count)
+    for warning in asked.warnings:
+        complain(f"warning: {warning}")
     steps, _ = stepwise(asked, number, lambda keep: solve_steps(asked, keep), to_end=False)
     return (view_of_run(partial_run(asked, steps)) if len(steps) == number else None), number
 

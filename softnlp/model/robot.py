@@ -23,6 +23,7 @@ from softnlp.model.rules import SELF_INTERSECTION as SELF_INTERSECTION
 from softnlp.model.rules import Violation as Violation
 
 MINIMUM_WALL = 0.8e-3  # delta_s of Eq. (1) [m]
+USUAL_SIZES = (1e-3, 1.0)  # of a soft robot's length and diameter [m]
 LENGTH_LIMITS = (SIZE.low * MILLIMETRE, SIZE.high * MILLIMETRE)  # [m]
 LARGEST = 1e300  # beyond it, an int may not even have a float
 MOST_CHAMBERS = 1000
@@ -246,7 +247,7 @@ def check(robot: Robot, *, allow: Collection[str] = (), minimum_wall: float = MI
 
     Returns
     -------
-    One warning for each allowed rule that the robot breaks.
+    One warning for each allowed rule that the robot breaks, and for a size that is likely in another unit.
 
     Raises
     ------
@@ -264,7 +265,17 @@ def check(robot: Robot, *, allow: Collection[str] = (), minimum_wall: float = MI
         first, more = refused[0], len(refused) - 1
         hint = f'; allow = ["{first.rule}"] lowers this to a warning' if first.lowerable else ""
         raise RobotError(f"{first.rule}: {first.message}{hint}{f' (and {more} more)' if more else ''}")
-    return tuple(f"{v.rule}: {v.message}" for v in found)
+    return (*(f"{v.rule}: {v.message}" for v in found), *size_notes(robot))
+
+
+def size_notes(robot: Robot) -> tuple[str, ...]:
+    """Return a warning for each size that no soft robot has, which is likely one in another unit."""
+    low, high = USUAL_SIZES
+    return tuple(
+        f"{name.replace('_', ' ')} {in_mm(value)} is outside {in_mm(low)} to {in_mm(high)}: check its unit, mm in files"
+        for name in ("outer_diameter", "length")
+        if not low <= (value := float(getattr(robot, name))) <= high
+    )
 
 
 def touching_stretch(robot: Robot) -> float:

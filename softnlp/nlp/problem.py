@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.errors import IllPosedError, nearest
-from softnlp.base.quantity import Quantity
+from softnlp.base.quantity import Quantity, expression
 from softnlp.nlp.case import Case, Equation
 from softnlp.nlp.optimality import Bounds, slopes
 
@@ -66,15 +66,19 @@ class Constraint:
         IllPosedError
             For bounds or a scale that cannot be meant.
         """
-        rows = ca.vec(self.expression)
-        try:
-            lower, upper = (
-                np.broadcast_to(np.asarray(b, float).ravel(), rows.shape[:1]) for b in (self.lower, self.upper)
-            )
-        except ValueError:
-            raise IllPosedError(f"constraint '{self.name}': expected one bound, or {rows.numel()}") from None
+        if not isinstance(self.name, str) or not self.name.strip():
+            raise IllPosedError(f"expected a name for each constraint, got {self.name!r}")
+        rows = ca.vec(expression(self.expression, f"constraint '{self.name}'"))
+        if not rows.numel():
+            raise IllPosedError(f"constraint '{self.name}': expected an expression of at least one entry")
+        lower, upper = (self._bound(b, rows.numel()) for b in (self.lower, self.upper))
         if not np.all(lower <= upper):
             raise IllPosedError(f"constraint '{self.name}': expected lower <= upper")
+        if np.any(lower == np.inf) or np.any(upper == -np.inf):
+            raise IllPosedError(f"constraint '{self.name}': no number lies between its bounds")
+        numbers = isinstance(self.scale, ca.MX | ca.DM) or np.asarray(self.scale).dtype.kind in "fiu"
+        if not numbers:
+            raise IllPosedError(f"constraint '{self.name}': expected a scale above 0, got {self.scale!r}")
         scale = ca.MX(self.scale)
         if not scale.is_scalar():
             raise IllPosedError(f"constraint '{self.name}': expected one scale for all entries, got {scale.numel()}")
@@ -87,6 +91,18 @@ class Constraint:
             raise IllPosedError(f"constraint '{self.name}': two different bounds need a scale that is a number")
         bound = np.where(np.isfinite(lower), lower, np.where(np.isfinite(upper), upper, 0.0))
         return (rows - bound) / scale, lower - bound, upper - bound
+
+    def _bound(self, given: Any, entries: int) -> Array:
+        """Return a bound of each entry."""
+        try:
+            bound = np.asarray(given)
+        except ValueError:  # of lists of several lengths
+            bound = np.array("")
+        if bound.dtype.kind not in "fiu":
+            raise IllPosedError(f"constraint '{self.name}': expected bounds that are numbers, got {given!r}")
+        if bound.size not in (1, entries):
+            raise IllPosedError(f"constraint '{self.name}': expected one bound, or {entries}")
+        return np.broadcast_to(bound.astype(float).ravel(), (entries,))
 
 
 @dataclass(frozen=True, eq=False)

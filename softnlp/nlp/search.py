@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 
 _STEPS = 15
 _SMALL = 1e-3  # a scaled quantity below this moves by parts of this
+_MOST = 300  # iterations of all steps from all starts: what is found at all is found sooner
 _NEAR = 0.2  # part by which a free quantity may move in one step
 
 
@@ -32,15 +33,18 @@ def minima(starts: Sequence[Start], tolerance: float) -> list[Solution]:
     tolerance : within which equations and bounds hold at a solution.
     """
     found = [start.engine.solve(start.p, start.x) for start in starts]
-    if not any(solution.holds(tolerance) for solution in found):
-        found += [in_steps(start, tolerance) for start in starts]
+    left = _MOST
+    for start in starts if not any(solution.holds(tolerance) for solution in found) else ():
+        found.append(in_steps(start, tolerance, left))
+        left -= found[-1].iterations
     return found
 
 
-def in_steps(start: Start, tolerance: float) -> Solution:
+def in_steps(start: Start, tolerance: float, most: int = _MOST) -> Solution:
     """Return where solves lead that keep the free quantities near the last solution: slower, and more robust.
 
-    Its residual is infinite where a bound of the last step still holds it.
+    most : iterations, after which no step is begun but the first. Its residual is infinite where a bound of the last
+    step still holds it.
     """
     x, n = start.x, start.engine.problem.free_size
     near, spent = _NEAR, 0
@@ -54,6 +58,8 @@ def in_steps(start: Start, tolerance: float) -> Solution:
             return replace(found, iterations=spent)
         else:
             x = found.x
+        if spent >= most:
+            break
     return replace(found, residual=np.inf, iterations=spent)
 
 

@@ -5,7 +5,7 @@ Files carry the unit in the name of a number; the package itself stays in SI.
 
 from softnlp.base.files import write_whole
 from softnlp.results.dataset import netcdf_bytes, to_dataset
-from softnlp.results.document import json_text, to_json
+from softnlp.results.document import json_text
 from softnlp.results.folder import (
     Body,
     ContactView,
@@ -16,6 +16,7 @@ from softnlp.results.folder import (
     view_of_dataset,
     view_of_run,
 )
+from softnlp.results.study import to_json
 from softnlp.results.table import table_lines, table_text, write_table
 
 __all__ = [

@@ -13,6 +13,7 @@ from softnlp.base.netcdf import dataset_bytes, flag_attributes, said
 from softnlp.model.inputs import file_attributes, pressure_bar
 from softnlp.model.quantities import Model
 from softnlp.nlp.solver import EquationResidual
+from softnlp.results.document import require_run
 from softnlp.statics.step import Run, Step
 from softnlp.studies.fields import (
     BLOCKED_FORCE,
@@ -60,9 +61,15 @@ def to_dataset(run: Run) -> xr.Dataset:
         the
         lines of the certificate. Numbers of a step without a solution are NaN (`stable` is -1, as
         under a dead tip moment).
+
+    Raises
+    ------
+    InputError
+        For the result of another study, naming what takes it.
     """
     import xarray as xr
 
+    run = require_run(run, "softnlp.to_dataset")
     steps, pressure = run.steps, OUTPUTS["pressure"]
     points = max((_points(step) for step in steps), default=0)
     sizes = {"axis": 3, "row": 3, "col": 3, "chamber": run.robot.chambers, "s": points}

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from softnlp.base.errors import InputError
 from softnlp.model.inputs import asked_tables, contact_table, package_version, pressure_bar, tidy
 from softnlp.model.quantities import Model
 from softnlp.nlp.solver import EquationResidual, Ipopt
@@ -21,20 +22,8 @@ from softnlp.studies.fields import BLOCKED_FORCE, closure_of, document_outputs, 
 _SAID = ("status", "iterations", "multipliers")
 
 
-def to_json(run: Run) -> dict[str, Any]:
-    """Return a run as plain dicts, lists, strings, numbers and None; no NaN or infinity.
-
-    Parameters
-    ----------
-    run
-        Of any study that returns one.
-
-    Returns
-    -------
-    dict
-        Numbers under keys with their unit, such as "tip_position_mm". A step without a solution keeps pressure, time,
-        status, message, residual, certificate and warnings; its other numbers are None.
-    """
+def run_document(run: Run) -> dict[str, Any]:
+    """Return a run as `softnlp.to_json` does."""
     return {
         **document_head(run.title, run.study, run.conventions.name),
         **asked_tables(Model(run.robot, run.material, run.coefficients), run.loads),
@@ -44,9 +33,23 @@ def to_json(run: Run) -> dict[str, Any]:
     }
 
 
+def require_run(found: Any, taker: str) -> Run:
+    """Return a run, or raise `InputError` that says what takes another result. taker : what was called."""
+    if isinstance(found, Run):
+        return found
+    name = type(found).__name__
+    advice = {
+        "Design": "; softnlp.to_json takes it, and the command softnlp design writes its files",
+        "TensileFit": "; softnlp.to_json takes it with its scenario, and the command softnlp identify writes its files",
+        "Identified": "; softnlp.to_json takes it with its scenario, and the command softnlp identify writes its files",
+        "Workspace": f"; it is a netCDF file already: {getattr(found, 'file', '')}",
+    }
+    raise InputError(f"{taker} takes a run, got a value of type {name}{advice.get(name, '')}")
+
+
 def json_text(run: Run) -> str:
-    """Return the document of `to_json` as text, ending in a newline."""
-    return document_text(to_json(run))
+    """Return the document of a run as text, ending in a newline."""
+    return document_text(run_document(run))
 
 
 def document_head(title: str, study: str, conventions: str) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from softnlp.model.inputs import loads_of_table, robot_of_table, versions
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.results.dataset import netcdf_bytes
-from softnlp.results.document import json_text
+from softnlp.results.document import json_text, require_run
 from softnlp.results.table import table_text
 from softnlp.statics.step import Run, SectionRadii
 from softnlp.studies.fields import BLOCKED_FORCE, INVERSE, closure_of, series, si_value, solved_pose
@@ -243,8 +243,9 @@ def save(
     Raises
     ------
     InputError
-        When the folder or a file cannot be written.
+        When the folder or a file cannot be written, and for the result of another study, naming what takes it.
     """
+    run = require_run(run, "softnlp.save")
     # The numbers are all made before the first file is written, so that an error leaves no half of the new results.
     contents: dict[str, str | bytes] = {
         RESULTS_FILE: netcdf_bytes(run),
@@ -267,6 +268,9 @@ def write_files(
     every = {**contents, "versions.json": json.dumps(versions(), indent=2) + "\n"}
     if scenario_text is not None:
         every["scenario.toml"] = scenario_text
+    for name in every:  # before the first of them is written
+        if (folder / name).is_dir():
+            raise InputError("cannot be written: Is a directory", source=str(folder / name))
     return [
         write_whole(folder / name, found.encode() if isinstance(found, str) else found) for name, found in every.items()
     ]

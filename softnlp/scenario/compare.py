@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import TIME_COLUMN, Columns
 from softnlp.base.errors import InputError, listed, nearest
-from softnlp.base.ranges import noise_note
+from softnlp.base.ranges import noise_note, unit_note
 from softnlp.base.reading import choices, read_text, shown
 from softnlp.model.contact_settings import CLOSURES, ContactSettings, ContactTask
 from softnlp.model.conventions import CONVENTIONS, Coefficients, Conventions
@@ -132,6 +132,7 @@ def compare_task(scenario: Scenario, path: str | PathLike[str], asked: Asked = A
         and any(name in compared for name in MEASURED_COLUMNS if name != _FORCE_COLUMN)
     ):
         notes.append("poses are compared with those of the free robot; --shape blocked takes the blocked ones")
+    readings = np.concatenate([of_robot.readings().ravel() for of_robot in rows])
     return CompareTask(
         scenario=scenario,
         path=Path(path),
@@ -144,7 +145,7 @@ def compare_task(scenario: Scenario, path: str | PathLike[str], asked: Asked = A
         shape=asked.shape,
         time=columns.numbers(TIME_COLUMN, blank=True),
         notes=tuple(notes),
-        warnings=noise_note(np.concatenate([of_robot.readings().ravel() for of_robot in rows])),
+        warnings=(*noise_note(readings), *unit_note(readings)),
         registration=registration,
     )
 

@@ -13,7 +13,7 @@ from pydantic import Field
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import Columns
 from softnlp.base.errors import InputError, located, of_table
-from softnlp.base.ranges import noise_note
+from softnlp.base.ranges import noise_note, unit_note
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import Coefficients
 from softnlp.model.materials import Material
@@ -144,7 +144,8 @@ def _robots(given: Read, table: MeasurementsTable) -> RobotTask:
         made.append(_measurements(rows, given.file.sigma, placed))
         cells.append(tuple(tuple(_cell(c, k, column) for column in header) for c, k in rows.places))
     free, bounds = _free(table, given.material)
-    notes = (*told, *noise_note(np.concatenate(readings)))
+    pressed = np.concatenate(readings)
+    notes = (*told, *noise_note(pressed), *unit_note(pressed))
     sets = made[0].robot.chamber_sets
     return RobotTask(tuple(made), free, bounds, header, tuple(cells), notes, registration_of(registration, sets))
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from softnlp.base.csv_columns import TIME_COLUMN, csv_rows
 from softnlp.base.errors import InputError, located
-from softnlp.base.ranges import READING, TIME, noise_note, without_noise
+from softnlp.base.ranges import READING, TIME, noise_note, unit_note, without_noise
 from softnlp.base.reading import LONGEST_NAME, did_you_mean, one_line, read_text, shown
 from softnlp.base.units import BAR
 from softnlp.scenario.laboratory import import_notes, or_imported
@@ -134,7 +134,7 @@ def _csv(text: str, sets: int) -> PressurePath:
     _require_possible(table, lines, columns)
     pressures = table[:, [columns[name] for name in columns if name != TIME_COLUMN]]
     path = _path(pressures, table[:, columns[TIME_COLUMN]].copy() if TIME_COLUMN in columns else None)
-    return path._replace(notes=(*path.notes, *notes))
+    return path._replace(notes=(*path.notes, *notes, *unit_note(pressures)))
 
 
 def _columns(header: list[str], sets: int, line: int) -> tuple[dict[str, int], tuple[str, ...]]:

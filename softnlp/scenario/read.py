@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from os import PathLike, fspath
@@ -11,7 +12,8 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from softnlp.base.errors import InputError, of_table
-from softnlp.base.reading import LARGEST_TOML, LONGEST_NAME, one_line, read_text, toml_tables
+from softnlp.base.ranges import file_unit_note
+from softnlp.base.reading import BACKSLASH_HINT, LARGEST_TOML, LONGEST_NAME, one_line, read_text, toml_tables
 from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
 from softnlp.model.conventions import COEFFICIENT_SETS, CONVENTIONS, Coefficients
 from softnlp.model.materials import material_from_table
@@ -31,6 +33,8 @@ from softnlp.scenario.workspace import workspace_task
 from softnlp.studies.plausibility import modulus_notes
 
 T = TypeVar("T")
+
+_ESCAPED = re.compile(r'^[^\n#]*file\w*\s*=[^\n]*"[^"\n]*\\[uU][0-9a-fA-F]{4}', re.MULTILINE)
 
 
 def load_scenario(path: str | PathLike[str]) -> Scenario:
@@ -69,6 +73,8 @@ def scenario_from_text(text: str, path: str | PathLike[str]) -> Scenario:
     try:
         return _scenario(text, Path(path))
     except InputError as error:
+        if "no such file" in error.message and _ESCAPED.search(text):
+            error = type(error)(f"{error.message}; {BACKSLASH_HINT}", table=error.table, key=error.key)
         raise placed(error, fspath(path)) from None
 
 
@@ -126,7 +132,7 @@ def _scenario(text: str, path: Path) -> Scenario:
         numerics=numerics,
         contact=contact,
         task=task,
-        warnings=(*warnings, *unlikely, *steps.notes),
+        warnings=(*warnings, *unlikely, *file_unit_note(data), *steps.notes),
         registration=getattr(file, "registration", None) if "registration" in data else None,
     )
 

@@ -8,6 +8,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from softnlp.base.errors import InputError
+from softnlp.base.processes import require_workers
 from softnlp.scenario.blocked_force import run_blocked
 from softnlp.scenario.data import Scenario, run_of, scenario_of
 from softnlp.scenario.design import run_design
@@ -60,6 +61,7 @@ def run_scenario(
         For anything but a scenario, and for what the study refuses.
     """
     study = scenario_of(scenario, None, "softnlp.run_scenario").study
+    require_workers(workers)
     if folder is not None and study != "workspace":
         raise InputError(f"only study 'workspace' takes one, not {study!r}; softnlp.save writes a run", key="folder")
     if study == "identify":

@@ -94,6 +94,8 @@ def _vector_or_fit(value: Any) -> list[float] | None:
 
 def _file_name(value: str) -> str:
     r"""Refuse control characters, which are escapes that nobody meant: in TOML "data\table.csv" holds a tab."""
+    if not value.strip():
+        raise wrong(f"expected a path, got {shown(value)}")
     if controls := [c for c in value if category(c) == "Cc"]:
         escape = as_typed(controls[0])
         raise wrong(f"expected a path, got '{as_typed(value)}', where {escape} is one character: {BACKSLASH_HINT}")

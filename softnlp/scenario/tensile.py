@@ -21,7 +21,14 @@ from softnlp.scenario.data import Read, Scenario
 from softnlp.scenario.laboratory import import_notes, laboratory_columns
 from softnlp.scenario.schema import FileName, ImportSettings, Label, Positive, optional_keys, wrong
 from softnlp.studies.measurements import TensileTask
-from softnlp.studies.plausibility import Check, area_check, divisor_checks, stiffness_checks
+from softnlp.studies.plausibility import (
+    Check,
+    area_check,
+    divisor_checks,
+    percent_check,
+    stiffness_checks,
+    true_checks,
+)
 
 if TYPE_CHECKING:  # imported where needed: to read a scenario takes none of them
     from softnlp.studies.tensile import LawFit, TensileFit
@@ -154,8 +161,10 @@ def _curve(columns: Columns, table: TensileTable, imported: bool) -> tuple[Array
         name, of_stress = _first(columns, _STRETCHES), _first(columns, _STRESSES)
         factor, zero = _STRETCHES[name]
         stretch, stress = zero + factor * columns.numbers(name), columns.numbers(of_stress) * _STRESSES[of_stress]
+        checks = (percent_check(stretch),) if name == "strain_percent" else ()
+        checks += true_checks(stretch, stress) if table.stress == "true" else ()
         if "force_N" in columns:
-            checks = divisor_checks(columns.numbers("force_N", blank=True), stress)
+            checks += divisor_checks(columns.numbers("force_N", blank=True), stress)
     else:
         raise InputError(
             f"{columns.file}: expected columns stretch, stress_MPa or displacement_mm, force_N; it has "
@@ -223,9 +232,10 @@ def run_tensile(scenario: Scenario) -> TensileFit:
             density=task.density,
             start=task.start,
             numerics=scenario.numerics,
+            read=task.checks,
         )
     fits = {name: replace(law, warnings=(*law.warnings, *_further(task, law))) for name, law in fit.fits.items()}
-    return replace(fit, fits=fits, checks=(*task.checks, *fit.checks))
+    return replace(fit, fits=fits)
 
 
 def _further(task: TensileTask, fit: LawFit) -> tuple[str, ...]:

@@ -17,7 +17,9 @@ from softnlp.nlp.solver import FROM_SOLUTION, EquationResidual, Solution, certif
 from softnlp.statics.case import pose_entries
 from softnlp.statics.chain import Chain
 from softnlp.statics.condensed import linear_solver
-from softnlp.statics.posed import Problem, followed
+from softnlp.statics.guards import grid_error, hidden, off_branch, require_in_range
+from softnlp.statics.pose_grid import HOPELESS
+from softnlp.statics.posed import BOUNDS, Problem, followed
 
 Array = NDArray[np.float64]
 EngineName = Literal["auto", "ipopt", "newton"]
@@ -35,7 +37,8 @@ class Answer:
         As solved.
     status, message
         "solved" where every equation, constraint and bound holds, evaluated again, and, where something is minimised,
-        the first-order conditions do.
+        the first-order conditions do. What no robot can be is named as `softnlp.forward` names it: "no_equilibrium",
+        "unstable_material", "inaccurate" for a grid that does not show the rod.
     values
         (entries,) every quantity by name, free or fixed [SI].
     outputs
@@ -48,6 +51,8 @@ class Answer:
         nothing is minimised by an engine that has them [1].
     solution
         x, p and the engine's word.
+    discretisation_error
+        Estimated, of positions [L_0] and directions [1]: the grid is given, and not refined. None without a solution.
     """
 
     problem: Problem
@@ -58,6 +63,7 @@ class Answer:
     residuals: tuple[EquationResidual, ...]
     multipliers: Mapping[str, Array]
     solution: Solution
+    discretisation_error: float | None = None
 
     def __getitem__(self, name: str) -> Array:
         """Return a quantity or an output by name [SI] (entries,). Raises `KeyError` that names what is near."""
@@ -132,13 +138,13 @@ def solve(
     Raises
     ------
     IllPosedError
-        For names that are not quantities of the problem, and values of another size.
+        For names that are not quantities of the problem, and values of another size or that are not finite.
     InputError
-        For another engine.
+        For another engine, and pressures or loads outside the ranges of `softnlp.forward`.
     """
     if engine not in get_args(EngineName):
         raise InputError(f"expected one of {', '.join(get_args(EngineName))}, got {engine!r}", key="engine")
-    values = dict(values or {})
+    values = _numbers(values or {})
     compiled = problem.compiled
     p = compiled.pack(values)
     if isinstance(start, Answer):
@@ -146,7 +152,8 @@ def solve(
             raise IllPosedError("expected an answer of the same problem to start from")
         x = start.solution.x
     else:
-        x = problem._start(values, start or {})
+        x = problem._start(values, _numbers(start or {}))
+    require_in_range(problem, x, p)
     square, options = compiled.is_square, dict(ipopt or {})
     if engine == "newton" and not square:
 
@@ -154,16 +161,17 @@ def solve(
             return Reduced(compiled, held_states(compiled, linear_solver), problem.residuals)
 
         reduced = problem._kept("reduced", made)
-        return _judged(problem, reduced.minimise(p, x), tolerance)
+        return _judged(problem, reduced.minimise(p, x), x, tolerance)
     if engine == "newton":
-        return _judged(problem, problem._engine(newton_only=True).solve(p, x), tolerance)
+        return _judged(problem, problem._engine(newton_only=True).solve(p, x), x, tolerance)
     if engine == "ipopt" or not square:
-        return _judged(problem, problem._engine(ipopt_only=True, options=options).solve(p, x), tolerance)
+        return _judged(problem, problem._engine(ipopt_only=True, options=options).solve(p, x), x, tolerance)
     proposed = problem._engine(options=options).solve(p, x)
-    if not proposed.holds(tolerance):
-        return _judged(problem, proposed, tolerance)
+    answer = _judged(problem, proposed, x, tolerance)
+    if answer.status is not Status.SOLVED:
+        return answer
     found = problem._engine(ipopt_only=True, options={**FROM_SOLUTION, **options}).closed(proposed)
-    answer = _judged(problem, found, tolerance)
+    answer = _judged(problem, found, x, tolerance)
     away = float(np.max(np.abs(found.x - proposed.x)))
     if away <= _CLOSE and answer.status is Status.SOLVED:
         return answer
@@ -194,8 +202,8 @@ def follow(
     Returns
     -------
     tuple
-        Answers (steps + 1,) with the start; fewer where the path ends before, the last one then with the status "fold"
-        and without outputs.
+        Answers (steps + 1,) with the start; fewer where the path ends before, the last one then with the status "fold",
+        or that of a point which no robot can be, and without outputs.
 
     Raises
     ------
@@ -206,10 +214,11 @@ def follow(
         raise IllPosedError("a path begins at a solution of this problem, which has as many equations as unknowns")
     if steps < 1:
         raise InputError(f"expected at least one step, got {steps}", key="steps")
-    compiled = problem.compiled
+    compiled, values = problem.compiled, _numbers(values)
     fixed = {q.name: start.values[q.name] for q in compiled.fixed}
     compiled.pack(values)  # for its errors
     begin, end = compiled.pack(fixed), compiled.pack({**fixed, **values})
+    require_in_range(problem, start.solution.x, end)
     entries = _pose_entries(problem)
     answers = [start]
     for k in range(steps):
@@ -220,13 +229,28 @@ def follow(
             answers[-1].solution.x,
             entries,
         )
-        answer = _judged(problem, found.solution, tolerance)
+        answer = _judged(problem, found.solution, answers[-1].solution.x, tolerance)
         if not found.arrived:
             message = f"{Status.FOLD.advice}; it was followed for {100 * (k + found.fraction) / steps:.3g} % of the way"
             answers.append(replace(answer, status=Status.FOLD, message=message, outputs={}))
             break
         answers.append(answer)
+        if answer.status is not Status.SOLVED:
+            break
     return tuple(answers)
+
+
+def _numbers(values: Mapping[str, Any]) -> dict[str, Array]:
+    """Return values by name as finite numbers, or raise `IllPosedError`."""
+    found = {}
+    for name, value in values.items():
+        try:
+            found[name] = np.asarray(value, float)
+        except (TypeError, ValueError):
+            found[name] = np.array(np.nan)
+        if not np.all(np.isfinite(found[name])):
+            raise IllPosedError(f"'{name}' takes finite numbers, got {value!r}")
+    return found
 
 
 def _pose_entries(problem: Problem) -> NDArray[np.intp]:
@@ -237,19 +261,30 @@ def _pose_entries(problem: Problem) -> NDArray[np.intp]:
     return np.concatenate(found)
 
 
-def _judged(problem: Problem, solution: Solution, tolerance: float) -> Answer:
-    """Return an answer by what its residual and first-order conditions say, evaluated again."""
+def _judged(problem: Problem, solution: Solution, start: Array, tolerance: float) -> Answer:
+    """Return an answer by what its residual and first-order conditions say, evaluated again; start : x before it."""
     compiled = problem.compiled
     status, message = Status.SOLVED, Status.SOLVED.advice
-    if not solution.holds(tolerance):
+    holds = solution.holds(tolerance)
+    refusal = off_branch(problem, solution) if holds or not compiled.free else None
+    error = grid_error(problem, solution, _pose_entries(problem)) if holds else None
+    off = hidden(compiled, solution, start) if holds else ""
+    if not holds and (refusal is None or refusal[0] is Status.DIVERGED):
         status = Status.DIVERGED
         message = f"no solution was found ({solution.engine_status}); start nearer, or follow a path from a solution"
+    elif refusal is not None:
+        status, message = refusal
+    elif off:
+        status, message = Status.DIVERGED, f"no solution was found: {off}"
+    elif error is not None and error > HOPELESS:
+        status = Status.INACCURATE
+        message = f"the grid does not show the rod: its estimated error is {error:.2g} L_0; take more intervals"
     elif compiled.has_objective and not solution.optimal:
         status, message = Status.NOT_OPTIMAL, not_optimal(solution.kkt, solution.engine_status)
     multipliers: dict[str, Array] = {}
     if compiled.has_objective and solution.ipopt is not None and solution.ipopt.rows.size:
         multipliers = {e.name: solution.ipopt.rows[e.rows] for e in compiled.equations}
-        multipliers["bounds"] = solution.ipopt.bounds[: compiled.free_size]
+        multipliers[BOUNDS] = solution.ipopt.bounds[: compiled.free_size]
     return Answer(
         problem=problem,
         status=status,
@@ -259,4 +294,5 @@ def _judged(problem: Problem, solution: Solution, tolerance: float) -> Answer:
         residuals=certificate(compiled, solution),
         multipliers=multipliers,
         solution=solution,
+        discretisation_error=error,
     )

@@ -1,8 +1,9 @@
-"""Whether a shape is possible as a body: a bend no sharper than the radius, and no part of the body inside another.
+"""Whether a shape is possible as a body: no negative length, no bend too sharp, no part of the body inside another.
 
 The body of outer radius r is the union of discs about the axis. Where curvature times r reaches 1 neighbouring discs
-meet: the inside of the bend has no length left. Below that discs may only meet where the axis has turned by pi or more
-in between (curve and point unrolled into a plane: the distance from a point of both discs has two minima below r), at
+meet: the inside of the bend has no length left. Where a load compresses the rod to nothing (v_z <= 0) there is none at
+all, and the curvature counts as infinite. Below that discs may only meet where the axis has turned by pi or more in
+between (curve and point unrolled into a plane: the distance from a point of both discs has two minima below r), at
 least pi r along the axis from each other. Then there is a pair of points nearest to each other, closer than 2 r, or the
 face of an end lies in another part.
 """
@@ -22,6 +23,7 @@ TURN = 3.0
 """Axes that turn by less [rad] never lead one part of a body into another; pi, less what shear and grids may take."""
 WARNED = 0.9
 """Curvature times outer radius from which a bend is told of."""
+_ANY = 100.0  # above it the number says nothing but that the rod is compressed to nearly nothing
 
 _SMALL_TURN = 1e-4  # below it a series is more accurate than the quotient [rad]
 _STEP = 0.3  # of the radius: how far apart stations are looked at
@@ -37,7 +39,7 @@ class Fit:
     Attributes
     ----------
     tightness
-        Largest curvature of the axis times the outer radius [1].
+        Largest curvature of the axis, per its deformed length, times the outer radius [1]; inf where v_z <= 0.
     overlaps
         Whether parts that are no neighbours lie inside each other.
     """
@@ -51,12 +53,20 @@ class Fit:
         return self.tightness >= 1 or self.overlaps
 
     @property
+    def inside_out(self) -> bool:
+        """Whether the rod is compressed to nothing somewhere, or past it."""
+        return bool(np.isinf(self.tightness))
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What to know of it."""
         found = []
-        if self.tightness >= 1:
+        if self.inside_out:
+            found.append("a part of the body has negative length (v_z <= 0), so no body can take this shape")
+        elif self.tightness >= 1:
+            number = f"{self.tightness:.2f}" if self.tightness <= _ANY else f"above {_ANY:g}"
             found.append(
-                f"curvature times outer radius is {self.tightness:.2f}: from 1 on the inside of the bend has negative "
+                f"curvature times outer radius is {number}: from 1 on the inside of the bend has negative "
                 "length, so no body can take this shape"
             )
         elif self.tightness >= WARNED:
@@ -76,14 +86,22 @@ def fit_of(position: Array, rotation: Array, radius: float, curvature: Array | N
     """Return how a shape suits a body.
 
     position : (M, 3) of the axis [m]. rotation : (M, 3, 3), columns are the body axes. radius : outer, deformed [m].
-    curvature : (M,) of the axis per its deformed length [1/m]; by default that of the screws between stations.
+    curvature : (M,) of the axis per its deformed length [1/m], inf where v_z <= 0; by default that of the screws
+    between stations.
     """
     if curvature is None:
         chord = np.linalg.norm(np.diff(position, axis=0), axis=1)
         turn = np.linalg.norm(turns(rotation)[:, :2], axis=1)
-        curvature = 2 * np.sin(turn / 2) / chord  # of a circular arc over this chord
+        with np.errstate(divide="ignore", invalid="ignore"):  # a circular arc over this chord
+            curvature = np.where(advances(position, rotation) > 0, 2 * np.sin(turn / 2) / chord, np.inf)
     tightness = float(np.max(curvature)) * radius
     return Fit(tightness, bool(overlapping(position[None], rotation[None, :, :, 2], np.array([radius]))[0]))
+
+
+def advances(position: Array, rotation: Array) -> Array:
+    """Return (M - 1,) how far the axis goes on from each station to the next, against its direction where negative."""
+    found: Array = ((rotation[:-1, :, 2] + rotation[1:, :, 2]) * np.diff(position, axis=0)).sum(axis=1)
+    return found
 
 
 def turns(rotation: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -22,6 +22,7 @@ from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.transcription import MultipleShooting, Transcription
 from softnlp.statics.branch import stretch_on_branch
 from softnlp.statics.chain import Chain, chain_case
+from softnlp.statics.compiled import RodEquations
 from softnlp.statics.kept import kept_equations
 from softnlp.statics.loadcase import LoadCase, load_case
 from softnlp.statics.unloaded import unloaded_case
@@ -149,6 +150,19 @@ def unloaded_values(case: LoadCase | Chain, values: Mapping[str, Array]) -> dict
             own = {q.name: values[q.name] for q in load.quantities(functions.model)}
             resting |= load.at_rest(own, tip)
     return resting
+
+
+def rods(
+    case: LoadCase | Chain, values: Mapping[str, Array]
+) -> Iterator[tuple[RodEquations, Mapping[str, Array], int]]:
+    """Yield what is compiled of each segment, its own of the values by key, SI, and where x has its stretch."""
+    if isinstance(case, LoadCase):
+        yield kept_equations(case.functions.model), values, 0
+        return
+    at = 0
+    for k, equations in enumerate(case.equations_of):
+        yield equations, case.body.of_segment(k, values), at
+        at += 1 + case.symbols[2 * k + 1].numel()
 
 
 def pose_entries(case: LoadCase | Chain) -> NDArray[np.intp]:

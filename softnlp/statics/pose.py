@@ -19,6 +19,9 @@ from softnlp.statics.step import Pose, Shape
 Array = NDArray[np.float64]
 
 SHAPE_POINTS = 61
+LEAST_STRAIN, MOST_STRAIN = 0.5, 2.0
+"""Strains v_z by loads outside these are told of: the stiffness is that at the stretch from pressure alone."""
+
 _SUBSTEPS = 4
 # Of the bending angle's quadrature.
 _SAMPLES, _ZOOMS, _MOST_PARTS = 6, 12, 225
@@ -139,6 +142,7 @@ def pose_of(
     """Assemble a pose. outputs : of the load case, SI. unloaded_tip : tip at this pressure without loads [m].
 
     bending : of `bending_angle`, in place of the output, whose quadrature is of second order at a kink.
+    stable : where it can be said: not of a rod that is compressed to nothing somewhere.
     """
     stretch = float(outputs["stretch"][0])
     R = np.asarray(outputs["tip_rotation"])
@@ -146,7 +150,7 @@ def pose_of(
     axis = R[:, 2]
     return Pose(
         stretch=stretch,
-        stable=stable,
+        stable=None if np.min(shape.shear_extension[:, 2]) <= 0 else stable,
         tip_position=tip,
         tip_displacement=tip - unloaded_tip,
         tip_rotation=R,
@@ -162,12 +166,18 @@ def pose_of(
 def pose_warnings(model: Model, pose: Pose) -> tuple[str, ...]:
     """Return what a designer should know of a solved pose: fitted range, touching chambers, stability, its body."""
     found = model.section.warnings(pose.stretch)
-    if np.min(pose.shape.shear_extension[:, 2]) <= 0:
+    if pose.fit.inside_out:
         found.append("the load compresses the rod to nothing somewhere (v_z <= 0); the model does not hold there")
-    if pose.stable is None:
+    elif pose.stable is None:
         found.append(
             "stability is undefined: a dead tip moment in space has no potential, so there is no energy to be least"
         )
-    elif not pose.stable:
+    low, high = (float(v) for v in (pose.shape.shear_extension[:, 2].min(), pose.shape.shear_extension[:, 2].max()))
+    if 0 < low < LEAST_STRAIN or high > MOST_STRAIN:
+        found.append(
+            f"the load strains the rod to {low if low < LEAST_STRAIN else high:.3g} of its length somewhere (v_z): the "
+            "model takes that strain as small"
+        )
+    if pose.stable is False:
         found.append("this equilibrium is not stable: the real robot buckles away from it")
     return (*found, *pose.fit.warnings)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeVar
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.errors import IllPosedError
-from softnlp.base.quantity import Quantity
+from softnlp.base.quantity import Quantity, expression
 from softnlp.nlp.continuation import Followed, Path, follow, straight_path
 from softnlp.nlp.optimality import Bounds
 from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
@@ -24,6 +24,9 @@ from softnlp.statics.loadcase import LoadCase
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
+
+BOUNDS = "bounds"
+"""What the multipliers of bounds stand under, beside the names of equations and constraints."""
 
 _LARGEST_JUMP = (
     0.6  # of a position or direction cosine between a solution and its prediction: another branch is further
@@ -204,9 +207,33 @@ def problem(
     if len(set(names)) < len(names):
         raise IllPosedError(f"two cases are named '{next(n for n in names if names.count(n) > 1)}'")
     known = {q.symbol.__hash__(): q for q in [q for c in cases for q in own_quantities(c)] + list(given)}
+    rows = [c.name for c in constraints]
+    taken = [*rows, BOUNDS, *(prefix + e.name for c in cases for e in c.equations for prefix in ("", f"{c.name}: "))]
+    for name in rows:
+        if taken.count(name) > 1:
+            raise IllPosedError(f"two constraints or equations are named '{name}'")
+    _require_known(cases, known.values(), [
+        *((f"constraint '{c.name}'", c.expression) for c in constraints),
+        *([] if objective is None else [("objective", objective)]),
+        *(("residual", r) for r in residuals),
+        *((f"case '{c.name}'", c.residuals) for c in cases),
+    ])  # fmt: skip
+    if objective is not None and not objective.is_scalar():
+        raise IllPosedError(f"objective: expected one number to minimise, got {objective.numel()}")
     column = ca.vertcat(*map(ca.vec, residuals)) if residuals else None
     alone = column if objective is None else None
     if column is not None:
         objective = ca.sumsqr(column) / 2 + (0 if objective is None else objective)
     compiled = compile_problem(list(known.values()), cases, free=free, constraints=constraints, objective=objective)
     return Problem(compiled, tuple(cases), alone)
+
+
+def _require_known(
+    cases: Sequence[LoadCase | Chain], quantities: Iterable[Quantity], used: Iterable[tuple[str, Any]]
+) -> None:
+    """Raise `IllPosedError` for what is no expression, or has a symbol that no case and no quantity declares."""
+    known = {q.symbol.__hash__() for q in quantities} | {s.__hash__() for c in cases for s in c.symbols}
+    for what, given in used:
+        for symbol in ca.symvar(expression(given, what)):
+            if symbol.__hash__() not in known:
+                raise IllPosedError(f"{what}: '{symbol.name()}' is no quantity of the cases, nor in given=[...]")

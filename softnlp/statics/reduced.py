@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 POSITION, ROTATION, MOMENT = slice(0, 3), slice(3, 12), slice(12, 15)
 STATE = 15
+_LEAST = 1e-300  # which changes no curvature, and divided by 0 is infinite
 _TURNING = slice(3, 15)  # rotation and moment; nothing depends on the position
 
 
@@ -158,8 +159,8 @@ def smallest_minor(S: Any) -> Any:
 
 
 def larger_curvature(functions: RodFunctions, known: Any, states: list[Any], c: Any) -> Any:
-    """Return the largest of a curvature and those of the axis at states, per its deformed length."""
+    """Return the largest of a curvature and those of the axis at states, per its deformed length; inf if v_z <= 0."""
     for x in states:
         v, u = functions.strains(x[: rod.STATE_SIZE], c)
-        known = ca.fmax(known, ca.sqrt(u[0] ** 2 + u[1] ** 2) / v[2])
+        known = ca.fmax(known, (ca.sqrt(u[0] ** 2 + u[1] ** 2) + _LEAST) / ca.fmax(v[2], 0))
     return known

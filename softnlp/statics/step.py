@@ -68,7 +68,8 @@ class Pose:
     stretch
         lambda, of the pressure alone [1].
     stable
-        No conjugate point on the rod, so that the energy is least; None under a dead tip moment, which has no energy.
+        No conjugate point on the rod, so that the energy is least; None under a dead tip moment, which has no energy,
+        and where the rod is compressed to nothing.
     tip_position
         (3,) [m].
     tip_displacement
@@ -105,8 +106,9 @@ class Pose:
     def fit(self) -> Fit:
         """Whether a body can take the shape, found when it is first asked for."""
         shape = self.shape
-        shortened = np.maximum(shape.shear_extension[:, 2], np.finfo(float).tiny)  # curvature is per reference length
-        curvature = np.hypot(shape.curvature[:, 0], shape.curvature[:, 1]) / shortened
+        bend, v_z = np.hypot(shape.curvature[:, 0], shape.curvature[:, 1]), shape.shear_extension[:, 2]
+        curvature = np.full(bend.shape, np.inf)
+        np.divide(bend, v_z, out=curvature, where=v_z > 0)
         return fit_of(shape.position, shape.rotation, self.radii.outer, curvature)
 
 

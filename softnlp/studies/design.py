@@ -10,7 +10,7 @@ from math import isfinite, prod
 from typing import Any
 
 from softnlp.base.errors import InputError
-from softnlp.base.processes import worker_pool
+from softnlp.base.processes import require_workers, worker_pool
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.model.materials import Material
@@ -111,8 +111,9 @@ def design(
     Raises
     ------
     InputError
-        For a task that cannot be meant, or a search without optuna.
+        For a task or a number of workers that cannot be meant, or a search without optuna.
     """
+    require_workers(workers)
     setting = Setting(
         robot, material, coefficients, conventions, checked_loads(loads), checked_contact(contact), numerics
     )

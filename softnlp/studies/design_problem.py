@@ -236,9 +236,8 @@ def _bodies(free: LoadCase, robot: Robot, allow: tuple[str, ...]) -> Iterator[Co
         return
     angle, stretch = free.outputs["bending_angle"], free.outputs["stretch"]
     tightness = angle * robot.outer_radius / (robot.length * stretch**1.5)
-    yield Constraint(SELF_INTERSECTION, tightness, -np.inf, _TIGHTEST)
-    if free.transcribed.points.size == 0:
-        yield Constraint(SELF_INTERSECTION, angle / (2 * np.pi), -np.inf, _TIGHTEST)
+    turns = [angle / (2 * np.pi)] if free.transcribed.points.size == 0 else []
+    yield Constraint(SELF_INTERSECTION, ca.vertcat(tightness, *turns), -np.inf, _TIGHTEST)
 
 
 def _on_the_branch(free: LoadCase) -> Iterator[Constraint]:

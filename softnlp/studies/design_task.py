@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
+from itertools import pairwise, product
 from math import inf, isfinite, prod
 from numbers import Integral
 from typing import Any
@@ -268,6 +268,9 @@ def check_task(task: DesignTask, setting: Setting) -> None:
     InputError
         With the key, for the first thing that is not right.
     """
+    for key in ("choices", "requirements"):
+        if not isinstance(getattr(task, key), Mapping):
+            raise InputError("expected a table by name", key=key)
     for name, values in task.choices.items():
         _check_choice(name, values)
     _check_pressure(task.pressure)
@@ -281,19 +284,21 @@ def check_task(task: DesignTask, setting: Setting) -> None:
         raise InputError("the gap may be required but not optimised: it is the smallest of several", key=way)
     for name, limits in task.requirements.items():
         _known(name, f"requirements.{name}")
-        if not limits.lower <= limits.upper or limits == Limits():
+        if not isinstance(limits, Limits) or not _ordered(limits.lower, limits.upper) or limits == Limits():
             raise InputError("expected a least value, a largest one above it, or both", key=f"requirements.{name}")
         if name == "chamber_gap" and limits.upper < inf:
             raise InputError("expected a least value only", key=f"requirements.{name}")
     counts = [*(r.chamber_sets for r in task.lists.get("robot", (setting.robot,))), *task.lists.get("chamber_sets", ())]
     fewest = min(task.lists.get("chamber_sets", counts))
-    if not task.sets or any(not 0 <= k < fewest for k in task.sets) or len(set(task.sets)) < len(task.sets):
-        raise InputError(f"expected different sets of 0 to {fewest - 1}, got {list(task.sets)}", key="sets")
+    whole = isinstance(task.sets, Sequence) and all(_is_whole(k) and 0 <= k < fewest for k in task.sets)
+    if not task.sets or not whole or len(set(task.sets)) < len(task.sets):
+        got = list(task.sets) if isinstance(task.sets, Sequence) else task.sets
+        raise InputError(f"expected different sets of 0 to {fewest - 1}, got {got}", key="sets")
     for rule in task.allow:
         if rule not in ALLOWABLE:
             raise InputError(f"expected rules of {', '.join(ALLOWABLE)}, got {rule!r}", key="allow")
     for key, value in (("starts", task.starts), ("trials", task.trials)):
-        if value is not None and value < 1:
+        if value is not None and not (_is_whole(value) and value >= 1):
             raise InputError(f"expected a number of at least 1, got {value}", key=key)
     if task.needs_force and task.is_continuous and setting.contact.closure == "weighted":
         raise InputError(
@@ -305,7 +310,16 @@ def check_task(task: DesignTask, setting: Setting) -> None:
 
 def _known(name: str, key: str) -> None:
     if name not in OUTPUTS:
-        raise InputError(f"unknown output{nearest(name, OUTPUTS)}", key=key)
+        raise InputError(f"unknown output{nearest(str(name), OUTPUTS)}", key=key)
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, Integral) and not isinstance(value, bool)
+
+
+def _ordered(*values: Any) -> bool:
+    """Whether values are numbers, none smaller than the one before."""
+    return all(map(is_number, values)) and all(a <= b for a, b in pairwise(values))
 
 
 def _check_choice(name: str, values: Any) -> None:
@@ -325,7 +339,7 @@ def _check_choice(name: str, values: Any) -> None:
         if name in kinds:
             right = isinstance(value, kinds[name])
         elif name in COUNTS:
-            right = isinstance(value, Integral) and not isinstance(value, bool) and int(value) >= 1
+            right = _is_whole(value) and int(value) >= 1
         else:
             right = is_number(value) and isfinite(value) and value > 0
         if not right:
@@ -336,15 +350,17 @@ def _check_choice(name: str, values: Any) -> None:
 
 
 def _check_range(values: Range, key: str) -> None:
-    if not 0 <= values.lower < values.upper < inf:
-        raise InputError(f"expected 0 <= from < to, got {values.lower:g} to {values.upper:g}", key=key)
+    low, high = values.lower, values.upper
+    if not _ordered(0, low, high) or low == high or high == inf:
+        got = f"{low:g} to {high:g}" if is_number(low) and is_number(high) else f"{low!r} to {high!r}"
+        raise InputError(f"expected 0 <= from < to, got {got}", key=key)
 
 
 def _check_pressure(pressure: Any) -> None:
     if isinstance(pressure, Range):
         _check_range(pressure, "pressure")
     elif isinstance(pressure, PressureSteps):
-        if not 0 < pressure.step <= pressure.highest < inf:
+        if not _ordered(0, pressure.step, pressure.highest) or pressure.step == 0 or pressure.highest == inf:
             raise InputError("expected 0 < step <= highest", key="pressure")
         if pressure.highest / pressure.step > MOST_PRESSURES:
             raise InputError(

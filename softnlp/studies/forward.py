@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.errors import InputError
-from softnlp.base.ranges import FORCE, GRAVITY, MOMENT, PRESSURE
+from softnlp.base.ranges import PRESSURE
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.model.materials import Material
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
+from softnlp.statics.guards import LIMITS
 from softnlp.statics.kept import pose_solver
 from softnlp.statics.step import Run, Step
 
@@ -116,13 +117,13 @@ def pressure_table(pressures: Any, sets: int) -> NDArray[np.float64]:
 def checked_loads(loads: Loads) -> Loads:
     """Return loads as arrays of three finite numbers, or raise `InputError` naming the one that is not."""
     checked = {}
-    for name, limits in (("tip_force", FORCE), ("tip_moment", MOMENT), ("gravity", GRAVITY)):
+    for name in ("tip_force", "tip_moment", "gravity"):
         try:
             value = np.asarray(getattr(loads, name), dtype=float)
         except (TypeError, ValueError) as error:
             raise InputError("expected three numbers", key=name) from error
         if value.shape != (3,) or not np.all(np.isfinite(value)):
             raise InputError(f"expected three finite numbers, got {value.tolist()}", key=name)
-        limits.require(np.abs(value), name)
+        LIMITS[name].require(np.abs(value), name)
         checked[name] = value
     return Loads(**checked)

@@ -6,7 +6,8 @@ falls or stays from there on; a quantity that was read for another one shows in 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import inf, isfinite
 from typing import Any
 
@@ -24,7 +25,10 @@ SMALLEST_STRETCH: tuple[Range, Range] = (0.3, inf), (0.3, inf)
 STRESS_AT_1: tuple[Range, Range] = (-0.03, 0.03), (-0.3, 0.05)  # a slack specimen is common and pardoned for longer
 SHEAR_MODULUS: tuple[Range, Range] = (0.002, 2.0), (0.001, 10.0)  # [MPa]
 FIRST: tuple[Range, Range] = (0.3, 5.0), (0.15, inf)
+SLACK: tuple[Range, Range] = (0.0, 0.03), (0.0, 0.1)  # of a tenth makes the modulus a quarter too small
 GROWTH: tuple[Range, Range] = (-1.5, 0.5), (-inf, inf)
+TRUE_GROWTH: tuple[Range, Range] = (0.3, inf), (-inf, inf)  # 1 for a neo-Hookean silicone, 0 where it is engineering
+IN_PERCENT: tuple[Range, Range] = (1.1, inf), (1.05, inf)  # a test of 5 % of a silicone is none, but a fraction is
 UNLOADINGS: tuple[Range, Range] = (0, 0), (0, inf)
 R_SQUARED: tuple[Range, Range] = (0.9, 1.0), (0.5, 1.0)
 AREA: tuple[Range, Range] = (1.5, 2000.0), (0.0, inf)  # [mm^2]
@@ -35,11 +39,13 @@ _NEAR, _NEARER = 0.08, 0.1  # of extension, and of the largest: a test that begi
 _NOTHING = 1e-30  # [Pa], in place of a stress of 0
 _STIFF = 2.0  # times the stiffest silicone of the library
 _SAME = 0.02  # relative, of areas
+_SLACKEST, _TRIED, _CLEARLY = 0.6, 61, 20.0  # of the extension; how many are tried; F of one that is seen
 _TURN, _RESTART = 0.2, 0.1  # of the range of the stretch: the least fall; how near to its end another test starts
 _READINGS = (
     (1e6, "stress in Pa (name its column stress_Pa), or a specimen's width and thickness in m"),
     (1e3, "stress in kPa (name its column stress_kPa), or force in mN"),
     (145.0, "stress in psi"),
+    (102.0, "force in gram-force"),
     (1e-3, "stress in GPa, or force in kN"),
 )  # the modulus is this many times the true one
 
@@ -48,6 +54,14 @@ _BEGINS_LATER = (
     "the stress begins at a larger stretch than 1: looks like a slack specimen, like the distance between the grips in "
     "displacement_mm, or like stretch in a column strain; take off what it begins at"
 )
+_REACH, _MODULUS, _CROSS = "largest stretch", "shear modulus of the data", "cross-section"
+_GROWS = "growth of the reduced stress with the stretch"
+_AGREEING = (
+    ((_REACH, False), (_GROWS, False)),
+    ((_REACH, False), (_MODULUS, True)),
+    ((_CROSS, False), (_MODULUS, True)),
+    ((_CROSS, True), (_MODULUS, False)),
+)  # pairs of checks, and whether their numbers are high: one mistake in a unit makes both unusual
 
 
 @dataclass(frozen=True)
@@ -122,11 +136,22 @@ def messages(checks: tuple[Check, ...], verdict: str) -> tuple[str, ...]:
     return tuple(check.message for check in checks if check.verdict == verdict)
 
 
-def curve_checks(stretch: Array, stress: Array) -> tuple[Check, ...]:
-    """Return the checks of a tensile test (points,) [1], [Pa]; those that need an earlier one end at its failure."""
+def agreed(checks: Sequence[Check]) -> tuple[Check, ...]:
+    """Return checks of which two that are unusual in a way that one mistake explains fail."""
+    unusual = {check.name: bool(check.value > check.usual[1]) for check in checks if check.verdict == "warned"}
+    both = {name for pair in _AGREEING if all(unusual.get(name) is high for name, high in pair) for name, _ in pair}
+    return tuple(replace(check, possible=check.usual) if check.name in both else check for check in checks)
+
+
+def curve_checks(stretch: Array, stress: Array, read: Sequence[Check] = ()) -> tuple[Check, ...]:
+    """Return the checks of a tensile test (points,) [1], [Pa]; those that need an earlier one end at its failure.
+
+    read : what is to be said of how it was read, told with them.
+    """
     reach = float(np.max(stretch))
     checks = [
-        Check("largest stretch", reach, *LARGEST_STRETCH, _largest(stretch)),
+        *read,
+        Check(_REACH, reach, *LARGEST_STRETCH, _largest(stretch)),
         Check(
             "smallest stretch",
             float(np.min(stretch)),
@@ -144,12 +169,12 @@ def curve_checks(stretch: Array, stress: Array) -> tuple[Check, ...]:
     lost = (stretch > stretch[top]) & (stress < 0.5 * stress[top])
     if np.any(lost):
         checks.append(Check("points after the break", float(np.sum(lost)), *UNLOADINGS, _BROKEN))
-    for more in (_beginning, _shear_modulus, _growth):
+    for more in (_beginning, _slack, _shear_modulus, _growth):
         if messages(tuple(checks), "failed"):
             break
         with np.errstate(all="ignore"):  # a number that cannot be represented fails
             checks += more(stretch, stress)
-    return tuple(checks)
+    return agreed(checks)
 
 
 def law_checks(modulus: float, r_squared: float, stretch: Array, stress: Array) -> tuple[Check, ...]:
@@ -214,15 +239,33 @@ def stiffness_checks(stretch: Array, stress: Array) -> tuple[Check, ...]:
     )
 
 
+def percent_check(stretch: Array) -> Check:
+    """Return the check of a column of strain in percent, by the stretch that was read from it (points,) [1]."""
+    likely = "looks like strain as a fraction in a column strain_percent; name it strain"
+    return Check("largest stretch of strain_percent", float(np.max(stretch)), *IN_PERCENT, likely)
+
+
+def true_checks(stretch: Array, stress: Array) -> tuple[Check, ...]:
+    """Return the check of a stress that is said to be true (points,) [1], [Pa], before it is divided by the stretch."""
+    found = _reduced_growth(stretch, stress)
+    if found is None:
+        return ()
+    (low, high), possible = TRUE_GROWTH
+    likely = 'looks like engineering stress; leave out stress = "true" where it is'
+    return (
+        Check("growth of the reduced true stress with the stretch", found[0], (low - found[1], high), possible, likely),
+    )
+
+
 def area_check(area: float) -> Check:
     """Return the check of a specimen's cross-section [mm^2]."""
-    return Check("cross-section", area, *AREA, "looks like a size that was left at 1 or is not in mm", "mm^2")
+    return Check(_CROSS, area, *AREA, "looks like a size that was left at 1 or is not in mm", "mm^2")
 
 
 def _largest(stretch: Array) -> str:
     """Return what a largest stretch out of range looks like."""
     if np.max(stretch) < 2:
-        return "looks like displacement_mm in m or cm, or strain in a column strain_percent"
+        return "looks like displacement_mm in m or cm, or in inches, or strain in a column strain_percent"
     if np.min(stretch) > LARGEST_STRETCH[1][1]:
         return "looks like stretch in percent, or a length in mm; divide by 100, or by the length before the test"
     return (
@@ -288,7 +331,7 @@ def _shear_modulus(stretch: Array, stress: Array) -> list[Check]:
     """Return the check of the modulus that fits all points."""
     reduced = _reduced(stretch)
     size = float(reduced @ stress / (reduced @ reduced)) / MEGAPASCAL
-    return [Check("shear modulus of the data", size, *SHEAR_MODULUS, _unit_of(size), "MPa")]
+    return [Check(_MODULUS, size, *SHEAR_MODULUS, _unit_of(size), "MPa")]
 
 
 def _unit_of(modulus: float) -> str:
@@ -300,20 +343,62 @@ def _unit_of(modulus: float) -> str:
     return f"looks like {'; or '.join(likely)}" if likely else "check the units of stress, force, lengths and specimen"
 
 
-def _growth(stretch: Array, stress: Array) -> list[Check]:
-    """Return the check of how the reduced stress grows with the stretch up to 2; true stress makes it grow as that."""
+def _slack(stretch: Array, stress: Array) -> list[Check]:
+    """Return the check of how far a specimen is pulled before it bears, where the fit shows that: what to take off.
+
+    The stress is fitted up to a stretch of 2 by its reduced stress, constant and growing.
+    """
     low = (stretch > 0.8) & (stretch <= 2)
-    if np.sum(low) < _FEWEST or np.max(stretch) < 1.05 or not _from_1(stretch):
+    if np.sum(low) < _FEWEST or not _from_1(stretch):
         return []
+    x, y = stretch[low], stress[low]
+    extension = float(np.max(x)) - 1
+
+    def misfit(slack: float) -> float:
+        beyond = np.maximum(x - slack * extension, np.minimum(x, 1))
+        A = np.column_stack([_reduced(beyond), _reduced(beyond) * (beyond - 1)])
+        found = np.linalg.lstsq(A, y, rcond=None)[0]
+        r = y - A @ found
+        return float(r @ r) if found[0] > 0 else inf
+
+    tried = np.linspace(0, _SLACKEST, _TRIED)
+    misfits = np.array([misfit(slack) for slack in tried])
+    best = int(np.argmin(misfits))
+    if not misfits[0] - misfits[best] > _CLEARLY * misfits[best] / max(x.size - 3, 1):
+        return []
+    begins = f"the stress begins at a stretch of {1 + tried[best] * extension:.3g}"
+    likely = f"{begins}: looks like a slack specimen; take what it begins at off every row"
+    return [Check("slack, relative to the largest extension,", float(tried[best]), *SLACK, likely)]
+
+
+def _reduced_growth(stretch: Array, stress: Array) -> tuple[float, float] | None:
+    """Return how the reduced stress grows with the stretch up to 2, over its value at 1, and what noise leaves open.
+
+    None where the test does not tell: it begins too late, or its stress near 1 is noise or none.
+    """
+    low = (stretch > 0.8) & (stretch <= 2)
+    if np.sum(low) < _FEWEST or not _from_1(stretch):
+        return None
     reduced = _reduced(stretch[low])
     A = np.column_stack([np.ones(reduced.size), reduced, reduced * (stretch[low] - 1)])
-    (_, first, growth), (_, _, error) = _line(A, stress[low])
-    value, more = (growth / first, _ERRORS * error / first) if first > 0 else (inf, 0.0)
+    (_, first, growth), (_, doubt, error) = _line(A, stress[low])
+    return (growth / first, _ERRORS * error / first) if first > _ERRORS * doubt else None
+
+
+def _growth(stretch: Array, stress: Array) -> list[Check]:
+    """Return the check of how the reduced stress grows with the stretch; true stress makes it grow as that."""
+    found = _reduced_growth(stretch, stress)
+    if found is None or any(check.message for check in _slack(stretch, stress)):  # of a slack one it says nothing
+        return []
+    value, more = found
     likely = 'looks like true stress; write stress = "true" where it is'
     if value < 0:
-        likely = "looks like a stretch too near to 1, of displacement_mm in cm or strain in a column strain_percent"
+        likely = (
+            "looks like a stretch too near to 1, of displacement_mm in cm or inches, or strain in a column "
+            "strain_percent"
+        )
     usual = GROWTH[0][0] - more, GROWTH[0][1] + more
-    return [Check("growth of the reduced stress with the stretch", value, usual, GROWTH[1], likely)]
+    return [Check(_GROWS, value, usual, GROWTH[1], likely)]
 
 
 def _unloadings(stretch: Array) -> int:

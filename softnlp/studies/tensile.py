@@ -5,7 +5,7 @@ The misfit is that of the engineering stress, every point counting alike; `softn
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,7 +21,7 @@ from softnlp.model.numerics import Numerics
 from softnlp.nlp.solver import Ipopt
 from softnlp.studies.fit_statistics import constant_note, determined, open_constants, repeats, uncertainty
 from softnlp.studies.law_curve import LawCurve, confirmed_constants, first_guesses, nearest_constants, one_term
-from softnlp.studies.plausibility import Check, curve_checks, law_checks, messages
+from softnlp.studies.plausibility import Check, curve_checks, law_checks, messages, true_checks
 
 Array = NDArray[np.float64]
 
@@ -174,6 +174,7 @@ def fit_tensile(
     density: float = DENSITY,
     start: Mapping[str, float] | None = None,
     numerics: Numerics = Numerics(),
+    read: Sequence[Check] = (),
 ) -> TensileFit:
     """Fit laws to a tensile test.
 
@@ -193,6 +194,8 @@ def fit_tensile(
         First guess of the constants of a law of your own [SI]; needed where the stress is not linear in them.
     numerics
         Its engine: but for "newton" IPOPT closes each fit from its constants.
+    read
+        Checks of how the test was read, which count as its own.
 
     Returns
     -------
@@ -206,9 +209,10 @@ def fit_tensile(
 
     """
     x, y = _checked(stretch, stress)
+    read = (*read, *(true_checks(x, y) if true_stress else ()))
     y = y / x if true_stress else y
     asked = (laws,) if isinstance(laws, str | Law) else tuple(laws)
-    fits, checks = {}, curve_checks(x, y)
+    fits, checks = {}, curve_checks(x, y, read)
     for asked_law in asked:
         if isinstance(asked_law, str) and asked_law not in LAWS:
             raise InputError(f"unknown law {asked_law!r}{nearest(asked_law, LAWS)}", key="laws")

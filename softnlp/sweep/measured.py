@@ -12,7 +12,7 @@ from softnlp.base.arrays import Array
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import TIME_COLUMN, read_columns
 from softnlp.base.errors import InputError
-from softnlp.base.ranges import noise_note, without_noise
+from softnlp.base.ranges import noise_note, unit_note, without_noise
 from softnlp.base.units import BAR, MILLIMETRE
 
 TIP_COLUMNS = tuple(OUTPUTS[f"tip_{x}"].measured for x in "xyz")
@@ -67,5 +67,5 @@ def load_measured(path: str | PathLike[str], sets: int) -> Measured:
         header=columns.header,
         cells=tuple(columns.rows[k] for k in np.flatnonzero(full)),
         skipped=skipped,
-        notes=noise_note(table[full, :sets]),
+        notes=(*noise_note(table[full, :sets]), *unit_note(table[full, :sets])),
     )

@@ -18,6 +18,7 @@ import numpy as np
 from softnlp import __version__
 from softnlp.base.errors import SoftnlpError
 from softnlp.base.files import make_folder
+from softnlp.base.processes import require_workers
 from softnlp.base.reading import one_line
 from softnlp.base.units import BAR
 from softnlp.batch.chunk import ChunkSolver
@@ -118,6 +119,7 @@ def sweep(
     csv: bool = False,
 ) -> SweepSummary:
     """Solve every pose of a plan; as `softnlp.run_sweep`. about : attributes of the result file."""
+    require_workers(workers)
     told: dict[str, Any] = dict(about)
     began = time.monotonic()
     folder = make_folder(folder)

@@ -25,7 +25,7 @@ from softnlp.base.units import MILLIMETRE
 from softnlp.figures.mesh.rings import circle, natural_body, placed, resampled
 from softnlp.model.robot import Robot
 from softnlp.results import Body, write_whole
-from softnlp.statics.body import fit_of, turns
+from softnlp.statics.body import advances, fit_of, turns
 
 if TYPE_CHECKING:
     from manifold3d import CrossSection
@@ -84,7 +84,8 @@ def body_solid(robot: Robot, body: Body, facets: int = FACETS) -> Solid:
     Raises
     ------
     InputError
-        Without the extra `mesh`, for a number of facets out of range, or where no wall is left beside the bores.
+        Without the extra `mesh`, for a number of facets out of range, where no wall is left beside the bores, or for a
+        shape that is compressed to nothing somewhere.
     """
     made = _swept("body", body, _silicone(robot, body, body.radii.bore, facets), facets)
     return replace(made, warnings=fit_of(body.position, body.rotation, body.radii.outer).warnings)
@@ -164,6 +165,8 @@ def _section(outlines: list[Array]) -> CrossSection:
 
 def _swept(name: str, body: Body, section: CrossSection, facets: int, chamber: int | None = None) -> Solid:
     """Sweep a section [mm] along a body."""
+    if np.min(advances(body.position, body.rotation)) <= 0:
+        raise InputError("a part of this shape has negative length (v_z <= 0), so it is no solid")
     loops = [np.asarray(loop, dtype=float) for loop in section.to_polygons()]
     flat = np.concatenate(loops)
     cap = np.asarray(_library("manifold3d").triangulate(loops), dtype=np.int64)
