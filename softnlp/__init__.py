@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from softnlp.model.section import Section as Section
     from softnlp.model.section import SectionRadii as SectionRadii
     from softnlp.model.section import SectionState as SectionState
-    from softnlp.nlp.problem import Constraint as Constraint
+    from softnlp.nlp.constraint import Constraint as Constraint
     from softnlp.nlp.transcription import Collocation as Collocation
     from softnlp.nlp.transcription import MultipleShooting as MultipleShooting
     from softnlp.results import save as save
@@ -113,7 +113,7 @@ _HOMES = {
     "model.robot": ("ROBOTS", "Robot", "robot"),
     "model.rod": ("Loads",),
     "model.section": ("Section", "SectionRadii", "SectionState"),
-    "nlp.problem": ("Constraint",),
+    "nlp.constraint": ("Constraint",),
     "nlp.transcription": ("Collocation", "MultipleShooting"),
     "results": ("save", "to_dataset", "to_json"),
     "scenario.read": ("load_scenario",),

@@ -11,7 +11,8 @@ import numpy as np
 
 from softnlp.base.quantity import Quantity
 from softnlp.model.quantities import Model, quantities
-from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
+from softnlp.nlp.constraint import Constraint
+from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.solver import Engine, Solution, outputs
 from softnlp.nlp.transcription import MultipleShooting, Transcription
 from softnlp.statics.branch import branch_function, stretch_on_branch

@@ -7,7 +7,6 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
-from softnlp.batch.reduced import larger_curvature
 
 from softnlp import (
     BAR,
@@ -28,6 +27,7 @@ from softnlp.model.quantities import Model
 from softnlp.results import to_dataset, to_json
 from softnlp.statics.body import Fit, fit_of, overlapping
 from softnlp.statics.loadcase import rod_functions
+from softnlp.statics.reduced import larger_curvature
 
 
 def helix(turn: float, radius: float, pitch: float = 0.0, points: int = 61) -> tuple[np.ndarray, np.ndarray]:
@@ -143,7 +143,7 @@ def test_many_poses_at_once_know_an_axis_that_runs_backwards() -> None:
     """By nodes: the curvature is infinite where v_z <= 0, without any bend too, and that of the axis elsewhere."""
     functions = rod_functions(Model(robot("D25L60"), material("Ecoflex 00-50")))
     x, c = ca.SX.sym("x", 18), ca.SX.sym("c", functions.field.size1_in(1))
-    largest = ca.Function("largest", [x, c], [larger_curvature(ca.SX(0), [x], c)])
+    largest = ca.Function("largest", [x, c], [larger_curvature(functions, ca.SX(0), [x], c)])
     column = np.concatenate([q.nominal for q in functions.declared().values()])
     constants, _, _ = functions.section(column, 1.0)
     state = np.asarray(functions.arc(column, 1.0, 0.5)).ravel()

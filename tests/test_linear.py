@@ -11,8 +11,9 @@ import pytest
 from softnlp import BAR, Coefficients, ContactSettings, IllPosedError, Numerics, forward, material, robot
 from softnlp.base.quantity import quantity
 from softnlp.model.quantities import Model
+from softnlp.nlp.constraint import Constraint
 from softnlp.nlp.linear import BorderedSolver, SparseSolver
-from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
+from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.solver import Engine
 from softnlp.nlp.transcription import MultipleShooting, method_named
 from softnlp.statics.compiled import rod_equations

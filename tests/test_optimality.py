@@ -12,8 +12,9 @@ import pytest
 from softnlp.base.errors import IllPosedError
 from softnlp.base.quantity import quantity
 from softnlp.nlp.bounded import Limits, Measured, could_gain
+from softnlp.nlp.constraint import Constraint
 from softnlp.nlp.optimality import OPTIMAL, Bounds, kkt_error, misfit_slope, not_optimal, slopes
-from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
+from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.solver import Engine, Solution, certificate, violation
 
 SCALES = [1e-6, 1e-3, 1.0, 50.0, 1e3]

@@ -13,8 +13,9 @@ import pytest
 from softnlp import fit_tensile, load_materials, material
 from softnlp.cli import main
 from softnlp.scenario.read import load_scenario
+from softnlp.studies.check import Check, messages
 from softnlp.studies.measurements import TensileTask
-from softnlp.studies.plausibility import Check, agreed, area_check, curve_checks, law_checks, messages
+from softnlp.studies.plausibility import agreed, area_check, curve_checks, law_checks
 
 STRETCH = np.linspace(1, 3, 41)
 SILICONES = [(s, law) for s, entry in load_materials().items() for law in entry.models if law != "linear"]

@@ -16,7 +16,7 @@ from softnlp.model.conventions import Coefficients
 from softnlp.model.quantities import Model, quantities
 from softnlp.model.robot import ROBOTS
 from softnlp.model.rod import Loads
-from softnlp.nlp.problem import Constraint
+from softnlp.nlp.constraint import Constraint
 from softnlp.nlp.solver import certificate
 from softnlp.nlp.transcription import Collocation
 from softnlp.studies.forward import forward

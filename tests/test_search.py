@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from softnlp.base.quantity import quantity
-from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
+from softnlp.nlp.constraint import Constraint
+from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.search import Start, in_steps, minima, spread
 from softnlp.nlp.solver import Engine
 

@@ -79,6 +79,7 @@ _FOLDERS = {"workspace": "sweep", "plots": "figures", "mesh": "figures.mesh", "e
 _NAMES = {
     "section": dict.fromkeys(("deform", "reference_area"), "model.round_chambers"),
     "loadcase": {"Equation": "nlp.case"},
+    "problem": {"Constraint": "nlp.constraint"},
     "quantities": {"Quantity": "base.quantity", "quantity": "base.quantity"},
     "workspace.run": {"run_sweep": "scenario.workspace"},
 }

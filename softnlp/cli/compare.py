@@ -97,8 +97,8 @@ def _compared(task: CompareTask) -> Comparison:
 def _say(task: CompareTask, found: Comparison) -> None:
     """Print the statistics of each variant, and the mean error by robot where there are several."""
     from softnlp.scenario.compare import comparison_checks
+    from softnlp.studies.check import messages
     from softnlp.studies.comparison import OBSERVABLES
-    from softnlp.studies.plausibility import messages
 
     robots = ", ".join(o.label for o in found.observed)
     say(f"{task.scenario.title}: {robots}; {task.scenario.material.name}; {len(task.columns.rows)} rows measured")

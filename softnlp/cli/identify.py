@@ -164,8 +164,8 @@ def _identified(asked: Scenario) -> Identified:
 def _say_robots(asked: Scenario, found: Identified) -> None:
     """Print constants and misfits."""
     from softnlp.base.columns import OUTPUTS
+    from softnlp.studies.check import messages
     from softnlp.studies.identified import file_name
-    from softnlp.studies.plausibility import messages
 
     say(f"{asked.title}: {', '.join(d.label for d in found.data)}; {asked.material.name} ({asked.material.law.name})")
     for line in gravity_lines(asked.loads.gravity):

@@ -13,7 +13,7 @@ from softnlp.base.reading import shown
 from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.imported import ANY
 from softnlp.laboratory.table import RawTable, in_si
-from softnlp.studies.plausibility import Check
+from softnlp.studies.check import Check
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.laboratory.choices import AskError, Choices
-from softnlp.studies.plausibility import Check
+from softnlp.studies.check import Check
 
 Array = NDArray[np.float64]
 

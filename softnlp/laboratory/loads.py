@@ -18,7 +18,7 @@ from softnlp.laboratory.samples import sample_checks
 from softnlp.laboratory.signals import noise, plateaus
 from softnlp.laboratory.streams import with_pressures
 from softnlp.laboratory.table import RawTable, in_si
-from softnlp.studies.plausibility import Check
+from softnlp.studies.check import Check
 
 Array = NDArray[np.float64]
 

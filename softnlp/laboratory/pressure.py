@@ -18,7 +18,7 @@ from softnlp.laboratory.samples import sample_checks
 from softnlp.laboratory.signals import lag_between, noise
 from softnlp.laboratory.table import RawTable, in_si
 from softnlp.laboratory.units import UNITS
-from softnlp.studies.plausibility import Check
+from softnlp.studies.check import Check
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.laboratory.imported import ANY
-from softnlp.studies.plausibility import Check
+from softnlp.studies.check import Check
 
 Array = NDArray[np.float64]
 

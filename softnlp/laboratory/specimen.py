@@ -14,7 +14,8 @@ from softnlp.base.units import MEGAPASCAL, MILLIMETRE
 from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.table import RawTable, in_si, one_column
 from softnlp.laboratory.units import UNITS
-from softnlp.studies.plausibility import SHEAR_MODULUS, Check, area_check, divisor_checks
+from softnlp.studies.check import Check
+from softnlp.studies.plausibility import SHEAR_MODULUS, area_check, divisor_checks
 
 Array = NDArray[np.float64]
 

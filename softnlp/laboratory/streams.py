@@ -13,7 +13,7 @@ from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.pressure import lag_check, pressures_of
 from softnlp.laboratory.signals import lag_between, plateaus
 from softnlp.laboratory.table import RawTable
-from softnlp.studies.plausibility import Check
+from softnlp.studies.check import Check
 
 Array = NDArray[np.float64]
 

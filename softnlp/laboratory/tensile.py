@@ -16,7 +16,8 @@ from softnlp.laboratory.imported import ANY, Imported, require_possible
 from softnlp.laboratory.signals import Leg, break_row, enclosed_area, legs
 from softnlp.laboratory.specimen import ACROSS, ALONG, Curve, curve_of, specimens
 from softnlp.laboratory.table import RawTable
-from softnlp.studies.plausibility import Check, curve_checks, stiffness_checks
+from softnlp.studies.check import Check
+from softnlp.studies.plausibility import curve_checks, stiffness_checks
 
 Array = NDArray[np.float64]
 

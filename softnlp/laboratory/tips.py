@@ -19,7 +19,7 @@ from softnlp.laboratory.samples import sample_checks, spikes
 from softnlp.laboratory.signals import noise
 from softnlp.laboratory.streams import with_pressures
 from softnlp.laboratory.table import RawTable
-from softnlp.studies.plausibility import Check
+from softnlp.studies.check import Check
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

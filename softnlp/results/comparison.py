@@ -13,8 +13,8 @@ from softnlp.base.statistics import Statistics
 from softnlp.model.inputs import coefficients_table, contact_table, loads_table, package_version, pressure_bar, tidy
 from softnlp.results.document import csv_text, number
 from softnlp.scenario.compare import CompareTask, comparison_checks
+from softnlp.studies.check import messages
 from softnlp.studies.comparison import NUMBERS, OBSERVABLES, Comparison, differences
-from softnlp.studies.plausibility import messages
 
 STATISTICS = ("count", "rmse", "mape_percent", "mean", "median", "max", "bias", "left_out_of_mape", "unit")
 _VARIANT = ("law", "coefficients", "conventions", "closure")

@@ -14,9 +14,9 @@ from softnlp.base.units import MEGAPASCAL
 from softnlp.model.inputs import loads_table, pressure_bar, tidy
 from softnlp.model.materials import Material
 from softnlp.results.document import csv_text, document_head, engine_table, number, plain
+from softnlp.studies.check import messages
 from softnlp.studies.identified import COEFFICIENTS, file_name
 from softnlp.studies.measurements import OBSERVABLES, column_slice
-from softnlp.studies.plausibility import messages
 
 if TYPE_CHECKING:
     from softnlp.scenario.read import Scenario

@@ -28,10 +28,10 @@ from softnlp.scenario.laboratory import import_notes, laboratory_columns
 from softnlp.scenario.measured_rows import SCALARS, RobotRows, rows_by_robot
 from softnlp.scenario.registration import import_settings, registration_of
 from softnlp.statics.kept import pose_solver
+from softnlp.studies.check import Check
 from softnlp.studies.compare import SHAPES, compare
 from softnlp.studies.comparison import Comparison
 from softnlp.studies.measurements import Measurements
-from softnlp.studies.plausibility import Check
 from softnlp.studies.predicted import unloaded_tips
 from softnlp.studies.registration import Registration
 from softnlp.studies.tip_checks import frame_checks

@@ -20,15 +20,9 @@ from softnlp.model.materials import Material
 from softnlp.scenario.data import Read, Scenario
 from softnlp.scenario.laboratory import import_notes, laboratory_columns
 from softnlp.scenario.schema import FileName, ImportSettings, Label, Positive, optional_keys, wrong
+from softnlp.studies.check import Check
 from softnlp.studies.measurements import TensileTask
-from softnlp.studies.plausibility import (
-    Check,
-    area_check,
-    divisor_checks,
-    percent_check,
-    stiffness_checks,
-    true_checks,
-)
+from softnlp.studies.plausibility import area_check, divisor_checks, percent_check, stiffness_checks, true_checks
 
 if TYPE_CHECKING:  # imported where needed: to read a scenario takes none of them
     from softnlp.studies.tensile import LawFit, TensileFit

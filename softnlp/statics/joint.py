@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.quantity import quantity
-from softnlp.nlp.problem import Constraint
+from softnlp.nlp.constraint import Constraint
 from softnlp.nlp.solver import Engine, Solution
 from softnlp.nlp.transcription import method_named
 from softnlp.statics.blocked import BlockedSolver

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from softnlp.base.errors import IllPosedError
 from softnlp.base.quantity import Quantity, expression
+from softnlp.nlp.constraint import Constraint
 from softnlp.nlp.continuation import Followed, Path, follow, straight_path
 from softnlp.nlp.optimality import Bounds
-from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
+from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.solver import Engine
 from softnlp.statics.case import alone, first_guess, own_quantities, pose_entries, unloaded_values
 from softnlp.statics.chain import Chain

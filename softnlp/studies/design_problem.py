@@ -16,7 +16,8 @@ from softnlp.model.body import Body, Segment
 from softnlp.model.quantities import Model, with_symbols
 from softnlp.model.robot import ROBOTS, SELF_INTERSECTION, Robot
 from softnlp.model.rules import rules
-from softnlp.nlp.problem import CompiledProblem, Constraint
+from softnlp.nlp.constraint import Constraint
+from softnlp.nlp.problem import CompiledProblem
 from softnlp.nlp.search import Start
 from softnlp.nlp.solver import Engine, Solution
 from softnlp.nlp.transcription import MultipleShooting
@@ -205,7 +206,7 @@ def design_problem(evaluator: Evaluator, intervals: int, plane: Array | None) ->
         cases,
         given=[applied, scale, *[fold] * task.needs_force],
         free=chosen,
-        constraints=[row for row in rows if ca.depends_on(row.expression, unknown)],
+        constraints=_together([row for row in rows if ca.depends_on(row.expression, unknown)]),
         objective=-task.sign * outputs[task.objective.name] / scale.symbol,
     ).compiled
     options = {**_OPTIONS, **dict(setting.numerics.ipopt)}
@@ -218,6 +219,22 @@ def _body(model: Model) -> Body:
     counts = {name: getattr(model.robot, name) for name in ("chamber_sets", "chambers_per_set")}
     made = replace(ROBOTS["D25L60"], **counts)
     return Body([Segment(made, model.material)], model.coefficients, model.conventions)
+
+
+def _together(rows: list[Constraint]) -> list[Constraint]:
+    """Return the constraints with those of one name as one, such as a rule that holds between several chambers."""
+    found: dict[str, Constraint] = {}
+    for row in rows:
+        if (before := found.get(row.name)) is None:
+            found[row.name] = row
+        else:
+            lower, upper = (
+                np.append(np.broadcast_to(a, before.expression.numel()), b)
+                for a, b in ((before.lower, row.lower), (before.upper, row.upper))
+            )
+            both = ca.vertcat(before.expression, row.expression)
+            found[row.name] = replace(before, expression=both, lower=lower, upper=upper)
+    return list(found.values())
 
 
 def _rules(robot: Robot, task: DesignTask) -> Iterator[Constraint]:

@@ -16,9 +16,10 @@ from softnlp.base.units import MEGAPASCAL
 from softnlp.model.conventions import Coefficients
 from softnlp.model.materials import Material
 from softnlp.nlp.solver import Ipopt
+from softnlp.studies.check import Check, messages
 from softnlp.studies.fit_statistics import Uncertainty, constant_note, determined
 from softnlp.studies.measurements import OBSERVABLES, Data, column_slice
-from softnlp.studies.plausibility import SHEAR_MODULUS, Check, messages
+from softnlp.studies.plausibility import SHEAR_MODULUS
 from softnlp.studies.registration import NAMES as REGISTRATION_NAMES
 from softnlp.studies.registration import Registration, unit_of
 

@@ -27,6 +27,7 @@ from softnlp.nlp.optimality import OPTIMAL, misfit_slope, not_optimal
 from softnlp.statics.closing import DisputedError
 from softnlp.statics.kept import blocked_solver, pose_solver
 from softnlp.statics.wall import checked_contact
+from softnlp.studies.check import Check
 from softnlp.studies.fit_statistics import Uncertainty, open_constants, uncertainty
 from softnlp.studies.forward import checked_loads
 from softnlp.studies.identified import (
@@ -49,7 +50,6 @@ from softnlp.studies.measurements import (
     checked_measurements,
     repeated_numbers,
 )
-from softnlp.studies.plausibility import Check
 from softnlp.studies.predicted import Predicted, Prediction
 from softnlp.studies.registered import Registered, begun, with_registration
 from softnlp.studies.registration import NAMES as REGISTRATION_NAMES

@@ -22,7 +22,8 @@ from softnlp.model.conventions import Conventions
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.rod import Loads
-from softnlp.nlp.problem import CompiledProblem, Constraint, compile_problem
+from softnlp.nlp.constraint import Constraint
+from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.solver import FROM_SOLUTION, Engine, Solution
 from softnlp.nlp.transcription import method_named
 from softnlp.statics.blocked_grid import Blocked

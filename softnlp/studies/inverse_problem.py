@@ -18,9 +18,9 @@ from softnlp.base.units import BAR
 from softnlp.model.numerics import Numerics
 from softnlp.model.rod import Loads
 from softnlp.nlp.bounded import Limits, could_gain
+from softnlp.nlp.constraint import Constraint
 from softnlp.nlp.implicit import ImplicitDerivatives
 from softnlp.nlp.places import each_from_the_last, least_apart, spread
-from softnlp.nlp.problem import Constraint
 from softnlp.nlp.reduced import Point, Reduced
 from softnlp.nlp.solver import Engine, Solution
 from softnlp.statics.branch import BranchPoint, stretch_on_branch

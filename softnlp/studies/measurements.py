@@ -13,9 +13,9 @@ from softnlp.base.errors import InputError, nearest
 from softnlp.model.laws import Law
 from softnlp.model.materials import Material
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
+from softnlp.studies.check import Check
 from softnlp.studies.fit_statistics import repeats
 from softnlp.studies.forward import pressure_table
-from softnlp.studies.plausibility import Check
 from softnlp.studies.registration import Registration
 
 Array = NDArray[np.float64]

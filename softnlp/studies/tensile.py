@@ -19,9 +19,10 @@ from softnlp.model.laws import LAWS, Law
 from softnlp.model.materials import DENSITY, Material
 from softnlp.model.numerics import Numerics
 from softnlp.nlp.solver import Ipopt
+from softnlp.studies.check import Check, messages
 from softnlp.studies.fit_statistics import constant_note, determined, open_constants, repeats, uncertainty
 from softnlp.studies.law_curve import LawCurve, confirmed_constants, first_guesses, nearest_constants, one_term
-from softnlp.studies.plausibility import Check, curve_checks, law_checks, messages, true_checks
+from softnlp.studies.plausibility import curve_checks, law_checks, true_checks
 
 Array = NDArray[np.float64]
 

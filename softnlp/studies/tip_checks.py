@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from softnlp.base.units import DEGREE, MILLIMETRE
 from softnlp.model.robot import Robot
+from softnlp.studies.check import Check
 from softnlp.studies.measurements import Data
-from softnlp.studies.plausibility import Check
 from softnlp.studies.registration import Registration
 
 Array = NDArray[np.float64]
