@@ -98,7 +98,8 @@ def differences(old: Any, new: Any, close: float) -> list[str]:
     for path, (key, a) in before.items():
         b = after.get(path, (key, a))[1]
         if isinstance(a, int | float) and isinstance(b, int | float) and not isinstance(a, bool):
-            allowed = max(close * max(abs(a), largest.get(_scale(key), 0.0)), errors.get(path, 0.0))
+            least = 1.0 if key.endswith("_deg") else 0.0  # a degree, where nothing bends
+            allowed = max(close * max(abs(a), largest.get(_scale(key), 0.0), least), errors.get(path, 0.0))
             if not (abs(a - b) <= allowed or (math.isnan(a) and math.isnan(b))):
                 found.append(f"{path}: {a!r} -> {b!r}")
         elif a != b:
