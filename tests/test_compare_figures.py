@@ -243,7 +243,7 @@ def test_everything_is_documented(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["compare", "--help"]) == 0
     options = set(re.findall(r"--[a-z]+", capsys.readouterr().out)) - {"--help", "--version"}
     shown = {code.split()[0] for code in CODE}
-    assert len(options) == 7
+    assert len(options) == 8
     assert options <= shown
     assert set(MEASURED_COLUMNS) <= shown
     plain = {name for name in ALIASES if not re.search(r"_[yz]_mm$", name)}

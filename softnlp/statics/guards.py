@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from softnlp.base.errors import InputError
 from softnlp.base.ranges import FORCE, GRAVITY, MOMENT, PRESSURE, Range
 from softnlp.base.status import Status
+from softnlp.model.quantities import quantities
 from softnlp.nlp.problem import CompiledProblem
 from softnlp.nlp.solver import Solution, certificate, discretisation_correction
 from softnlp.statics.branch import stretch_on_branch
@@ -99,7 +100,7 @@ def _case_off_branch(case: LoadCase | Chain, values: Mapping[str, Array], x: Arr
     """Return where a rod of a case, with its unknowns x, is not on the branch of the stretch from zero pressure."""
     every = list(rods(case, values))
     for k, (equations, own, at) in enumerate(every):
-        column = np.concatenate([own[key] for key in equations.declared])
+        column = np.concatenate([own[key] for key in quantities(equations.functions.model)])
         branch = stretch_on_branch(equations.branch, column, own["pressure"])
         segment = f"segment {k + 1}: " if len(every) > 1 else ""
         if branch.status is not Status.SOLVED:
