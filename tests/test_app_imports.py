@@ -57,6 +57,10 @@ def test_a_test_is_read_with_its_reasons(tmp_path: Path) -> None:
     assert reasons["stretch"][0] == "[1.0, 2.0]"
     assert "the test goes to 4" in reasons["stretch"][1]
     assert "preamble" in reasons["width_mm"][1]
+    assert reasons["separator"] == ("comma", "as the file has it")
+    given = read(Asked(wanted.folder, wanted.files, None, {"width_mm": 8})).imported
+    assert given is not None
+    assert ["width_mm", "8", "given"] in setting_rows(given)[1]
     assert "points outside stretch" in told(reading.imported)
     (whole, used), x_label, y_label = traces(reading.imported)
     assert (len(whole["x"]), len(used["x"])) == (31, reading.imported.rows)

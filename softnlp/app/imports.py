@@ -192,8 +192,9 @@ def _cell(value: Any) -> Any:
 
 def setting_rows(imported: Imported) -> tuple[list[str], Rows]:
     """Return header and rows of what decided: each setting, and why it was guessed where nobody gave it."""
-    reasons = {guess.key: guess.reason for guess in imported.choices.guesses}
-    rows = [[key, str(value), reasons.get(key, "given")] for key, value in imported.choices.used.items()]
+    choices = imported.choices
+    reasons = dict.fromkeys(choices.given, "given") | {guess.key: guess.reason for guess in choices.guesses}
+    rows = [[key, str(value), reasons.get(key, "as the file has it")] for key, value in choices.used.items()]
     return ["setting", "value", "why"], rows
 
 
