@@ -65,11 +65,24 @@ def test_a_test_is_read_with_its_reasons(tmp_path: Path) -> None:
     (whole, used), x_label, y_label = traces(reading.imported)
     assert (len(whole["x"]), len(used["x"])) == (31, reading.imported.rows)
     assert (x_label, y_label) == ("stretch [-]", "engineering stress [MPa]")
-    assert {row[3] for row in check_rows(reading.imported)[1]} <= {"passed", "warned"}
+    assert {row[-1] for row in check_rows(reading.imported)[1]} <= {"passed", "warned"}
     assert reading.csv.splitlines()[0] == "stretch,stress_MPa"
     recipe = tmp_path / "files" / "again.import.toml"
     recipe.write_text(recipe_text(reading.imported, wanted.folder, wanted.folder))
     assert read_recipe(recipe).run().csv() == reading.csv
+
+
+def test_a_warning_is_told_and_stands_first_among_the_checks() -> None:
+    every = {"gauge_length_mm": 25, "area_mm2": 8, "cycle": "all"}
+    found = read(Asked(LABORATORY, ("utm_cyclic.csv",), None, every)).imported
+    assert found is not None
+    header, rows = check_rows(found)
+    assert dict(zip(header, rows[0], strict=True)) == {
+        "check": "load cycles taken as one test",
+        "value": "4",
+        "verdict": "warned",
+    }
+    assert told(found).startswith("Warning: the load cycles taken as one test is 4")
 
 
 def test_what_is_lacking_is_asked_beside_the_table_as_it_stands(tmp_path: Path) -> None:

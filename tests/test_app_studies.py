@@ -291,6 +291,7 @@ def test_a_test_of_a_machine_is_imported_corrected_and_used(tab: Watched, tmp_pa
     tab.type("import.width_mm", "8")  # half the stress
     tab.page.wait_for_selector("[data-testid='import.settings']:has-text('given')")
     tab.page.wait_for_selector("[data-testid='import.use']:not([disabled])")
+    tab.page.locator("[data-testid='import.use']").scroll_into_view_if_needed()
     tab.page.screenshot(path=pictures / "app_import.png")
     assert tab.evaluate(TOO_WIDE) == []
     assert tab.evaluate(FAINT) == []

@@ -201,13 +201,14 @@ def setting_rows(imported: Imported) -> tuple[list[str], Rows]:
 def check_rows(imported: Imported) -> tuple[list[str], Rows]:
     """Return header and rows of the checks, those with something to say first."""
     checks = sorted(imported.checks, key=lambda check: check.verdict == "passed")
-    rows = [[c.name, float(c.value), c.unit, c.verdict, c.message and c.likely] for c in checks]
-    return ["check", "value", "unit", "verdict", "what is likely"], rows
+    rows = [[c.name, f"{c.value:.4g} {c.unit}".strip(), c.verdict] for c in checks]
+    return ["check", "value", "verdict"], rows
 
 
 def told(imported: Imported) -> str:
-    """Return what was left out and why, and what is reported of the files, a line each."""
-    lines = [f"Left out: {count} {reason}" for reason, count in imported.choices.dropped.items()]
+    """Return what is unusual, what was left out and why, and what is reported of the files, a line each."""
+    lines = [f"Warning: {warning}" for warning in imported.warnings]
+    lines += [f"Left out: {count} {reason}" for reason, count in imported.choices.dropped.items()]
     return "\n".join((*lines, *(f"{name}: {value:.5g}" for name, value in imported.numbers.items())))
 
 

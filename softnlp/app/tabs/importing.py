@@ -69,6 +69,7 @@ class _Import:
             ).classes(controls.HINT)
             with ui.column().classes("w-full gap-2") as self._more:
                 self._row = RunRow("import", "Read again", self._read)
+                self._table = NumberTable("import.table", height="12rem")
                 self._kind = controls.select(dict(KINDS), "import.kind", "Kind", value="", on_change=self._read)
                 self._box = ui.element("div").classes("grid grid-cols-2 gap-2 w-full items-start")
                 self._further = controls.named(ui.textarea("Other settings, a KEY=VALUE a line"), "import.further")
@@ -76,7 +77,6 @@ class _Import:
                     "w-full"
                 )
                 self._further.on_value_change(self._read)
-                self._table = NumberTable("import.table", height="12rem")
                 self._chart = Chart("import.chart", "", "", height="16rem")
                 with ui.column().classes("w-full gap-2") as self._results:
                     self._told = ui.label("").classes("text-sm whitespace-pre-line break-words").mark("import.told")
@@ -167,7 +167,7 @@ class _Import:
         self._told.set_text(told(imported))
         self._settings.show(*setting_rows(imported), "settings.csv")
         header, rows = check_rows(imported)
-        self._checks.show(header, rows, "checks.csv", failed=[row[3] != "passed" for row in rows])
+        self._checks.show(header, rows, "checks.csv", failed=[row[-1] != "passed" for row in rows])
         curves, x_label, y_label = traces(imported)
         self._chart.show(curves, x_label=x_label, y_label=y_label)
         self._enable(True)
