@@ -121,7 +121,7 @@ def test_only_files_of_a_person_are_taken(tmp_path: Path) -> None:
         ([], "expected 1 to 8 files"),
         ([(f"{k}.csv", b"") for k in range(9)], "got 9"),
         ([("a.csv", b"x" * (LARGEST_FILE + 1))], "at most 5 MB"),
-        ([("a.import.toml", b'kind = "tips"\nfiles = ["/etc/passwd"]')], "names files of its folder"),
+        ([("a.import.toml", b'kind = "tips"\nfiles = ["/etc/passwd"]')], "names further files"),
         ([("..", b"")], "expected a file with a name"),
     ):
         with pytest.raises(InputError, match=words):

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softnlp.app.parts import line
-from softnlp.app.session import checked_size, plain_name
+from softnlp.app.session import checked_content, plain_name
 from softnlp.base.errors import InputError
 from softnlp.base.reading import LONGEST_NAME, one_line
 from softnlp.figures.style import colour
@@ -19,7 +19,6 @@ from softnlp.laboratory.choices import Choices, settings_from_words
 from softnlp.laboratory.formats import read_tables
 from softnlp.laboratory.imported import Imported
 from softnlp.laboratory.importing import import_files, kind_of
-from softnlp.laboratory.recipe import SUFFIX
 from softnlp.laboratory.tips import FRAMES
 
 Rows = list[list[Any]]
@@ -130,13 +129,11 @@ def placed(folder: Path, contents: Iterable[tuple[str, bytes]]) -> tuple[str, ..
     Raises
     ------
     InputError
-        For files that are too large or too many, and for what names others.
+        For files that are too large or too many, and for the recipe of an import.
     """
-    named = {plain_name(name): checked_size(name, content) for name, content in contents}
+    named = {plain_name(name): checked_content(name, content) for name, content in contents}
     if not 1 <= len(named) <= MOST_FILES:
         raise InputError(f"expected 1 to {MOST_FILES} files of one test, got {len(named)}")
-    if any(name.endswith(SUFFIX) for name in named):
-        raise InputError(f"a NAME{SUFFIX} names files of its folder; drop those files, and type its settings")
     folder.mkdir(parents=True)
     for name, content in named.items():
         (folder / name).write_bytes(content)
