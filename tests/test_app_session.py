@@ -346,3 +346,17 @@ def test_what_a_warning_says_stands_in_no_other_line(session: Session) -> None:
     run, _ = session.live.pose(session.scenario, session.pressure)
     assert any("stability is undefined" in warning for warning in run.steps[0].warnings)
     assert "stab" not in certificate_words(run)
+
+
+def test_the_recipe_of_an_import_is_not_taken(session: Session, tmp_path: Path) -> None:
+    """A page in the network would read any file of the server's machine through it."""
+    session.choose("identify")
+    (tmp_path / "own.csv").write_text("stretch,stress_MPa\n1,0\n1.5,0.01\n2,0.02\n")
+    recipe = f'kind = "tensile"\nfiles = ["{(tmp_path / "own.csv").as_posix()}"]\n'.encode()
+    text = 'study = "identify"\n[tensile]\nfile = "a.import.toml"\n'
+    with pytest.raises(InputError, match="names further files"):
+        session.take_file("tensile", "a.import.toml", recipe, {}, lambda problem: False)
+    with pytest.raises(InputError, match="names further files"):
+        session.open(text, "a.toml", {"a.import.toml": recipe})
+    assert not (session.folder / "a.import.toml").exists()
+    assert session.table("tensile") == {}

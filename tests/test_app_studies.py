@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import pytest
 
 pytest.importorskip("nicegui", reason="the extra gui is not installed")
 pytest.importorskip("playwright", reason="playwright is not installed")
+
+from laboratory_files import MODULUS, machine_text
 
 from benchmarks.app import chromium
 from tests.browser import WINDOW, Watched, assert_same_as_the_command, keeps, reload, run_json
@@ -272,6 +275,36 @@ def test_constants_are_identified_from_a_dropped_file(tab: Watched) -> None:
     tab.press("tab-kinematics")
     tab.open_panel("coefficients")
     assert tab.input_value("input[data-testid=stiffening-bending]") != "1.23"
+
+
+def test_a_test_of_a_machine_is_imported_corrected_and_used(tab: Watched, tmp_path: Path, pictures: Path) -> None:
+    file = tmp_path / "utm.csv"
+    file.write_text(machine_text())
+    tab.page.set_viewport_size(WINDOW)
+    tab.press("tab-identify")
+    tab.page.locator("[data-testid=import] .q-item").first.click()
+    tab.page.set_input_files("[data-testid='import.drop'] input", file)
+    tab.page.wait_for_selector("[data-testid='import.message']:has-text('31 rows')")
+    tab.page.wait_for_selector("[data-testid='import.chart'] .scatterlayer .trace", state="attached")
+    assert "width_mm" in tab.text("import.settings")
+    assert "given" not in tab.text("import.settings")
+    tab.type("import.width_mm", "8")  # half the stress
+    tab.page.wait_for_selector("[data-testid='import.settings']:has-text('given')")
+    tab.page.wait_for_selector("[data-testid='import.use']:not([disabled])")
+    tab.page.locator("[data-testid='import.use']").scroll_into_view_if_needed()
+    tab.page.screenshot(path=pictures / "app_import.png")
+    assert tab.evaluate(TOO_WIDE) == []
+    assert tab.evaluate(FAINT) == []
+    assert "width_mm = 8" in download(tab, "import.import.toml").decode()
+    assert len(download(tab, "import.csv").splitlines()) == 32
+    tab.press("import.use")
+    tab.page.wait_for_selector("[data-testid='tensile.run']:visible")
+    run(tab, "tensile")
+    tab.choose("tensile.law", "neo-hookean")
+    (silicone,) = tomllib.loads(download(tab, "tensile.toml").decode()).values()
+    assert silicone["neo-hookean"]["mu0_MPa"] == pytest.approx(MODULUS / 2, rel=0.01)
+    tab.press("tensile.use")
+    tab.settled()
 
 
 @pytest.mark.parametrize("dark", [pytest.param(False, marks=pytest.mark.slow), True], ids=["light", "dark"])

@@ -9,7 +9,7 @@ import pytest
 from laboratory_files import FOLDER, SPECIMEN, check_of, imported
 
 from softnlp.cli import main
-from softnlp.laboratory.choices import AskError
+from softnlp.laboratory.choices import AskError, settings_from_words
 from softnlp.laboratory.signals import break_row, legs
 
 
@@ -54,6 +54,13 @@ def test_what_is_missing_is_asked_all_at_once(file: str, asked: tuple[str, ...])
     with pytest.raises(AskError) as error:
         imported(file)
     assert all(word in str(error.value) for word in asked)
+
+
+def test_a_stress_is_true_where_a_person_says_so() -> None:
+    settings = settings_from_words(["stress=true", "unit.stress=kPa"])
+    plain, true = (imported("stretch_stress_no_unit.csv", **more) for more in ({"unit__stress": "kPa"}, settings))
+    assert settings == {"stress": "true", "unit.stress": "kPa"}
+    assert true.columns["stress_MPa"] * true.columns["stretch"] == pytest.approx(plain.columns["stress_MPa"])
 
 
 def test_guesses_have_reasons() -> None:

@@ -46,8 +46,13 @@ def plain_name(name: str) -> str:
     return plain
 
 
-def checked_size(name: str, content: bytes) -> bytes:
-    """Return the content of a file; raises `InputError` for one too large."""
+def checked_content(name: str, content: bytes) -> bytes:
+    """Return the content of a file; raises `InputError` for one too large, and for a recipe of an import.
+
+    That one names further files. A page reads what was dropped, and not what else the machine of its server has.
+    """
+    if name.endswith(".import.toml"):
+        raise InputError(f"{shown(name)} names further files; take the CSV of the import, or import those files here")
     if len(content) > LARGEST_FILE:
         size = len(content) / 1e6
         raise InputError(f"{shown(name)} has {size:.0f} MB; expected a table of at most {LARGEST_FILE / 1e6:.0f} MB")
@@ -96,7 +101,7 @@ class Session:
         name = PurePath(name).name or "scenario.toml"
         try:
             document = Document(text)
-            given = {plain_name(key): checked_size(key, content) for key, content in (files or {}).items()}
+            given = {plain_name(key): checked_content(key, content) for key, content in (files or {}).items()}
             scenario = self._try(document, name, given)
         except InputError as error:
             raise placed(error, name) from None  # and not where it was tried
@@ -144,7 +149,7 @@ class Session:
     def keep(self, name: str, content: bytes) -> str:
         """Put a file beside the scenario and return the name it has there; raises `InputError` for one too large."""
         plain = plain_name(name)
-        (self.folder / plain).write_bytes(checked_size(name, content))
+        (self.folder / plain).write_bytes(checked_content(name, content))
         return plain
 
     def change(self, table: str, key: str, value: object) -> None:

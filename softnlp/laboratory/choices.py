@@ -131,6 +131,8 @@ def settings_from_words(words: Iterable[str]) -> dict[str, Any]:
             value = tomllib.loads(f"value = {text}")["value"]
         except (tomllib.TOMLDecodeError, KeyError):
             value = text.strip()
+        if isinstance(value, bool):  # no setting is yes or no, but a stress may be the true one
+            value = text.strip()
         found[key.strip().removeprefix(_PREFIX)] = value
     return found
 

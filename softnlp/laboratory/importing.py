@@ -55,15 +55,15 @@ def import_files(
         raise InputError("expected a file", key="FILE")
     choices = Choices(dict(settings or {}))
     tables = [table for file in files for table in read_tables(folder, file, choices)]
-    chosen = kind or _kind_of(tables, choices)
+    chosen = kind or kind_of(tables, choices)
     made = {"tensile": import_tensile, "pressure": import_pressure, "tips": import_tips, "force": import_force}[chosen]
     imported = made(tables, choices)
     choices.require_used()
     return imported
 
 
-def _kind_of(tables: Sequence[RawTable], choices: Choices) -> str:
-    """Return the kind that the columns of some files have."""
+def kind_of(tables: Sequence[RawTable], choices: Choices) -> str:
+    """Return the kind that the columns of some files have; raises `AskError` where they tell none."""
     for kind, fits in (("tips", is_tips), ("tensile", is_tensile), ("force", is_force), ("pressure", is_pressure)):
         if any(fits(table) for table in tables):
             choices.take("as", kind, "by the names of its columns")

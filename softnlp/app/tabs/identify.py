@@ -14,6 +14,7 @@ from softnlp.app import controls
 from softnlp.app.asking import Progress
 from softnlp.app.parts import Chart, NumberTable, csv_drop, downloads, marks, study_row
 from softnlp.app.session import Session, Stage
+from softnlp.app.tabs.importing import import_part, use_tensile
 from softnlp.app.tabs.tensile import GREY, asked_with, from_files, tensile_part
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import read_columns
@@ -76,11 +77,20 @@ def identify_tab(stage: Stage) -> None:
             aside[other] = session.table(other)
             session.change_all(other, None)
 
+    def use_tips(name: str, content: bytes) -> None:
+        kinds.set_value("measurements")
+        robots.take(name, content)
+
+    def use_test(name: str, content: bytes) -> None:
+        kinds.set_value("tensile")
+        use_tensile(session, name, content)
+
     with ui.column().classes("w-full gap-3 pt-2"):
+        import_part(session, {"tips": use_tips, "tensile": use_test})
         kinds = controls.toggle({"measurements": "Robots", "tensile": "Tensile test"}, "identify.kind", kind())
         boxes: dict[str, ui.column] = {}
         with ui.column().classes("w-full gap-3") as boxes["measurements"]:
-            _Measurements(session)
+            robots = _Measurements(session)
             ui.separator()
             _Identification(session)
         with ui.column().classes("w-full gap-3") as boxes["tensile"]:
@@ -100,7 +110,7 @@ class _Measurements:
         self._fields: dict[tuple[str, int], ui.number] = {}
         controls.heading("Measurements of robots")
         self._file = ui.label("").classes("text-sm").mark("measurements.file")
-        csv_drop("measurements.drop", "Drop a CSV of measurements", self._dropped)
+        csv_drop("measurements.drop", "Drop a CSV of measurements", self.take)
         ui.label(
             f"Columns p1_bar, p2_bar, … and any of {', '.join(_MEASURED)}; robot, weight and sigma_… if there are."
         ).classes(controls.HINT)
@@ -173,7 +183,7 @@ class _Measurements:
         if table and free and self._freed() != free:
             self._session.put("measurements", with_free(table, free))
 
-    def _dropped(self, name: str, content: bytes) -> None:
+    def take(self, name: str, content: bytes) -> None:
         """Take a file of measurements; one that cannot be read leaves the scenario as it was."""
         session, table = self._session, self._table()
         with of_table(""):
