@@ -98,6 +98,22 @@ STRETCH = np.linspace(1, 2.2, 61)
 STRESS = 0.03 * (STRETCH - STRETCH**-2)  # [MPa]
 
 
+@pytest.mark.parametrize(
+    ("name", "strain"),
+    [
+        ("Log strain (-)", np.log(STRETCH)),
+        ("Logarithmic strain [mm/mm]", np.log(STRETCH)),
+        ("ln strain (1)", np.log(STRETCH)),
+        ("Hencky strain (-)", np.log(STRETCH)),
+        ("Green-Lagrange strain (-)", (STRETCH**2 - 1) / 2),
+        ("Datalog strain (-)", STRETCH - 1),
+    ],
+)
+def test_the_measure_of_a_strain_is_known_by_its_name(name: str, strain: np.ndarray, tmp_path: Path) -> None:
+    file = machine(tmp_path, f"{name},Engineering stress (kPa)", np.column_stack([strain, 1e3 * STRESS]))
+    assert modulus(file=file) == pytest.approx(0.03, rel=1e-3)
+
+
 def test_side_by_side_specimens(tmp_path: Path) -> None:
     one = np.column_stack([25 * (STRETCH - 1), 8 * STRESS])
     file = machine(tmp_path, "Extension (mm),Load (N),Extension (mm),Load (N)", np.hstack([one, one * [1, 1.1]]))

@@ -23,7 +23,8 @@ DISPLACEMENT = r"extension|displac|crosshead|position|stroke|traverse|elongation
 _FORCE = r"load|force|kraft|^last|^f[yz]?$"
 _STRAIN, _STRESS, _STRETCH = r"strain|dehnung", r"stress|spannung|^sigma", r"stretch|lambda"
 ALONG, ACROSS = rf"{DISPLACEMENT}|{_STRAIN}|{_STRETCH}", rf"{_STRESS}|{_FORCE}"
-_TRUE, _RATE = r"true|cauchy|wahre", r"rate|limit|pacing"
+_TRUE = r"true|cauchy|wahre|hencky|(?<![a-z])(?:ln|log(?:arithm\w*)?)(?![a-z])"
+_GREEN, _RATE = r"green|lagrang", r"rate|limit|pacing|almansi"
 _SAME = 0.02  # relative, of two columns that say the same
 _STRESS_UNITS = ("Pa", "kPa", "bar", "psi", "MPa")
 
@@ -112,9 +113,10 @@ def _stretch(table: RawTable, choices: Choices, missing: list[str]) -> tuple[Arr
     """Return the stretch, and the check of the crosshead against a strain where the file has both."""
     columns = {
         "stretch": one_column(table, "stretch", table.named(_STRETCH), choices),
-        "strain": one_column(table, "strain", table.named(_STRAIN, f"{_TRUE}|{_RATE}"), choices),
+        "strain": one_column(table, "strain", table.named(_STRAIN, f"{_TRUE}|{_GREEN}|{_RATE}"), choices),
         "displacement": one_column(table, "displacement", table.named(DISPLACEMENT, f"{_STRAIN}|{_RATE}"), choices),
-        "true strain": one_column(table, "true strain", table.named(rf"({_TRUE}).*({_STRAIN})"), choices),
+        "true strain": one_column(table, "true strain", table.named(rf"({_TRUE}).*({_STRAIN})", _RATE), choices),
+        "Green strain": one_column(table, "Green strain", table.named(rf"({_GREEN}).*({_STRAIN})", _RATE), choices),
     }
     known = [name for name, k in columns.items() if k is not None]
     if not known:
@@ -148,8 +150,19 @@ def _stretch(table: RawTable, choices: Choices, missing: list[str]) -> tuple[Arr
     strain = _strain(table, k, chosen, columns, choices, crosshead, missing)
     if strain is None:
         return None, []
-    stretch = np.exp(strain) if chosen == "true strain" else 1 + strain
+    if chosen == "Green strain":
+        choices.take("extension", chosen, "(stretch^2 - 1) / 2, by its name")
+    stretch = _stretch_of(strain, chosen)
     return stretch, [] if crosshead is None else _crosshead_check(crosshead, stretch)
+
+
+def _stretch_of(strain: Array, measure: str) -> Array:
+    """Return the stretch of a strain, by its measure."""
+    if measure == "true strain":
+        return np.exp(strain)
+    if measure == "Green strain":
+        return np.sqrt(np.maximum(1 + 2 * strain, 0.0))
+    return 1 + strain
 
 
 def _crosshead_check(crosshead: Array, stretch: Array) -> list[Check]:
@@ -195,9 +208,10 @@ def _strain(
     if largest > 12:
         choices.take("unit.strain", "%", f"it goes to {largest:.4g}, and no silicone to that stretch")
         return plain * UNITS["%"].scale
+    plain_one, percent = (float(_stretch_of(np.array(largest * scale), chosen)) for scale in (1.0, 0.01))
     missing.append(
-        f"column {shown(table.names[k])} has no unit and goes to {largest:.4g}: a stretch of {1 + largest:.4g} "
-        f"(--set unit.strain=1) or of {1 + largest / 100:.4g} (--set unit.strain=%)"
+        f"column {shown(table.names[k])} has no unit and goes to {largest:.4g}: a stretch of {plain_one:.4g} "
+        f"(--set unit.strain=1) or of {percent:.4g} (--set unit.strain=%)"
     )
     return None
 
