@@ -114,6 +114,16 @@ def test_the_measure_of_a_strain_is_known_by_its_name(name: str, strain: np.ndar
     assert modulus(file=file) == pytest.approx(0.03, rel=1e-3)
 
 
+def test_the_whole_length_of_a_dumbbell_is_warned_of(tmp_path: Path) -> None:
+    rows = np.column_stack([25 * (STRETCH - 1), 8 * STRESS])
+    name = "gauge length over the width"
+    for length, verdict in ((115, "warned"), (25, "passed")):
+        preamble = f"Specimen length (mm),{length}\nWidth (mm),4\nThickness (mm),2\n"
+        file = machine(tmp_path, f"{preamble}Extension (mm),Load (N)", rows)
+        assert check_of(imported(file), name).verdict == verdict
+    assert name not in [check.name for check in imported(file, gauge_length_mm=30).checks]
+
+
 def test_side_by_side_specimens(tmp_path: Path) -> None:
     one = np.column_stack([25 * (STRETCH - 1), 8 * STRESS])
     file = machine(tmp_path, "Extension (mm),Load (N),Extension (mm),Load (N)", np.hstack([one, one * [1, 1.1]]))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +11,7 @@ from softnlp.base.errors import InputError
 from softnlp.base.reading import shown
 from softnlp.base.units import MEGAPASCAL, MILLIMETRE
 from softnlp.laboratory.choices import AskError, Choices
+from softnlp.laboratory.sizes import area_of, gauge_length, size_checks
 from softnlp.laboratory.table import RawTable, in_si, one_column
 from softnlp.laboratory.units import UNITS
 from softnlp.studies.check import Check
@@ -70,8 +70,9 @@ def curve_of(table: RawTable, choices: Choices) -> Curve:
         Naming everything that is missing at once.
     """
     missing: list[str] = []
-    area, sized = _area(table, choices)
-    stretch, told = _stretch(table, choices, missing)
+    area, sized = area_of(table, choices)
+    gauge = gauge_length(table, choices)
+    stretch, told = _stretch(table, choices, gauge, missing)
     stress, more = _stress(table, choices, stretch, area, missing)
     if missing or stretch is None or stress is None:
         raise AskError(f"{table.file}: {'; and '.join(missing)}")
@@ -79,37 +80,12 @@ def curve_of(table: RawTable, choices: Choices) -> Curve:
     choices.drop(int(np.sum(~known)), "rows with a missing cell")
     if area is not None and sized:
         more = [area_check(area / MILLIMETRE**2), *more]
-    return Curve(stretch[known], stress[known], area, (*told, *more))
+    return Curve(stretch[known], stress[known], area, (*told, *more, *size_checks(table, area, choices)))
 
 
-def _size(table: RawTable, key: str, patterns: Sequence[str], choices: Choices) -> float | None:
-    """Return a size of the specimen [mm], from its setting or the preamble."""
-    given = choices.number(f"{key}_mm", 0.01, 3000.0)
-    if given is not None:
-        return given
-    found = table.value(*patterns)
-    if found is None or found[2] is None or found[2].kind != "length":
-        return None
-    size = found[1] * found[2].scale / MILLIMETRE
-    return float(choices.take(f"{key}_mm", round(size, 9), f"{shown(found[0])} of the preamble")) if size > 0 else None
-
-
-def _area(table: RawTable, choices: Choices) -> tuple[float | None, bool]:
-    """Return the specimen's cross-section [m^2], None where nothing says it, and whether it is to be checked."""
-    given = choices.number("area_mm2")
-    if given is not None:
-        return given * MILLIMETRE**2, True
-    diameter = _size(table, "diameter", (r"^(specimen |sample )?diameter",), choices)
-    if diameter is not None:
-        return float(np.pi / 4) * (diameter * MILLIMETRE) ** 2, True
-    width = _size(table, "width", (r"^(specimen |sample )?width",), choices)
-    thickness = _size(table, "thickness", (r"^(specimen |sample )?thickness",), choices)
-    if width is None or thickness is None:
-        return None, False
-    return width * thickness * MILLIMETRE**2, True
-
-
-def _stretch(table: RawTable, choices: Choices, missing: list[str]) -> tuple[Array | None, list[Check]]:
+def _stretch(
+    table: RawTable, choices: Choices, gauge: float | None, missing: list[str]
+) -> tuple[Array | None, list[Check]]:
     """Return the stretch, and the check of the crosshead against a strain where the file has both."""
     columns = {
         "stretch": one_column(table, "stretch", table.named(_STRETCH), choices),
@@ -131,7 +107,6 @@ def _stretch(table: RawTable, choices: Choices, missing: list[str]) -> tuple[Arr
         choices.take("extension", chosen, f"measured at the specimen, or made from it; the file has {others} too")
     k = columns[chosen]
     assert k is not None
-    gauge = _size(table, "gauge_length", (r"gauge", r"^(specimen |sample )?length", r"l0|messl"), choices)
     crosshead = None
     if columns["displacement"] is not None and (gauge is not None or chosen == "displacement"):
         moved = in_si(table, columns["displacement"], "length", choices, "displacement")

@@ -1,0 +1,77 @@
+"""The size of a specimen: its cross-section and gauge length, as they are set or as a preamble says them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from softnlp.base.reading import shown
+from softnlp.base.units import MILLIMETRE
+from softnlp.laboratory.choices import Choices
+from softnlp.laboratory.table import RawTable
+from softnlp.studies.check import Check
+
+_MARKED = r"gauge|l0|messl"  # labels of what is stretched, and of nothing else
+_LABELS: Mapping[str, Sequence[str]] = {
+    "gauge_length": (r"gauge", r"^(specimen |sample )?length", r"l0|messl"),
+    "diameter": (r"^(specimen |sample )?diameter",),
+    "width": (r"^(specimen |sample )?width",),
+    "thickness": (r"^(specimen |sample )?thickness",),
+}
+_SLENDER = 10.0  # widths: a dumbbell's gauge length is 2 to 7 of its narrow width, the whole of it 12 to 20 (ISO 37)
+
+
+def _size(table: RawTable, key: str, choices: Choices) -> float | None:
+    """Return a size of the specimen [mm], from its setting or the preamble."""
+    given = choices.number(f"{key}_mm", 0.01, 3000.0)
+    if given is not None:
+        return given
+    found = _written(table, key)
+    if found is None:
+        return None
+    label, size = found
+    meant = "" if re.search(_MARKED, label) or key != "gauge_length" else ", if that is what was stretched"
+    return float(choices.take(f"{key}_mm", size, f"{shown(label)} of the preamble{meant}"))
+
+
+def area_of(table: RawTable, choices: Choices) -> tuple[float | None, bool]:
+    """Return the specimen's cross-section [m^2], None where nothing says it, and whether it is to be checked."""
+    given = choices.number("area_mm2")
+    if given is not None:
+        return given * MILLIMETRE**2, True
+    diameter = _size(table, "diameter", choices)
+    if diameter is not None:
+        return float(np.pi / 4) * (diameter * MILLIMETRE) ** 2, True
+    width = _size(table, "width", choices)
+    thickness = _size(table, "thickness", choices)
+    if width is None or thickness is None:
+        return None, False
+    return width * thickness * MILLIMETRE**2, True
+
+
+def gauge_length(table: RawTable, choices: Choices) -> float | None:
+    """Return the length that is stretched [mm], None where nothing says it."""
+    return _size(table, "gauge_length", choices)
+
+
+def _written(table: RawTable, key: str) -> tuple[str, float] | None:
+    """Return what a preamble calls a size of the specimen, and the size [mm]."""
+    found = table.value(*_LABELS[key])
+    if found is None or found[2] is None or found[2].kind != "length" or found[1] <= 0:
+        return None
+    return found[0], round(found[1] * found[2].scale / MILLIMETRE, 9)
+
+
+def size_checks(table: RawTable, area: float | None, choices: Choices) -> list[Check]:
+    """Return the check of a gauge length that a preamble only calls a length; area : of the specimen [m^2]."""
+    length = _written(table, "gauge_length")
+    taken = choices.used.get("gauge_length_mm")
+    if length is None or length[1] != taken or re.search(_MARKED, length[0]):
+        return []
+    width = choices.used.get("width_mm") or (None if area is None else np.sqrt(area) / MILLIMETRE)
+    if width is None:
+        return []
+    likely = f"{shown(length[0])} may be that of the whole specimen, heads included; then --set gauge_length_mm=…"
+    return [Check("gauge length over the width", taken / width, (0, _SLENDER), (0, np.inf), likely)]
