@@ -53,6 +53,18 @@ def test_a_wrong_order_of_a_quaternion_is_noticed() -> None:
     assert check_of(imported("tracker_em_two_sensors.csv", **BASE), "quaternion order").verdict == "passed"
 
 
+@pytest.mark.parametrize("lost", [-3.697314e28, -9999.0, 999.99])
+@pytest.mark.parametrize("unit", ["", " (mm)"])
+def test_numbers_that_stand_for_a_lost_sensor_are_no_tips(lost: float, unit: str, tmp_path: Path) -> None:
+    rows = np.array([0.0, 0.0, 60.0]) + np.random.default_rng(1).normal(scale=2.0, size=(60, 3))
+    rows[[3, 40]] = lost
+    header = ",".join(f"{axis}{unit}" for axis in "xyz")
+    np.savetxt(tmp_path / "tips.csv", rows, delimiter=",", header=header, comments="")
+    found = imported(str(tmp_path / "tips.csv"))
+    assert found.choices.dropped == {"rows in which the sensor was not seen": 2}
+    assert np.max(np.abs(tips(found))) < 100
+
+
 def test_metres_and_an_upward_y(tmp_path: Path) -> None:
     found = imported("tracker_optical_states.csv", **GIVEN)
     turn = Rotation.from_rotvec([-np.pi / 2, 0, 0])  # z up to y up

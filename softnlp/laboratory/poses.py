@@ -26,7 +26,7 @@ _STATE = re.compile(r"state|status", re.IGNORECASE)
 _SEEN = ("ok", "valid", "visible", "tracked", "enabled", "good", "1", "true")
 _TOOL = re.compile(r"^(tool|sensor|body|marker|rigid ?body|port ?handle|tool ?info|name)s?\b", re.IGNORECASE)
 _REACH = (1e-3, 3.0)  # [m]: how far a tip moves in a test
-_NORM = 0.02
+_FARTHEST = 10.0  # [m]: beyond what any tracker sees
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +135,7 @@ def _sensor(table: RawTable, name: str, group: tuple[list[int], list[int], str],
     columns = [in_si(table, k, "length", choices, "position") for k in places]
     raw = np.column_stack([table.columns[k] for k in places])
     q = np.column_stack([table.columns[k] for k in turns]) if turns else None
-    seen = np.all(np.isfinite(raw), axis=1) & _state(table, min([*places, *turns]))
+    seen = np.all(np.isfinite(raw), axis=1) & ~_placeholders(raw) & _state(table, min([*places, *turns]))
     if q is not None:
         norm = np.linalg.norm(np.nan_to_num(q), axis=1)
         seen &= np.isfinite(q).all(axis=1) & (norm > 0.5)
@@ -145,12 +145,21 @@ def _sensor(table: RawTable, name: str, group: tuple[list[int], list[int], str],
         seen &= ~zeros | bool(np.mean(zeros) > 0.5)
     known = [column for column in columns if column is not None]
     position = np.column_stack(known) if len(known) == 3 else raw * _scale(raw[seen], table, choices)
+    seen &= np.linalg.norm(position, axis=1) < _FARTHEST
     asked = choices.get("quaternion")
     if q is not None and asked is not None:
         if asked not in ("wxyz", "xyzw"):
             raise InputError(f"expected 'wxyz' or 'xyzw', got {shown(asked)}", key="quaternion")
         order = str(asked)
     return Sensor(name, position, q if q is None else _as_xyzw(q, order or "wxyz"), seen, order)
+
+
+def _placeholders(raw: Array) -> NDArray[np.bool_]:
+    """Return which rows hold one number three times, beyond all others: -9999 and the like stand for a lost sensor."""
+    same = (raw == raw[:, :1]).all(axis=1) & (raw[:, 0] != 0)
+    others = raw[~same & np.isfinite(raw).all(axis=1)]
+    beyond: NDArray[np.bool_] = same & (np.abs(raw[:, 0]) > np.max(np.abs(others), initial=0.0)) & bool(len(others))
+    return beyond
 
 
 def _as_xyzw(q: Array, order: str) -> Array:
