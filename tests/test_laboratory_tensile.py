@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from laboratory_files import FOLDER, SPECIMEN, check_of, imported
 
+from softnlp.base.errors import InputError
 from softnlp.cli import main
 from softnlp.laboratory.choices import AskError, settings_from_words
 from softnlp.laboratory.signals import break_row, legs
@@ -122,6 +123,22 @@ def test_the_whole_length_of_a_dumbbell_is_warned_of(tmp_path: Path) -> None:
         file = machine(tmp_path, f"{preamble}Extension (mm),Load (N)", rows)
         assert check_of(imported(file), name).verdict == verdict
     assert name not in [check.name for check in imported(file, gauge_length_mm=30).checks]
+
+
+def test_two_lengths_are_asked_for(tmp_path: Path) -> None:
+    preamble = "Grip to grip separation (mm),50\nGauge length (mm),25\n"
+    rows = np.column_stack([50 * (STRETCH - 1), 8 * STRESS])
+    file = machine(tmp_path, f"{preamble}Crosshead displacement (mm),Force (N)", rows)
+    with pytest.raises(AskError, match=r"gauge_length_mm=50.*gauge_length_mm=25"):
+        imported(file, area_mm2=8)
+    assert modulus(file=file, area_mm2=8, gauge_length_mm=50) == pytest.approx(0.03, rel=1e-3)
+
+
+@pytest.mark.parametrize("header", ["Compressive strain (-),Stress (kPa)", "Strain (-),Compressive stress (kPa)"])
+def test_compression_is_no_tensile_test(header: str, tmp_path: Path) -> None:
+    file = machine(tmp_path, header, np.column_stack([1 - 1 / STRETCH, 1e3 * STRESS]))
+    with pytest.raises(InputError, match="of compression"):
+        imported(file)
 
 
 def test_side_by_side_specimens(tmp_path: Path) -> None:

@@ -9,10 +9,12 @@ import numpy as np
 
 from softnlp.base.reading import shown
 from softnlp.base.units import MILLIMETRE
-from softnlp.laboratory.choices import Choices
+from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.table import RawTable
+from softnlp.laboratory.units import UNITS
 from softnlp.studies.check import Check
 
+_GRIPS = r"\b(grip|jaw|clamp)|einspannl"
 _MARKED = r"gauge|l0|messl"  # labels of what is stretched, and of nothing else
 _LABELS: Mapping[str, Sequence[str]] = {
     "gauge_length": (r"gauge", r"^(specimen |sample )?length", r"l0|messl"),
@@ -51,8 +53,23 @@ def area_of(table: RawTable, choices: Choices) -> tuple[float | None, bool]:
     return width * thickness * MILLIMETRE**2, True
 
 
-def gauge_length(table: RawTable, choices: Choices) -> float | None:
-    """Return the length that is stretched [mm], None where nothing says it."""
+def gauge_length(table: RawTable, choices: Choices, moved: bool) -> float | None:
+    """Return the length that is stretched [mm], None where nothing says it; moved : whether a displacement is of it.
+
+    Raises
+    ------
+    AskError
+        Where a preamble has a distance of the grips besides, and either could be what a displacement is of.
+    """
+    grips, marked = table.value(_GRIPS), _written(table, "gauge_length")
+    if moved and choices.get("gauge_length_mm") is None and grips is not None and marked is not None:
+        apart = grips[1] * (UNITS["mm"] if grips[2] is None else grips[2]).scale / MILLIMETRE
+        if abs(apart - marked[1]) > 0.01 * marked[1]:
+            raise AskError(
+                f"{table.file}: two lengths could be what was stretched: {shown(grips[0])} is {apart:.6g} mm "
+                f"(--set gauge_length_mm={apart:.6g}, for the way of the crosshead), {shown(marked[0])} is "
+                f"{marked[1]:.6g} mm (--set gauge_length_mm={marked[1]:.6g}, for an extensometer)"
+            )
     return _size(table, "gauge_length", choices)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +26,7 @@ _STRAIN, _STRESS, _STRETCH = r"strain|dehnung", r"stress|spannung|^sigma", r"str
 ALONG, ACROSS = rf"{DISPLACEMENT}|{_STRAIN}|{_STRETCH}", rf"{_STRESS}|{_FORCE}"
 _TRUE = r"true|cauchy|wahre|hencky|(?<![a-z])(?:ln|log(?:arithm\w*)?)(?![a-z])"
 _GREEN, _RATE = r"green|lagrang", r"rate|limit|pacing|almansi"
+_COMPRESSION = r"compress|druck(spannung|kraft)"
 _SAME = 0.02  # relative, of two columns that say the same
 _STRESS_UNITS = ("Pa", "kPa", "bar", "psi", "MPa")
 
@@ -71,8 +73,7 @@ def curve_of(table: RawTable, choices: Choices) -> Curve:
     """
     missing: list[str] = []
     area, sized = area_of(table, choices)
-    gauge = gauge_length(table, choices)
-    stretch, told = _stretch(table, choices, gauge, missing)
+    stretch, told = _stretch(table, choices, missing)
     stress, more = _stress(table, choices, stretch, area, missing)
     if missing or stretch is None or stress is None:
         raise AskError(f"{table.file}: {'; and '.join(missing)}")
@@ -83,9 +84,7 @@ def curve_of(table: RawTable, choices: Choices) -> Curve:
     return Curve(stretch[known], stress[known], area, (*told, *more, *size_checks(table, area, choices)))
 
 
-def _stretch(
-    table: RawTable, choices: Choices, gauge: float | None, missing: list[str]
-) -> tuple[Array | None, list[Check]]:
+def _stretch(table: RawTable, choices: Choices, missing: list[str]) -> tuple[Array | None, list[Check]]:
     """Return the stretch, and the check of the crosshead against a strain where the file has both."""
     columns = {
         "stretch": one_column(table, "stretch", table.named(_STRETCH), choices),
@@ -107,6 +106,8 @@ def _stretch(
         choices.take("extension", chosen, f"measured at the specimen, or made from it; the file has {others} too")
     k = columns[chosen]
     assert k is not None
+    _require_tension(table, k)
+    gauge = gauge_length(table, choices, chosen == "displacement")
     crosshead = None
     if columns["displacement"] is not None and (gauge is not None or chosen == "displacement"):
         moved = in_si(table, columns["displacement"], "length", choices, "displacement")
@@ -129,6 +130,14 @@ def _stretch(
         choices.take("extension", chosen, "(stretch^2 - 1) / 2, by its name")
     stretch = _stretch_of(strain, chosen)
     return stretch, [] if crosshead is None else _crosshead_check(crosshead, stretch)
+
+
+def _require_tension(table: RawTable, k: int) -> None:
+    """Raise `InputError` for a column of a compression test, whose signs and stretches are others."""
+    if re.search(_COMPRESSION, table.names[k], re.IGNORECASE):
+        raise InputError(
+            f"{table.file}: column {shown(table.names[k])} is of compression; a test in tension is expected"
+        )
 
 
 def _stretch_of(strain: Array, measure: str) -> Array:
@@ -211,6 +220,7 @@ def _stress(
     k = columns.get(chosen)
     if k is None:
         raise InputError(f"expected {' or '.join(map(repr, known))}, got {shown(asked)}", key="stress")
+    _require_tension(table, k)
     force = columns["force"] if columns["force"] is not None and columns["force"] != k else None
     pull = None if force is None else in_si(table, force, "force", choices, "force")
     if chosen == "force":
