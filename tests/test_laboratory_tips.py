@@ -65,6 +65,17 @@ def test_numbers_that_stand_for_a_lost_sensor_are_no_tips(lost: float, unit: str
     assert np.max(np.abs(tips(found))) < 100
 
 
+def test_whole_numbers_without_a_unit_may_be_counts(tmp_path: Path) -> None:
+    counts = 101 + np.round(np.column_stack([80 * np.abs(np.sin(np.arange(60) / 9 + k)) for k in range(3)]))
+    counts[:5] = 101
+    file = tmp_path / "log.csv"
+    np.savetxt(file, np.column_stack([np.arange(60) * 50, counts]), "%d", ",", header="millis,p1,p2,p3", comments="")
+    with pytest.raises(AskError, match="calibration="):
+        imported(str(file), kind="pressure")
+    found = imported(str(file), kind="pressure", calibration=[101, 0.01])
+    assert found.columns["p1_bar"] == pytest.approx((counts[:, 0] - 101) / 100)
+
+
 def test_metres_and_an_upward_y(tmp_path: Path) -> None:
     found = imported("tracker_optical_states.csv", **GIVEN)
     turn = Rotation.from_rotvec([-np.pi / 2, 0, 0])  # z up to y up

@@ -132,7 +132,7 @@ def _in_bar(table: RawTable, chosen: Sequence[int], choices: Choices) -> Array:
     columns = []
     for k in chosen:
         unit = table.units[k]
-        if unit is not None and unit.kind == "other":
+        if (unit is not None and unit.kind == "other") or (unit is None and "calibration" in choices.given):
             columns.append(_calibrated(table, k, choices))
             continue
         known = in_si(table, k, "pressure", choices, "pressure")
@@ -143,7 +143,7 @@ def _in_bar(table: RawTable, chosen: Sequence[int], choices: Choices) -> Array:
 
 
 def _calibrated(table: RawTable, k: int, choices: Choices) -> Array:
-    """Return a column of a sensor's volts or amperes in bar, by two numbers that a person gives."""
+    """Return a column of a sensor's volts, amperes or counts in bar, by two numbers that a person gives."""
     line = choices.numbers("calibration", 2)
     if line is None:
         unit = table.units[k]
@@ -157,11 +157,15 @@ def _calibrated(table: RawTable, k: int, choices: Choices) -> Array:
 
 
 def _unit(table: RawTable, chosen: Sequence[int], choices: Choices) -> str:
-    """Return the unit of columns that have none: that in which the sets rest at the pressure of the air."""
+    """Return the unit of columns that have none: that in which the sets rest at the pressure of the air.
+
+    Whole numbers are asked about, since counts of a converter may rest there by chance.
+    """
     values = np.column_stack([table.columns[k] for k in chosen])
+    counts = bool(np.all(np.mod(values[np.isfinite(values)], 1) == 0))
     rest = float(np.median(np.nanmin(values, axis=0)))
     air = [u for u in _UNITS if _ATMOSPHERE[0] <= rest * UNITS[u].scale / BAR <= _ATMOSPHERE[1]]
-    if len(air) == 1:
+    if len(air) == 1 and not counts:
         return str(
             choices.take("unit.pressure", air[0], f"the sets rest at {rest:.5g}, the air's pressure in {air[0]}")
         )
@@ -172,6 +176,8 @@ def _unit(table: RawTable, chosen: Sequence[int], choices: Choices) -> str:
         + f" (--set unit.pressure={u})"
         for u in _UNITS[:4]
     ]
+    if counts:
+        told.append("it may be counts too, for all are whole (--set calibration=[counts at 0 bar, bar a count])")
     raise AskError(f"{table.file}: column {shown(table.names[chosen[0]])} has no unit: {'; '.join(told)}")
 
 
