@@ -76,6 +76,17 @@ def test_whole_numbers_without_a_unit_may_be_counts(tmp_path: Path) -> None:
     assert found.columns["p1_bar"] == pytest.approx((counts[:, 0] - 101) / 100)
 
 
+def test_centimetres_are_not_taken_for_millimetres(tmp_path: Path) -> None:
+    bend = np.linspace(0.01, 1.2, 60)
+    rows = 6 * np.column_stack([(1 - np.cos(bend)) / bend, 0 * bend, np.sin(bend) / bend])
+    np.savetxt(tmp_path / "tips.csv", rows, delimiter=",", header="x,y,z", comments="")
+    with pytest.raises(AskError, match=r"within 5.*unit\.position=mm, or cm"):
+        imported(str(tmp_path / "tips.csv"))
+    assert tips(imported(str(tmp_path / "tips.csv"), unit__position="cm"))[0, 2] == pytest.approx(60, abs=0.1)
+    np.savetxt(tmp_path / "tips.csv", 10 * rows, delimiter=",", header="x,y,z", comments="")
+    assert tips(imported(str(tmp_path / "tips.csv")))[0, 2] == pytest.approx(60, abs=0.1)
+
+
 def test_metres_and_an_upward_y(tmp_path: Path) -> None:
     found = imported("tracker_optical_states.csv", **GIVEN)
     turn = Rotation.from_rotvec([-np.pi / 2, 0, 0])  # z up to y up

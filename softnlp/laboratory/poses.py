@@ -26,6 +26,7 @@ _STATE = re.compile(r"state|status", re.IGNORECASE)
 _SEEN = ("ok", "valid", "visible", "tracked", "enabled", "good", "1", "true")
 _TOOL = re.compile(r"^(tool|sensor|body|marker|rigid ?body|port ?handle|tool ?info|name)s?\b", re.IGNORECASE)
 _REACH = (1e-3, 3.0)  # [m]: how far a tip moves in a test
+_SHORT = 0.04  # [m]: a robot for which positions in mm may as well be in cm
 _FARTHEST = 10.0  # [m]: beyond what any tracker sees
 
 
@@ -186,9 +187,11 @@ def _scale(position: Array, table: RawTable, choices: Choices) -> float:
     reach = float(np.linalg.norm(np.ptp(position, axis=0))) if len(position) else 0.0
     size = max(reach, float(np.linalg.norm(np.median(position, axis=0))) if len(position) else 0.0)
     likely = [u for u in ("mm", "m") if _REACH[0] <= size * UNITS[u].scale <= _REACH[1]]
+    if size * UNITS["mm"].scale < _SHORT < size * UNITS["cm"].scale:
+        likely.append("cm")
     if len(likely) != 1:
         raise AskError(
-            f"{table.file}: its positions have no unit and lie within {size:.4g}: --set unit.position=mm, or m"
+            f"{table.file}: its positions have no unit and lie within {size:.4g}: --set unit.position=mm, or cm, m"
         )
     unit = choices.take(
         "unit.position", likely[0], f"the positions lie within {size:.4g}, {size * UNITS[likely[0]].scale:.3g} m"
