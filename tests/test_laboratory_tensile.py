@@ -125,6 +125,19 @@ def test_the_whole_length_of_a_dumbbell_is_warned_of(tmp_path: Path) -> None:
     assert name not in [check.name for check in imported(file, gauge_length_mm=30).checks]
 
 
+def test_a_setting_against_the_file_is_not_silent(tmp_path: Path) -> None:
+    preamble = "Gauge length (mm),25\nWidth (mm),4\nThickness (mm),2\n"
+    rows = np.column_stack([25 * (STRETCH - 1), 8 * STRESS])
+    file = machine(tmp_path, f"{preamble}Extension (mm),Load (N)", rows)
+    check = check_of(imported(file, area_mm2=80), "size that was set over that of the preamble")
+    assert "area_mm2 is 80, and the file says 8" in check.message
+    assert check_of(imported(file, area_mm2=8), check.name).verdict == "passed"
+    with pytest.raises(InputError, match=r"'Load' is in N, got mN.*unit\.Load=mN"):
+        imported(file, unit__force="mN")
+    assert modulus(file=file, unit__force="N") == pytest.approx(0.03, rel=1e-3)
+    assert imported(file, unit__Load="mN", accept="shear-modulus-of-the-data").columns["stress_MPa"][-1] < 1e-4
+
+
 def test_two_lengths_are_asked_for(tmp_path: Path) -> None:
     preamble = "Grip to grip separation (mm),50\nGauge length (mm),25\n"
     rows = np.column_stack([50 * (STRETCH - 1), 8 * STRESS])

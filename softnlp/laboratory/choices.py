@@ -40,7 +40,8 @@ class Choices:
 
     given : by dotted key. used : every setting that decided something, given or guessed, in the order of use.
     guesses : those that were not given. dropped : rows left out, by reason. varying : keys that were guessed to be one
-    thing of one file and another of the next.
+    thing of one file and another of the next. against : settings that a file itself contradicts, with what to say.
+    decisive : those that all the same decided something else.
     """
 
     given: Mapping[str, Any]
@@ -48,6 +49,8 @@ class Choices:
     guesses: list[Guess] = field(default_factory=list)
     dropped: dict[str, int] = field(default_factory=dict)
     varying: set[str] = field(default_factory=set)
+    against: dict[str, str] = field(default_factory=dict)
+    decisive: set[str] = field(default_factory=set)
     _known: set[str] = field(default_factory=set)
 
     def get(self, key: str, default: Any = None) -> Any:
@@ -108,10 +111,12 @@ class Choices:
             self.dropped[reason] = self.dropped.get(reason, 0) + int(count)
 
     def require_used(self) -> None:
-        """Raise `InputError` for a setting that nothing asked for."""
+        """Raise `InputError` for a setting that nothing asked for, and one that only contradicts a file."""
         for key in self.given:
             if key not in self._known:
                 raise InputError(f"this setting is not used here{nearest(key, self._known)}", key=key)
+            if key in self.against and key not in self.decisive:
+                raise InputError(self.against[key], key=key)
 
 
 def settings_from_words(words: Iterable[str]) -> dict[str, Any]:

@@ -82,7 +82,37 @@ def _written(table: RawTable, key: str) -> tuple[str, float] | None:
 
 
 def size_checks(table: RawTable, area: float | None, choices: Choices) -> list[Check]:
-    """Return the check of a gauge length that a preamble only calls a length; area : of the specimen [m^2]."""
+    """Return the checks of sizes that were set against a preamble, and of a gauge length that it only calls a length.
+
+    area : of the specimen [m^2].
+    """
+    return [*_set_checks(table, area, choices), *_slender_checks(table, area, choices)]
+
+
+def _set_checks(table: RawTable, area: float | None, choices: Choices) -> list[Check]:
+    """Return the checks of sizes that were set beside others of a preamble."""
+    written = {key: found[1] for key in _LABELS if (found := _written(table, key)) is not None}
+    pairs = [(f"{key}_mm", choices.given.get(f"{key}_mm"), value) for key, value in written.items()]
+    if area is not None and "area_mm2" in choices.given:
+        if "diameter" in written:
+            pairs.append(("area_mm2", area / MILLIMETRE**2, float(np.pi / 4) * written["diameter"] ** 2))
+        elif {"width", "thickness"} <= set(written):
+            pairs.append(("area_mm2", area / MILLIMETRE**2, written["width"] * written["thickness"]))
+    return [
+        Check(
+            "size that was set over that of the preamble",
+            given / value,
+            (0.99, 1.01),
+            (0, np.inf),
+            f"{key} is {given:.6g}, and the file says {value:.6g}; leave the setting out, or know why it differs",
+        )
+        for key, given, value in pairs
+        if given is not None
+    ]
+
+
+def _slender_checks(table: RawTable, area: float | None, choices: Choices) -> list[Check]:
+    """Return the check of a gauge length that a preamble only calls a length."""
     length = _written(table, "gauge_length")
     taken = choices.used.get("gauge_length_mm")
     if length is None or length[1] != taken or re.search(_MARKED, length[0]):

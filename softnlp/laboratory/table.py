@@ -228,7 +228,7 @@ def _values(before: Sequence[Sequence[str]], decimal: str) -> dict[str, tuple[fl
 def in_si(table: RawTable, k: int, kind: str, choices: Choices, role: str) -> Array | None:
     """Return a column in SI, None where nothing says its unit.
 
-    Its unit is that of the setting `unit.ROLE` or `unit.NAME`, else the one that the file has for it.
+    Its unit is that of the setting `unit.NAME`, else the one that the file has for it, else that of `unit.ROLE`.
 
     Raises
     ------
@@ -236,13 +236,20 @@ def in_si(table: RawTable, k: int, kind: str, choices: Choices, role: str) -> Ar
         For a unit that is none, or that measures something else.
     """
     name = table.names[k]
-    unit = table.units[k]
-    for key in (f"unit.{role}", f"unit.{name}"):
+    unit = own = table.units[k]
+    for key in (f"unit.{name}", f"unit.{role}"):
         asked = choices.get(key)
         if asked is not None:
             unit = unit_named(str(asked))
             if unit is None or unit.kind != kind:
                 raise InputError(f"expected a unit of {kind}, got {shown(asked)}", key=key)
+            if key != f"unit.{name}" and own is not None:
+                if own != unit:
+                    told = f"{table.file}: column {shown(name)} is in {own.name}, got {unit.name}"
+                    choices.against[key] = f"{told}; where the file is wrong, say --set unit.{name}={unit.name}"
+                unit = own
+            else:
+                choices.decisive.add(key)
             break
     if unit is None:
         return None
