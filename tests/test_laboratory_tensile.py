@@ -233,6 +233,18 @@ def test_a_wrong_reading_of_a_renamed_file_is_warned_by_name(
     assert message in said.out + said.err
 
 
+def test_a_hold_is_warned_of(tmp_path: Path) -> None:
+    held = np.column_stack([np.full(200, STRETCH[-1]), STRESS[-1] * (0.6 + 0.4 * np.exp(-np.arange(200) / 40))])
+    rows = np.vstack([np.column_stack([STRETCH, STRESS]), held])
+    file, name = machine(tmp_path, "Stretch,Stress (MPa)", rows), "share of rows in which the stress relaxes"
+    assert check_of(imported(file), name).value == pytest.approx(200 / 261, abs=0.01)
+    assert check_of(imported(file, stretch=[1, 2.19]), name).verdict == "passed"
+    assert modulus(file=file, stretch=[1, 2.19]) == pytest.approx(0.03, rel=1e-3)
+    for known in ("utm_cyclic.csv", "utm_to_failure_four_columns.csv"):
+        settings = SPECIMEN if known == "utm_cyclic.csv" else {}
+        assert check_of(imported(known, **settings), name).value == 0
+
+
 def test_legs_and_breaks() -> None:
     rise, fall = np.linspace(0, 1, 30), np.linspace(1, 0, 30)
     assert [leg.rising for leg in legs(np.concatenate([rise, fall, rise, fall]))] == [True, False, True, False]

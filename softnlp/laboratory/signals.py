@@ -14,6 +14,7 @@ Rows = NDArray[np.intp]
 
 _TURN = 0.1  # of the range: a smaller fall is noise and no turn
 _BROKEN = 0.5  # of the largest stress: what is left of it after a break
+_HELD, _RELAXED = 2e-3, 0.02  # of the range of the stretch, and of the largest stress
 _NOISE = 6.0  # standard deviations of the change between samples
 
 
@@ -54,6 +55,21 @@ def break_row(stress: Array) -> int:
         if falls[0] <= max(5, 0.05 * top):
             return top
     return len(stress)
+
+
+def relaxing(stretch: Array, stress: Array) -> int:
+    """Return over how many rows a stress falls while the stretch is held: that relaxes and follows no elastic law."""
+    held = _HELD * float(np.ptp(stretch))
+    fall = _RELAXED * float(np.max(np.abs(stress)))
+    count = first = 0
+    while first < len(stretch):
+        away = np.flatnonzero(np.abs(stretch[first:] - stretch[first]) > held)
+        end = first + int(away[0]) if away.size else len(stretch)
+        third = (end - first) // 3
+        if third > 1 and np.median(stress[first : first + third]) - np.median(stress[end - third : end]) > fall:
+            count += end - first
+        first = end
+    return count
 
 
 def enclosed_area(x: Array, y: Array) -> float:

@@ -40,7 +40,7 @@ class Curve:
     area: float | None
     checks: tuple[Check, ...]
 
-    def kept(self, rows: slice) -> Curve:
+    def kept(self, rows: slice | NDArray[np.intp]) -> Curve:
         """Return the curve with some of its rows."""
         return replace(self, stretch=self.stretch[rows], stress=self.stress[rows])
 

@@ -13,7 +13,7 @@ from softnlp.base.reading import shown
 from softnlp.base.units import MEGAPASCAL
 from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.imported import ANY, Imported, require_possible
-from softnlp.laboratory.signals import Leg, break_row, enclosed_area, legs
+from softnlp.laboratory.signals import Leg, break_row, enclosed_area, legs, relaxing
 from softnlp.laboratory.specimen import ACROSS, ALONG, Curve, curve_of, specimens
 from softnlp.laboratory.table import RawTable
 from softnlp.studies.check import Check
@@ -51,6 +51,7 @@ def import_tensile(tables: Sequence[RawTable], choices: Choices) -> Imported:
     if stretch.size < 3:
         raise InputError(f"{stretch.size} points are left, too few for a tensile test")
     checks = [*(check for curve in curves for check in curve.checks), *_cycle_checks(cycles, choices)]
+    checks.append(_held_check(parts, choices))
     checks += [*curve_checks(stretch, stress), *stiffness_checks(stretch, stress)]
     require_possible(checks, choices)
     columns = {"stretch": stretch, "stress_MPa": stress / MEGAPASCAL}
@@ -115,6 +116,20 @@ def _cycle_checks(cycles: int, choices: Choices) -> list[Check]:
     return [Check("load cycles taken as one test", cycles, (1, 1), ANY, likely)]
 
 
+def _held_check(parts: Sequence[Curve], choices: Choices) -> Check:
+    """Return the check of rows that are kept though the stretch is held and the stress relaxes."""
+    limits = choices.used.get("stretch", (-np.inf, np.inf))
+    kept = [part.kept(np.flatnonzero(_within(part.stretch, limits))) for part in parts]
+    kept = [part for part in kept if part.stretch.size]
+    held = sum(relaxing(part.stretch, part.stress) for part in kept)
+    share = held / sum(part.stretch.size for part in kept)
+    top = max(float(np.max(part.stretch)) for part in kept)
+    likely = (
+        f"the stress relaxes while the stretch is held; stretch=[1, {0.995 * top:.4g}] leaves a hold at the end out"
+    )
+    return Check("share of rows in which the stress relaxes", share, (0, 0.02), ANY, likely)
+
+
 def _cut(stretch: Array, stress: Array, choices: Choices) -> tuple[Array, Array]:
     """Return the points within the range of stretch that is asked for."""
     limits = choices.numbers("stretch", 2)
@@ -123,9 +138,14 @@ def _cut(stretch: Array, stress: Array, choices: Choices) -> tuple[Array, Array]
         limits = choices.take("stretch", list(_USUAL), f"{reason}; stretch=[1, {np.max(stretch):.3g}] takes it all")
     if limits is None:
         return stretch, stress
-    kept = (stretch >= limits[0] - 1e-9) & (stretch <= limits[1] + 1e-9)
+    kept = _within(stretch, limits)
     choices.drop(int(np.sum(~kept)), f"points outside stretch = {list(limits)}")
     return stretch[kept], stress[kept]
+
+
+def _within(stretch: Array, limits: Sequence[float]) -> NDArray[np.bool_]:
+    kept: NDArray[np.bool_] = (stretch >= limits[0] - 1e-9) & (stretch <= limits[1] + 1e-9)
+    return kept
 
 
 def tared(curve: Curve, choices: Choices) -> Curve:
