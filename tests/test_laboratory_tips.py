@@ -87,6 +87,22 @@ def test_centimetres_are_not_taken_for_millimetres(tmp_path: Path) -> None:
     assert tips(imported(str(tmp_path / "tips.csv")))[0, 2] == pytest.approx(60, abs=0.1)
 
 
+@pytest.mark.parametrize("sense", [1, -1])
+def test_turns_of_the_other_sense_are_warned_of(sense: int, tmp_path: Path) -> None:
+    bend = np.linspace(0.01, 1.2, 60)
+    tip = 60 * np.column_stack([(1 - np.cos(bend)) / bend, 0 * bend, np.sin(bend) / bend])
+    R = Rotation.from_rotvec(np.outer(bend, [0, 1, 0]))
+    q = R.as_quat() * [sense, sense, sense, 1]
+    header = "x_mm,y_mm,z_mm,qx,qy,qz,qw"
+    rows = np.column_stack([tip + R.apply([0, 0, 8]), q])
+    np.savetxt(tmp_path / "tips.csv", rows, delimiter=",", header=header, comments="")
+    found = imported(str(tmp_path / "tips.csv"), tip_offset_mm=[0, 0, 8])
+    check = check_of(found, "cosine between the tip's motion and its turn")
+    assert check.value == pytest.approx(sense, abs=0.05)
+    assert check.verdict == ("passed" if sense > 0 else "warned")
+    assert np.allclose(tips(found), tip, atol=1e-3) == (sense > 0)
+
+
 def test_metres_and_an_upward_y(tmp_path: Path) -> None:
     found = imported("tracker_optical_states.csv", **GIVEN)
     turn = Rotation.from_rotvec([-np.pi / 2, 0, 0])  # z up to y up

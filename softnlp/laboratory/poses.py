@@ -257,3 +257,20 @@ def order_misfits(sensor: Sensor) -> dict[str, float]:
         cosine = np.abs(np.sum(axis * moved, axis=1)[used]) / (turn * far)[used]
         found[order] = float(np.mean(cosine))
     return found
+
+
+def turn_sense(position: Array, quaternion: Array) -> float | None:
+    """Return the mean cosine between where a tip moves and where it turns the z axis to, None where it hardly turns.
+
+    position : (rows, 3), of a robot along z at rest. quaternion : (rows, 4) x, y, z, w.
+    """
+    from scipy.spatial.transform import Rotation
+
+    R = Rotation.from_quat(quaternion)
+    turned = np.cross((R * R[0].inv()).as_rotvec(), [0.0, 0.0, 1.0])[:, :2]
+    moved = (position - position[0])[:, :2]
+    turn, far = np.linalg.norm(turned, axis=1), np.linalg.norm(moved, axis=1)
+    used = (turn > 0.1) & (far > 0.2 * far.max())
+    if np.sum(used) < 3:
+        return None
+    return float(np.mean(np.sum(turned * moved, axis=1)[used] / (turn * far)[used]))

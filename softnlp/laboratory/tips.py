@@ -13,7 +13,7 @@ from softnlp.base.units import MILLIMETRE
 from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.clock import time_of
 from softnlp.laboratory.imported import ANY, Imported, require_possible
-from softnlp.laboratory.poses import Sensor, order_misfits, pose_groups, sensors, tip_and_base
+from softnlp.laboratory.poses import Sensor, order_misfits, pose_groups, sensors, tip_and_base, turn_sense
 from softnlp.laboratory.pressure import is_pressure, pressure_columns, pressures_of
 from softnlp.laboratory.samples import sample_checks, spikes
 from softnlp.laboratory.signals import noise
@@ -58,7 +58,7 @@ def import_tips(tables: Sequence[RawTable], choices: Choices) -> Imported:
     choices.drop(lost, "rows in which the sensor was not seen")
     checks = _quaternion_checks(tip)
     position, quaternion, more = _in_frame(tip, None if base_name is None else found[base_name][1], choices)
-    checks += more
+    checks += [*more, *_sense_checks(position, quaternion, choices)]
     time, seen = None, tip.seen
     pressures = None
     if pressure_columns(table) and not logs:
@@ -176,6 +176,18 @@ def _quaternion_checks(tip: Sensor) -> list[Check]:
     limit = 0.3 if best[1] > 0.5 * used[1] else min(0.3, 0.12)
     found.append(Check("quaternion order", used[1], (0, limit), (0, 1), likely))
     return found
+
+
+def _sense_checks(position: Array, quaternion: Array | None, choices: Choices) -> list[Check]:
+    """Return the check of the sense of the turns, in the robot's frame: a tip moves to where it turns the z axis."""
+    cosine = None if quaternion is None or choices.used.get("frame") == "fit" else turn_sense(position, quaternion)
+    if cosine is None:
+        return []
+    likely = (
+        "the tip moves against its turn: the quaternion is that from the robot to the sensor, so negate its vector "
+        "part (a tip_offset_mm goes the wrong way else); or z is not along the robot: --set frame=…, up=…"
+    )
+    return [Check("cosine between the tip's motion and its turn", cosine, (0, 1), ANY, likely)]
 
 
 def _rest_checks(columns: dict[str, Array], choices: Choices) -> list[Check]:
