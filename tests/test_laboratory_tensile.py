@@ -161,6 +161,27 @@ def test_side_by_side_specimens(tmp_path: Path) -> None:
     assert modulus(file=file, **SPECIMEN, specimen=2) == pytest.approx(0.033, rel=1e-3)
 
 
+@pytest.mark.parametrize(("area", "gauge"), [(16, 25), (8, 50)])
+def test_each_block_has_its_own_sizes(area: float, gauge: float, tmp_path: Path) -> None:
+    text = ""
+    for number, (wide, long) in enumerate([(8, 25), (area, gauge)], start=1):
+        head = f"Specimen {number}\nArea (mm^2),{wide}\nGauge length (mm),{long}\nExtension (mm),Load (N)\n"
+        rows = zip(long * (STRETCH - 1), wide * STRESS, strict=True)
+        text += head + "".join(f"{moved:.6f},{force:.8f}\n" for moved, force in rows) + "\n"
+    file = tmp_path / "blocks.csv"
+    file.write_text(text)
+    for specimen in ("all", 1, 2):
+        assert modulus(file=str(file), specimen=specimen) == pytest.approx(0.03, rel=1e-3)
+    checks = imported(str(file), area_mm2=8, gauge_length_mm=25).checks
+    assert "warned" in [
+        check.verdict for check in checks if check.name == "size that was set over that of the preamble"
+    ]
+    out = tmp_path / "a"
+    assert main(["import", str(file), "--out", str(out)]) == 0
+    assert main(["import", f"{out}.import.toml", "--out", str(tmp_path / "b")]) == 0
+    assert out.with_suffix(".csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
+
+
 def test_toe_tare_and_preload(tmp_path: Path) -> None:
     moved = 25 * (STRETCH - 1)
     slack = machine(tmp_path, "Extension (mm),Load (N)", np.column_stack([moved + 3, 8 * STRESS]))

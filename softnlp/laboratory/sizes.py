@@ -15,6 +15,7 @@ from softnlp.laboratory.units import UNITS
 from softnlp.studies.check import Check
 
 _GRIPS = r"\b(grip|jaw|clamp)|einspannl"
+_AREA = r"\barea\b.*\bmm(2|\^2|²)"
 _MARKED = r"gauge|l0|messl"  # labels of what is stretched, and of nothing else
 _LABELS: Mapping[str, Sequence[str]] = {
     "gauge_length": (r"gauge", r"^(specimen |sample )?length", r"l0|messl"),
@@ -49,7 +50,11 @@ def area_of(table: RawTable, choices: Choices) -> tuple[float | None, bool]:
     width = _size(table, "width", choices)
     thickness = _size(table, "thickness", choices)
     if width is None or thickness is None:
-        return None, False
+        written = _written_area(table)
+        if written is None:
+            return None, False
+        taken = choices.take("area_mm2", written[1], f"{shown(written[0])} of the preamble")
+        return float(taken) * MILLIMETRE**2, True
     return width * thickness * MILLIMETRE**2, True
 
 
@@ -81,6 +86,12 @@ def _written(table: RawTable, key: str) -> tuple[str, float] | None:
     return found[0], round(found[1] * found[2].scale / MILLIMETRE, 9)
 
 
+def _written_area(table: RawTable) -> tuple[str, float] | None:
+    """Return what a preamble calls the cross-section of the specimen, and it [mm^2], where its label has that unit."""
+    found = table.value(_AREA)
+    return None if found is None or found[1] <= 0 else found[:2]
+
+
 def size_checks(table: RawTable, area: float | None, choices: Choices) -> list[Check]:
     """Return the checks of sizes that were set against a preamble, and of a gauge length that it only calls a length.
 
@@ -98,6 +109,8 @@ def _set_checks(table: RawTable, area: float | None, choices: Choices) -> list[C
             pairs.append(("area_mm2", area / MILLIMETRE**2, float(np.pi / 4) * written["diameter"] ** 2))
         elif {"width", "thickness"} <= set(written):
             pairs.append(("area_mm2", area / MILLIMETRE**2, written["width"] * written["thickness"]))
+        elif (whole := _written_area(table)) is not None:
+            pairs.append(("area_mm2", area / MILLIMETRE**2, whole[1]))
     return [
         Check(
             "size that was set over that of the preamble",

@@ -47,7 +47,7 @@ class Curve:
 
 def specimens(table: RawTable, choices: Choices) -> list[RawTable]:
     """Return the specimens of a file, whose columns stand side by side or whose rows follow each other."""
-    parts = [table.kept(table.repeat == k) for k in np.unique(table.repeat)]
+    parts = [table.block(int(k)) for k in np.unique(table.repeat)]
     count = len(table.names)
     for width in range(2, count // 2 + 1):
         if count % width == 0 and all(table.names[k] == table.names[k % width] for k in range(count)):

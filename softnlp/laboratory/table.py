@@ -36,7 +36,7 @@ class RawTable:
 
     file : as it was named. names, units : of each column. columns : numbers, nan where a cell is missing, or texts.
     repeat : (rows,) how often the header stood above a row again. values : of the preamble, by its label in lower case,
-    with their units. preamble : its lines.
+    with their units. preamble : its lines. later : the values above each repeat of the header.
     """
 
     file: str
@@ -46,6 +46,7 @@ class RawTable:
     repeat: Array
     values: Mapping[str, tuple[float, Unit | None]]
     preamble: tuple[str, ...]
+    later: tuple[Mapping[str, tuple[float, Unit | None]], ...] = ()
 
     @property
     def rows(self) -> int:
@@ -71,6 +72,11 @@ class RawTable:
         index = np.flatnonzero(where) if where.dtype == bool else where.astype(int)
         columns = tuple(c[index] if isinstance(c, np.ndarray) else [c[int(k)] for k in index] for c in self.columns)
         return replace(self, columns=columns, repeat=self.repeat[index])
+
+    def block(self, k: int) -> RawTable:
+        """Return the rows below a repeat of the header, 0 for the first, with the values of its own preamble."""
+        own = self.later[k - 1] if 0 < k <= len(self.later) else {}
+        return replace(self.kept(self.repeat == k), values={**self.values, **own}, later=())
 
     def only(self, chosen: Sequence[int]) -> RawTable:
         """Return the table with some of its columns."""
@@ -138,6 +144,7 @@ def assembled(
     pieces: Sequence[Sequence[Any]],
     choices: Choices,
     decimal: str,
+    later: Sequence[Sequence[Sequence[str]]] = (),
 ) -> RawTable:
     """Return the table of a file from the pieces of its columns, the last one the repeats of its header."""
     *columns, repeats = [_whole(piece) for piece in pieces]
@@ -164,6 +171,7 @@ def assembled(
         repeat=repeats,
         values=_values(before, decimal),
         preamble=tuple(" ".join(c for c in row if c) for row in before if any(row)),
+        later=tuple(_values(above, decimal) for above in later),
     )
 
 

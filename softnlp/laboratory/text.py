@@ -10,7 +10,7 @@ from __future__ import annotations
 import codecs
 import csv
 import io
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -29,6 +29,7 @@ SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "spa
 _LONGEST_LINE = 1_000_000
 _SAMPLE_LINES, _SAMPLE = 600, 400_000
 _CHUNK = 20_000
+_PREAMBLE = 200  # lines above a repeated header
 _NEARLY = 0.9  # of the best score: another reading that is as likely
 _WHITE = 0.9  # of the score of a reading by spaces, which text has too
 
@@ -119,8 +120,8 @@ def text_table(label: str, content: bytes, choices: Choices) -> RawTable:
     header = header_rows(before, block.width, block.rows)
     width = max(block.width, len(header.names))
     rows = _rows(_lines(content, encoding), block)
-    pieces = _columns(rows, block, width, header.names, choices)
-    return assembled(label, header, before, pieces, choices, block.dialect.decimal)
+    pieces, later = _columns(rows, block, width, header.names, choices)
+    return assembled(label, header, before, pieces, choices, block.dialect.decimal, later)
 
 
 def _sample(content: bytes, encoding: str) -> list[str]:
@@ -239,8 +240,13 @@ def _scored(lines: Sequence[str], dialect: Dialect, run: Sequence[tuple[int, tup
 
 def _columns(
     rows: Iterator[list[str]], block: Block, width: int, header: Sequence[str], choices: Choices
-) -> list[list[Any]]:
-    """Return the pieces of each column below the first row of numbers; the last is the repeat of the header above."""
+) -> tuple[list[list[Any]], list[list[list[str]]]]:
+    """Return the pieces of each column below the first row of numbers; the last is the repeat of the header above.
+
+    With them come the rows of text above each repeat.
+    """
+    later: list[list[list[str]]] = []
+    notes_above: deque[list[str]] = deque(maxlen=_PREAMBLE)
     pieces: list[list[Any]] = [[] for _ in range(width + 1)]
     wrong = repeat = 0
     numeric = [_is_numeric(block, k) for k in range(width)]
@@ -251,10 +257,14 @@ def _columns(
                 if any(row[width:]):
                     raise InputError(f"expected at most {width} columns as above, got a row of {len(row)}")
                 row = row[:width]
+            if row and row[0][:1].isalpha():
+                notes_above.append(row)
             count = sum(1 for cell, is_one in zip(row, numeric, strict=False) if is_one and cell[:1] in _BEGINS)
             if not count:
                 if header and [c for c in row if c] == [n for n in header if n]:
                     repeat += 1
+                    later.append(list(notes_above))
+                    notes_above.clear()
                 notes += any(row)
                 continue
             kept.append(row + [""] * (width - len(row)) if len(row) < width else row)
@@ -271,7 +281,7 @@ def _columns(
                 pieces[k].append(list(column))
         pieces[width].append(np.array(repeats, float))
     choices.drop(wrong, "cells that are no number")
-    return pieces
+    return pieces, later
 
 
 _BEGINS = frozenset("0123456789+-.,nN")
