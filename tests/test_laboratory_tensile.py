@@ -182,6 +182,19 @@ def test_each_block_has_its_own_sizes(area: float, gauge: float, tmp_path: Path)
     assert out.with_suffix(".csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
 
 
+def test_each_specimen_has_its_own_row_of_results(tmp_path: Path) -> None:
+    sizes = [(2, 25), (3, 25), (2.5, 50)]
+    table = "".join(f"{k},A-{k},{t},4.0,{gauge}\n" for k, (t, gauge) in enumerate(sizes, start=1))
+    head = f"Results Table 1\n,Specimen label,Thickness,Width,Length\n,,(mm),(mm),(mm)\n{table}\n"
+    curves = [np.column_stack([gauge * (STRETCH - 1), 4 * t * STRESS]) for t, gauge in sizes]
+    names = ",".join(["Extension (mm),Load (N)"] * 3)
+    assert modulus(file=machine(tmp_path, head + names, np.hstack(curves))) == pytest.approx(0.03, rel=1e-3)
+    alone = machine(tmp_path, f"{head}Specimen 2\nExtension (mm),Load (N)", curves[1])
+    with pytest.raises(AskError, match=r"gauge_length_mm.*area_mm2.*specimen="):
+        imported(alone)
+    assert modulus(file=alone, specimen=2) == pytest.approx(0.03, rel=1e-3)
+
+
 def test_toe_tare_and_preload(tmp_path: Path) -> None:
     moved = 25 * (STRETCH - 1)
     slack = machine(tmp_path, "Extension (mm),Load (N)", np.column_stack([moved + 3, 8 * STRESS]))

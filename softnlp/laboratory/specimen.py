@@ -53,6 +53,7 @@ def specimens(table: RawTable, choices: Choices) -> list[RawTable]:
         if count % width == 0 and all(table.names[k] == table.names[k % width] for k in range(count)):
             parts = [part.only(range(k, k + width)) for part in parts for k in range(0, count, width)]
             break
+    parts = _with_results(parts, choices)
     if len(parts) == 1:
         return parts
     asked = choices.take("specimen", "all", f"{len(parts)} specimens; they count as repeats of one test")
@@ -61,6 +62,32 @@ def specimens(table: RawTable, choices: Choices) -> list[RawTable]:
     if isinstance(asked, bool) or not isinstance(asked, int) or not 1 <= asked <= len(parts):
         raise InputError(f"expected 'all' or 1 to {len(parts)}, got {shown(asked)}", key="specimen")
     return [parts[asked - 1]]
+
+
+def _with_results(parts: list[RawTable], choices: Choices) -> list[RawTable]:
+    """Return specimens with the sizes of their own rows of a table of results, none where nothing tells the row.
+
+    One specimen takes the row that the setting `specimen` says.
+    """
+    table = parts[0]
+    units = {label: unit for label, (_, unit) in table.values.items() if unit is not None and unit.kind == "length"}
+    several = {label: v for label, v in table.results.items() if label in units and len(set(v)) > 1}
+    if not several:
+        return parts
+    count = max(map(len, several.values()))
+    rows: list[int | None] = list(range(count)) if len(parts) == count else [None] * len(parts)
+    asked = choices.get("specimen") if len(parts) == 1 else None
+    if asked is not None:
+        if isinstance(asked, bool) or not isinstance(asked, int) or not 1 <= asked <= count:
+            raise InputError(f"expected a row of the results, 1 to {count}, got {shown(asked)}", key="specimen")
+        rows = [asked - 1]
+    made = []
+    for part, row in zip(parts, rows, strict=True):
+        values = {label: value for label, value in part.values.items() if label not in several}
+        if row is not None:
+            values |= {label: (v[row], part.values[label][1]) for label, v in several.items() if row < len(v)}
+        made.append(replace(part, values=values))
+    return made
 
 
 def curve_of(table: RawTable, choices: Choices) -> Curve:
@@ -76,7 +103,9 @@ def curve_of(table: RawTable, choices: Choices) -> Curve:
     stretch, told = _stretch(table, choices, missing)
     stress, more = _stress(table, choices, stretch, area, missing)
     if missing or stretch is None or stress is None:
-        raise AskError(f"{table.file}: {'; and '.join(missing)}")
+        rows = any(label not in table.values for label in table.results)
+        hint = "; its table of results has several rows: --set specimen=… takes one" if rows else ""
+        raise AskError(f"{table.file}: {'; and '.join(missing)}{hint}")
     known = np.isfinite(stretch) & np.isfinite(stress)
     choices.drop(int(np.sum(~known)), "rows with a missing cell")
     if area is not None and sized:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,6 +38,7 @@ class RawTable:
     file : as it was named. names, units : of each column. columns : numbers, nan where a cell is missing, or texts.
     repeat : (rows,) how often the header stood above a row again. values : of the preamble, by its label in lower case,
     with their units. preamble : its lines. later : the values above each repeat of the header.
+    results : of a label of the preamble with a column of several numbers below it, all of them.
     """
 
     file: str
@@ -47,6 +49,7 @@ class RawTable:
     values: Mapping[str, tuple[float, Unit | None]]
     preamble: tuple[str, ...]
     later: tuple[Mapping[str, tuple[float, Unit | None]], ...] = ()
+    results: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
     def rows(self) -> int:
@@ -172,6 +175,7 @@ def assembled(
         values=_values(before, decimal),
         preamble=tuple(" ".join(c for c in row if c) for row in before if any(row)),
         later=tuple(_values(above, decimal) for above in later),
+        results=_results(before, decimal),
     )
 
 
@@ -230,6 +234,23 @@ def _values(before: Sequence[Sequence[str]], decimal: str) -> dict[str, tuple[fl
                 else:
                     continue
             found.setdefault(one_line(label.strip().lower(), LONGEST_NAME), (number(value, decimal), unit))
+    return found
+
+
+def _results(before: Sequence[Sequence[str]], decimal: str) -> dict[str, tuple[float, ...]]:
+    """Return the columns of several numbers in a preamble, as a table of results has, by their labels."""
+    found: dict[str, tuple[float, ...]] = {}
+    for i, row in enumerate(before):
+        for j, cell in enumerate(row):
+            if not cell.strip() or is_number(cell.strip(), decimal) or len(cell) > 80:
+                continue
+            below = [other[j].strip() if j < len(other) else "" for other in before[i + 1 :]]
+            if below and unit_named(below[0]):
+                below = below[1:]
+            column = list(takewhile(lambda text: is_number(text, decimal), below))
+            if len(column) > 1:
+                label = one_line(split_unit(cell.strip().rstrip(":= "))[0].strip().lower(), LONGEST_NAME)
+                found.setdefault(label, tuple(number(text, decimal) for text in column))
     return found
 
 
