@@ -12,6 +12,7 @@ import numpy as np
 
 from softnlp.app.parts import line
 from softnlp.app.session import checked_content, plain_name
+from softnlp.base.columns import BAR_, MM, N, S
 from softnlp.base.errors import InputError
 from softnlp.base.reading import LONGEST_NAME, one_line
 from softnlp.figures.style import colour
@@ -34,7 +35,7 @@ KINDS: Mapping[str, str] = {
     "force": "Forces",
 }
 _OF_FRAME = ("frame", "base_sensor_mm", "rotation_world_from_base_quat_xyzw", "translation_mm")
-_LABELS = {"tips": "tip [mm]", "pressure": "gauge pressure [bar]", "force": "force [N]"}
+_LABELS = {"tips": f"tip [{MM.sign}]", "pressure": f"gauge pressure [{BAR_.sign}]", "force": f"force [{N.sign}]"}
 _DRAWN = {"tips": r"[xyz]_mm", "pressure": r"p\d+_bar", "force": r"f.*_N"}
 
 
@@ -219,7 +220,7 @@ def traces(imported: Imported) -> tuple[list[dict[str, Any]], str, str]:
     x = columns.get("t_s", np.arange(1.0, imported.rows + 1))
     names = [name for name in columns if re.fullmatch(_DRAWN[imported.kind], name)]
     drawn = [line(x, columns[name], colour(k), name.rpartition("_")[0]) for k, name in enumerate(names)]
-    return drawn, "time [s]" if "t_s" in columns else "row", _LABELS[imported.kind]
+    return drawn, f"time [{S.sign}]" if "t_s" in columns else "row", _LABELS[imported.kind]
 
 
 def result_name(imported: Imported) -> str:
