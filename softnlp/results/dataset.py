@@ -9,7 +9,7 @@ import numpy as np
 
 from softnlp.base.arrays import Array
 from softnlp.base.columns import OUTPUTS, Output
-from softnlp.base.netcdf import dataset_bytes, flag_attributes, said
+from softnlp.base.netcdf import Variable, file_bytes, flag_attributes, said
 from softnlp.model.inputs import file_attributes, pressure_bar
 from softnlp.model.quantities import Model
 from softnlp.nlp.solver import EquationResidual
@@ -27,8 +27,6 @@ from softnlp.studies.fields import (
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Variable = tuple[tuple[str, ...], Any, dict[str, Any]]
 
 _CERTIFICATE = (
     "largest error of each equation",
@@ -69,7 +67,20 @@ def to_dataset(run: Run) -> xr.Dataset:
     """
     import xarray as xr
 
-    run = require_run(run, "softnlp.to_dataset")
+    variables, coordinates, attributes = _parts(require_run(run, "softnlp.to_dataset"))
+    return xr.Dataset(variables, coords=coordinates, attrs=attributes)
+
+
+def netcdf_bytes(run: Run) -> bytes:
+    """Return the netCDF file of a run.
+
+    It is made in memory: HDF5 writing to a full disk ends the interpreter instead of raising.
+    """
+    return file_bytes(*_parts(run))
+
+
+def _parts(run: Run) -> tuple[dict[str, Variable], dict[str, Variable], dict[str, Any]]:
+    """Return variables, coordinates and attributes: a run is written without xarray, which takes long to import."""
     steps, pressure = run.steps, OUTPUTS["pressure"]
     points = max((_points(step) for step in steps), default=0)
     sizes = {"axis": 3, "row": 3, "col": 3, "chamber": run.robot.chambers, "s": points}
@@ -92,15 +103,7 @@ def to_dataset(run: Run) -> xr.Dataset:
             variables |= _errors("weighted_residual", "weighted_equation", "weighted_residual_unit", left, _WEIGHTED)
     model = Model(run.robot, run.material, run.coefficients, run.conventions)
     about = file_attributes(run.study, model, run.loads, run.contact, {"warnings": list(run.warnings)})
-    return xr.Dataset(variables, coords=_coordinates(run, variables["arc"][1]), attrs={"title": run.title, **about})
-
-
-def netcdf_bytes(run: Run) -> bytes:
-    """Return the netCDF file of a run.
-
-    It is made in memory: HDF5 writing to a full disk ends the interpreter instead of raising.
-    """
-    return dataset_bytes(to_dataset(run))
+    return variables, _coordinates(run, variables["arc"][1]), {"title": run.title, **about}
 
 
 def _words(along: str, texts: Sequence[str], meaning: str) -> Variable:
