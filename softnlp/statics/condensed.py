@@ -222,7 +222,6 @@ def _pieces(
         "section",
         [column, stretch],
         [constants, ca.densify(c_slope), ca.jacobian(balance, stretch), scales],
-        {"cse": True},
     )
     r = right_sides
     V, state, gap, c, dc, h = (
@@ -238,12 +237,12 @@ def _pieces(
     moves = ca.vertcat(V, ca.horzcat(ca.SX(nc, columns - r), moving))
     arrived = ca.jtimes(step(state, c, h), ca.vertcat(state, c), moves)
     arrived[:, columns - r :] += gap
-    advance = ca.Function("advance", [V, state, gap, c, dc, h], [arrived], {"cse": True})
+    advance = ca.Function("advance", [V, state, gap, c, dc, h], [arrived])
 
     y, a, units = sym("y", ny), sym("a", na), sym("units", 2)
     tip_residual = functions.tip(state, c, y, a, units)
     linear = ca.horzcat(ca.jtimes(tip_residual, ca.vertcat(state, c), moves), ca.jacobian(tip_residual, y))
-    tip = ca.Function("tip", [V, state, c, dc, y, a, units], [ca.densify(linear)], {"cse": True})
+    tip = ca.Function("tip", [V, state, c, dc, y, a, units], [ca.densify(linear)])
 
     return advance, tip, section
 
