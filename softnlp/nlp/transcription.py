@@ -125,7 +125,7 @@ def with_quadrature(field: ca.Function, quadrature: ca.Function) -> ca.Function:
 
 
 @lru_cache(maxsize=16)
-def _interval_slopes(field: ca.Function, method: Transcription) -> ca.Function:
+def interval_slopes(field: ca.Function, method: Transcription) -> ca.Function:
     """Return (states of one interval, c, h, dc) -> Jacobian by all but the last node, by that, and change along dc."""
     interval = method.interval(field)
     m, nc = interval.size1_out(0), interval.size1_in(1)
@@ -141,7 +141,7 @@ def _slopes(field: ca.Function, method: Transcription, unknowns: ca.MX, c: ca.MX
 
     Made of the blocks of one interval, since automatic differentiation of the whole takes some times as long.
     """
-    K, block = method.intervals, _interval_slopes(field, method.with_intervals(1))
+    K, block = method.intervals, interval_slopes(field, method.with_intervals(1))
     m, nx = block.size1_out(0), field.size1_in(0)
     windows = unknowns[(np.arange(m + nx)[:, None] + m * np.arange(K)).T.ravel().tolist()]
     own, following, moved = block.map(K)(ca.reshape(windows, m + nx, K), c, 1 / K, dc)
