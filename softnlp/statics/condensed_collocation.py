@@ -88,7 +88,7 @@ def _interval_entries(field: ca.Function, method: Transcription) -> tuple[ca.Fun
     own, _, moved = slopes(*given)
     rows, columns = own.sparsity().get_triplet()
     return (
-        ca.Function("entries", given, [ca.vertcat(*(ca.SX(entry) for entry in own.nonzeros())), moved]),
+        ca.Function("entries", given, [ca.densify(own.nz[:]), moved]),
         rows,
         columns,
     )
