@@ -78,7 +78,8 @@ class BlockedSolver:
         self.has_wall = wall
         # Without loads the free lengths and tip are taken from the closed form, so the grid need not show it.
         self.poses = poses or PoseSolver(model, numerics, unloaded_accuracy=numerics.accuracy)
-        self.equations = equations or rod_equations(model, (TipContact(contact.closure, wall),))
+        loads = (TipContact(contact.closure, wall),)
+        self.equations = equations or rod_equations(model, loads, like=self.poses.equations)
 
     def with_contact(self, contact: ContactSettings) -> BlockedSolver:
         """Return a solver with other settings that shares what both need compiled."""

@@ -110,7 +110,9 @@ class RodEquations:
         }
 
 
-def rod_equations(model: Model, loads: Sequence[Load] = (), *, by_machine: bool = True) -> RodEquations:
-    """Compile the rod of a model. loads : beside the dead ones. by_machine : see `RodFunctions`."""
-    functions = rod_functions(model, loads, by_machine=by_machine)
+def rod_equations(
+    model: Model, loads: Sequence[Load] = (), *, by_machine: bool = True, like: RodEquations | None = None
+) -> RodEquations:
+    """Compile the rod of a model, see `rod_functions`."""
+    functions = rod_functions(model, loads, by_machine=by_machine, like=like.functions if like else None)
     return RodEquations(functions, functions.declared())

@@ -30,8 +30,8 @@ def pose_solver(model: Model, numerics: Numerics, **settings: Any) -> PoseSolver
 
 def blocked_solver(model: Model, numerics: Numerics, contact: ContactSettings, *, wall: bool = True) -> BlockedSolver:
     """Return a solver for use in this thread, which shares what it compiles as `pose_solver`."""
-    kept = kept_equations(model, (TipContact(contact.closure, wall),))
     poses = pose_solver(model, numerics, unloaded_accuracy=numerics.accuracy)
+    kept = kept_equations(model, (TipContact(contact.closure, wall),))
     return BlockedSolver(model, numerics, contact, wall=wall, poses=poses, equations=kept)
 
 
@@ -42,7 +42,7 @@ def kept_equations(model: Model, loads: tuple[Load, ...] = ()) -> RodEquations:
     """
     kept, name = _KEPT.equations, (model.kind, loads)
     if name not in kept:
-        kept[name] = rod_equations(model, loads)
+        kept[name] = rod_equations(model, loads, like=kept.get((model.kind, ())))
         while len(kept) > MOST_KINDS:
             kept.popitem(last=False)
     kept.move_to_end(name)

@@ -47,7 +47,7 @@ def shape_function(functions: RodFunctions) -> ca.Function:
         end = step(end, c, h / _SUBSTEPS)
     section = unpack_section(c)
     every = ca.vertcat(end, *functions.strains(end[: rod.STATE_SIZE], c), *rod.wall_resultants(end, section))
-    return ca.Function("shape", [x, c, h], [every], {"cse": True})
+    return ca.Function("shape", [x, c, h], [every])
 
 
 class Mapped(Protocol):

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from softnlp.model.numerics import Numerics
 from softnlp.model.rod import STATE_SIZE
-from softnlp.nlp.linear import SparseSolver
 from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.solver import Engine, Solution
-from softnlp.nlp.transcription import method_named
+from softnlp.nlp.transcription import Collocation, method_named
 from softnlp.statics.compiled import RodEquations
 from softnlp.statics.condensed import case_solver
+from softnlp.statics.condensed_collocation import CondensedCollocation
 from softnlp.statics.loadcase import LoadCase, load_case
 from softnlp.statics.single_shooting import AtStretch, Shot
 
@@ -83,7 +83,9 @@ def compiled_grid(equations: RodEquations, numerics: Numerics, intervals: int) -
     given = equations.declared
     case = load_case("pose", equations.functions, given, method)
     problem = compile_problem(list(given.values()), [case])
-    linear = case_solver(case) or SparseSolver(problem)
+    linear: Any = case_solver(case)
+    if isinstance(method, Collocation):
+        linear = CondensedCollocation(equations.functions, method)
     chosen: dict[str, Any] = {"linear": linear, "newton_only": True}
     if numerics.engine == "ipopt":
         chosen = {"linear": linear, "ipopt_only": True, "options": numerics.ipopt}

@@ -52,7 +52,7 @@ def transition_function(field: ca.Function) -> ca.Function:
         turn = ca.vertcat(W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]) / 2
         rows.append(ca.vertcat(moved[0:3, j], turn, moved[12:18, j]))
     transition = ca.substitute(ca.horzcat(*rows), delta, ca.SX.zeros(12))
-    return ca.Function("transition", [x, c, h], [transition], {"cse": True})
+    return ca.Function("transition", [x, c, h], [transition])
 
 
 def conjugate_points(transition: ca.Function, nodes: Array, constants: Array) -> int:
