@@ -17,7 +17,7 @@ from softnlp.laboratory.pressure import is_pressure
 from softnlp.laboratory.samples import sample_checks
 from softnlp.laboratory.signals import noise, plateaus
 from softnlp.laboratory.streams import with_pressures
-from softnlp.laboratory.table import RawTable, in_si
+from softnlp.laboratory.table import RawTable, in_si, no_unit
 from softnlp.studies.check import Check
 
 Array = NDArray[np.float64]
@@ -87,8 +87,8 @@ def _newtons(table: RawTable, k: int, choices: Choices) -> Array:
         said = re.search(_COUNTS.format("n(?!m)"), " ".join(table.preamble), re.IGNORECASE)
         if said is None:
             raise AskError(
-                f"{table.file}: column {shown(table.names[k])} has no unit: --set unit.force=N, or counts_per_N=…; it "
-                f"has {listed(table.names)}"
+                f"{table.file}: {no_unit(table, k, 'force')}: --set unit.force=N, or counts_per_N=…; it has "
+                f"{listed(table.names)}"
             )
         counts = float(choices.take("counts_per_N", float(said[1]), f"{shown(said[0])} of the preamble"))
     plain: Array = table.columns[k]
