@@ -46,10 +46,7 @@ def time_of(table: RawTable, choices: Choices, need: bool = False) -> tuple[Arra
         k, time = min(known, key=lambda pair: abs(float(pair[1][0])))
         return time, [check for j, other in known if j != k for check in _two_clocks(time, other)]
     made = _of_day(table, choices)
-    if made is not None:
-        made = made - made[0]
-    else:
-        made = _from_step(table, choices)
+    made = made - made[0] if made is not None else _from_step(table, choices)
     if made is None and need:
         raise AskError(f"{table.file}: no column tells the time; say --set rate_Hz=…, or --set column.time=…")
     return made, []

@@ -70,7 +70,7 @@ def import_force(tables: Sequence[RawTable], choices: Choices) -> Imported:
     checks.append(Check("largest force", top, (0.005, 100.0), (0.0, 1e5), "looks like mN, kN or counts read as N", "N"))
     numbers = {"noise_N": float(max(map(noise, force.T)))}
     if logs and time is not None:
-        columns, more, found = with_pressures(columns, force, logs[0], choices)
+        columns, more, found = with_pressures(columns, force, table, logs[0], choices)
         checks, numbers = [*checks, *more], numbers | found
     require_possible(checks, choices)
     files = tuple(t.file for t in tables)

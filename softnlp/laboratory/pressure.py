@@ -217,8 +217,8 @@ def _rest_check(gauge: Array, choices: Choices) -> Check:
         usual = (-_AT_REST, max(_AT_REST, level))
     likely = (
         "neither 0, as a gauge shows at rest, nor the pressure of the air: --set zero=absolute where the air has so "
-        f"little, high up; zero=tare, or zero={level:.4g}, where a sensor or regulator rests there; zero=gauge where no "
-        "set goes to 0"
+        f"little, high up; zero=tare, or zero={level:.4g}, where a sensor or regulator rests there; zero=gauge where "
+        "no set goes to 0"
     )
     return Check("level at which all sets rest", level, usual, (-np.inf, usual[1]), likely, "bar")
 

@@ -83,7 +83,7 @@ def import_tips(tables: Sequence[RawTable], choices: Choices) -> Imported:
     if time is not None:
         numbers["noise_mm"] = float(max(map(noise, position.T))) / MILLIMETRE
     if logs:
-        columns, streamed, told = with_pressures(columns, position, logs[0], choices)
+        columns, streamed, told = with_pressures(columns, position, table, logs[0], choices)
         checks, numbers = [*checks, *streamed], numbers | told
     checks += _rest_checks(columns, choices)
     require_possible(checks, choices)
