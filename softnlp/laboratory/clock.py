@@ -9,15 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.base.reading import shown
 from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.imported import ANY
-from softnlp.laboratory.table import RawTable, in_si
+from softnlp.laboratory.table import RawTable, in_si, no_unit
+from softnlp.laboratory.units import UNITS
 from softnlp.studies.check import Check
 
 Array = NDArray[np.float64]
 
-_NAMES = r"^(test |elapsed |relative |run |rel\.? ?)?(time|zeit|t|x_value|seconds|timestamp|time ?stamp)\b"
+_NAMES = (
+    r"^(test |elapsed |relative |run |rel\.? ?)?(time|zeit|t|x_value|seconds|timestamp|time ?stamp|(milli|micro)s)\b"
+)
 _PARTS = (("hour", 3600.0), ("minute", 60.0), ("second", 1.0), (r"ms|millisecond", 1e-3))
 _RATES = (0.1, 5000.0)  # samples a second that a laboratory's logger takes
 _CLOCK = re.compile(
@@ -58,18 +60,19 @@ def _seconds(table: RawTable, k: int, choices: Choices) -> Array | None:
     if known is not None:
         return _past_midnight(known, table, choices)
     plain: Array = table.columns[k]
+    for word, scale in (("millis", 1e-3), ("micros", 1e-6)):
+        if table.names[k].lower() == word:
+            return np.asarray(plain * scale)
     steps = np.diff(plain[np.isfinite(plain)])
     step = float(np.median(steps)) if steps.size else 0.0
     if not step > 0:
         return None
-    likely = [
-        (unit, scale) for unit, scale in (("s", 1.0), ("ms", 1e-3)) if _RATES[0] <= 1 / (step * scale) <= _RATES[1]
-    ]
+    known_units = [(u, UNITS[u].scale) for u in ("s", "ms", "us", "ns")]
+    likely = [(unit, scale) for unit, scale in known_units if _RATES[0] <= 1 / (step * scale) <= _RATES[1]]
     if len(likely) != 1:
-        name = shown(table.names[k])
         raise AskError(
-            f"{table.file}: column {name} has no unit and rises by {step:g}: {1 / step:.4g} samples a second in s "
-            f"(--set unit.time=s), {1e3 / step:.4g} in ms (--set unit.time=ms)"
+            f"{table.file}: {no_unit(table, k, 'time')}; it rises by {step:g}: {1 / step:.4g} samples a second in s "
+            f"(--set unit.time=s), {1e3 / step:.4g} in ms (--set unit.time=ms), {1e6 / step:.4g} in us (unit.time=us)"
         )
     unit, scale = likely[0]
     choices.take("unit.time", unit, f"{1 / (step * scale):.4g} samples a second, as loggers take")

@@ -15,6 +15,7 @@ Rows = NDArray[np.intp]
 _TURN = 0.1  # of the range: a smaller fall is noise and no turn
 _BROKEN = 0.5  # of the largest stress: what is left of it after a break
 _HELD, _RELAXED = 2e-3, 0.02  # of the range of the stretch, and of the largest stress
+_TRIED_ON = 4000  # samples on which a lag is looked for first
 _CHANGED = 0.05  # of the range: a step between two plateaus
 _NOISE = 6.0  # standard deviations of the change between samples
 
@@ -115,7 +116,8 @@ def lag_between(time: Array, response: Array, command_time: Array, command: Arra
     low, high = command_time[0] - time[-1] + half, command_time[-1] - time[0] - half
     step = max(min(float(np.median(np.diff(time))), float(np.median(np.diff(command_time)))) / 2, (high - low) / 2000)
     tried = np.arange(low, high + step, step)
-    quality = np.array([explained(time, response, command_time - lag, command) for lag in tried])
+    some = slice(None, None, 1 + len(time) // _TRIED_ON)
+    quality = np.array([explained(time[some], response[some], command_time - lag, command) for lag in tried])
     fine = tried[int(np.argmax(quality))] + np.linspace(-2, 2, 41) * step
     sharp = np.array([explained(time, response, command_time - lag, command) for lag in fine])
     good = fine[sharp >= sharp.max() - 1e-9 - 0.02 * (1 - sharp.min())]
@@ -157,7 +159,7 @@ def explained(time: Array, response: Array, command_time: Array, command: Array)
 
 
 def changes(time: Array, signals: Array) -> Array:
-    """Return from when to when (changes, 2) signals go from one plateau to another, away by a twentieth of the range."""
+    """Return from when to when (changes, 2) signals go from one plateau to another, a twentieth of the range away."""
     still = list(plateaus(signals))
     levels = [np.median(signals[rows], axis=0) for rows in still]
     size = np.maximum(np.ptp(signals, axis=0), 1e-30)

@@ -110,14 +110,19 @@ def _level_checks(pressures: Array, response: Array) -> list[Check]:
     if len(pressures) > 400:  # samples: their plateaus have been looked at
         return []
     size = max(float(np.max(np.ptp(pressures, axis=0))), 1e-9)
+    sets = int(np.sum(np.ptp(pressures, axis=0) > _SAME * size))
+    likely = "so few plateaus go with nearly any motion: take more levels, or see that the two are of one experiment"
+    found = [
+        Check("plateaus beyond those that any motion goes with", len(pressures) - sets - 1, (2, np.inf), ANY, likely)
+    ]
     apart = np.max(np.abs(pressures[:, None] - pressures[None]), axis=2) / size
     away = np.linalg.norm(response[:, None] - response[None], axis=2)
     equal = np.triu(apart < _SAME, 1)
     if not np.any(equal):
-        return []
+        return found
     value = float(np.max(away[equal]) / max(float(np.max(away)), 1e-30))
     likely = "equal pressures did not move it to the same place: another experiment, another lag_s, creep or a slip"
-    return [Check("distance at equal pressures over the motion", value, (0, 0.2), ANY, likely)]
+    return [*found, Check("distance at equal pressures over the motion", value, (0, 0.2), ANY, likely)]
 
 
 def _rows(

@@ -13,7 +13,7 @@ from softnlp.base.units import MILLIMETRE
 from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.clock import time_of
 from softnlp.laboratory.imported import ANY, Imported, require_possible
-from softnlp.laboratory.poses import Sensor, order_misfits, pose_groups, sensors, tip_and_base, turn_sense
+from softnlp.laboratory.poses import Sensor, motion_axis, order_misfits, pose_groups, sensors, tip_and_base, turn_sense
 from softnlp.laboratory.pressure import is_pressure, pressure_columns, pressures_of
 from softnlp.laboratory.samples import sample_checks, spikes
 from softnlp.laboratory.signals import noise
@@ -29,7 +29,11 @@ Array = NDArray[np.float64]
 FRAMES = ("given", "base sensor", "rest", "fit")
 _AXES = ("x_mm", "y_mm", "z_mm")
 _QUATERNION = ("qx", "qy", "qz", "qw")
-_UP = {"z": (0.0, 0.0, 0.0), "y": (np.pi / 2, 0.0, 0.0), "x": (0.0, -np.pi / 2, 0.0)}  # rotation vectors onto +z
+_UP = {  # rotation vectors onto +z
+    **{"z": (0.0, 0.0, 0.0), "y": (np.pi / 2, 0.0, 0.0), "x": (0.0, -np.pi / 2, 0.0)},
+    **{"-z": (np.pi, 0.0, 0.0), "-y": (-np.pi / 2, 0.0, 0.0), "-x": (0.0, np.pi / 2, 0.0)},
+}
+_AXIS, _STRAIGHT = 25.0, 15.0  # [deg]: the robot's axis, and its rest tip as seen from its base, away from z
 
 
 def is_tips(table: RawTable) -> bool:
@@ -85,7 +89,7 @@ def import_tips(tables: Sequence[RawTable], choices: Choices) -> Imported:
     if logs:
         columns, streamed, told = with_pressures(columns, position, table, logs[0], choices)
         checks, numbers = [*checks, *streamed], numbers | told
-    checks += _rest_checks(columns, choices)
+    checks += [*_rest_checks(columns, choices), *_upright_checks(columns, choices)]
     require_possible(checks, choices)
     return Imported("tips", tuple(t.file for t in tables), columns, tuple(checks), choices, numbers)
 
@@ -212,3 +216,42 @@ def _rest_checks(columns: dict[str, Array], choices: Choices) -> list[Check]:
         )
         found.append(Check("rest tip, away from (0, 0, length)", away, (0, 0.02 * length), ANY, likely, "mm"))
     return found
+
+
+def _upright_checks(columns: dict[str, Array], choices: Choices) -> list[Check]:
+    """Return the checks of a robot along z: of its motion, and of its rest tip as seen from the origin [deg]."""
+    if choices.used.get("frame") == "fit":
+        return []
+    tips = np.column_stack([columns[name] for name in _AXES])
+    rest = np.median(tips[_rest_rows(tips)], axis=0)
+    how = (
+        "; else --set frame=rest or 'base sensor', rotation_world_from_base_quat_xyzw=…, or frame = \"fit\" in "
+        "[registration] of the scenario"
+    )
+    found = []
+    if (told := motion_axis(tips, rest)) is not None:
+        axis, in_plane = told
+        up = next((name for name, turn in _UP.items() if np.dot(_axis_of(turn), axis) > np.cos(np.radians(_AXIS))), "")
+        angle = float(np.degrees(np.arccos(np.clip(axis[2], -1, 1))))
+        likely = f"the robot lies along {up} of the tracker: --set up={up}{how}" if up else f"the robot is turned{how}"
+        if in_plane:
+            angle = abs(90 - angle)
+            likely = f"the tips move in one plane, which z is not in{how.replace('else', 'say up=y or x,', 1)[1:]}"
+        found.append(Check("angle between the robot by its motion and z", angle, (0, _AXIS), ANY, likely, "deg"))
+    far = float(np.linalg.norm(rest))
+    if far > 0 and choices.number("length_mm") is None:
+        tilt = float(np.degrees(np.arccos(np.clip(rest[2] / far, -1, 1))))
+        up = next(
+            (name for name, turn in _UP.items() if np.dot(_axis_of(turn), rest / far) > np.cos(np.radians(_STRAIGHT))),
+            "",
+        )
+        likely = f"the tips are in the frame of the tracker{f', whose {up} axis the robot is along: --set up={up}' if up else ''}{how}"
+        found.append(Check("angle between the rest tip and z", tilt, (0, _STRAIGHT), ANY, likely, "deg"))
+    return found
+
+
+def _axis_of(turn: Sequence[float]) -> Array:
+    """Return the axis that a rotation vector brings onto z."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(turn).inv().apply([0.0, 0.0, 1.0]))
