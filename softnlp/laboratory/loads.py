@@ -16,6 +16,7 @@ from softnlp.laboratory.imported import Imported, require_possible
 from softnlp.laboratory.pressure import is_pressure
 from softnlp.laboratory.samples import sample_checks
 from softnlp.laboratory.signals import noise, plateaus
+from softnlp.laboratory.specimen import ALONG
 from softnlp.laboratory.streams import with_pressures
 from softnlp.laboratory.table import RawTable, in_si, no_unit
 from softnlp.studies.check import Check
@@ -37,7 +38,7 @@ def force_columns(table: RawTable) -> list[int]:
 
 def is_force(table: RawTable) -> bool:
     """Whether a table is of a load cell."""
-    return bool(force_columns(table)) and not table.named(r"displac|extension|strain|stretch")
+    return bool(force_columns(table)) and not table.named(ALONG)
 
 
 def import_force(tables: Sequence[RawTable], choices: Choices) -> Imported:

@@ -23,6 +23,7 @@ from softnlp.studies.check import Check
 Array = NDArray[np.float64]
 
 _NAMES = r"^(p|pressure|press|druck|ch|chamber|valve|actuator|sensor)[ _#-]?\(?(\d+)\)?$"
+_WORDS = r"(?<!com)press|(?<![a-z])druck|chamber|valve|actuator|supply|regulator|^p\b|^p_|^ch"
 _COMMAND = r"set ?point|set|command|cmd|soll|target|desired|ref"
 _ATMOSPHERE = (0.85, 1.08)  # [bar]: of the air where people live
 _AT_REST = 0.1  # [bar]: sets that rest at more than this, all of them, are hardly at 0
@@ -45,6 +46,14 @@ def pressure_columns(table: RawTable) -> list[int]:
 def is_pressure(table: RawTable) -> bool:
     """Whether a table is a log of pressures."""
     return bool(pressure_columns(table)) or any(u is not None and u.kind == "pressure" for u in table.units)
+
+
+def has_sets(table: RawTable) -> bool:
+    """Whether a table is a log of pressures by the names of its columns, not only by a unit that a stress has too."""
+    return bool(pressure_columns(table)) or any(
+        unit is not None and unit.kind == "pressure" and re.search(_WORDS, name, re.IGNORECASE)
+        for name, unit in zip(table.names, table.units, strict=True)
+    )
 
 
 def import_pressure(tables: Sequence[RawTable], choices: Choices) -> Imported:
@@ -137,6 +146,7 @@ def _in_bar(table: RawTable, chosen: Sequence[int], choices: Choices) -> Array:
         if (unit is not None and unit.kind == "other") or (unit is None and "calibration" in choices.given):
             columns.append(_calibrated(table, k, choices))
             continue
+        choices.read.add((table.file, table.names[k]))
         known = in_si(table, k, "pressure", choices, "pressure")
         if known is None:
             known = table.columns[k] * UNITS[_unit(table, chosen, choices)].scale

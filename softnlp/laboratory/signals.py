@@ -155,7 +155,7 @@ def explained(time: Array, response: Array, command_time: Array, command: Array)
         return 0.0
     A = np.column_stack([np.ones(len(P)), P / np.ptp(P, axis=0)])  # with squares another lag fits as well
     left = y - A @ np.linalg.lstsq(A, y, rcond=None)[0]
-    return max(0.0, 1 - float(np.sum(left**2)) / total * (levels - 1) / free)
+    return float(max(0.0, 1 - np.sum(left**2) / total * (levels - 1) / free))
 
 
 def changes(time: Array, signals: Array) -> Array:

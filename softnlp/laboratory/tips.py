@@ -231,27 +231,28 @@ def _upright_checks(columns: dict[str, Array], choices: Choices) -> list[Check]:
     found = []
     if (told := motion_axis(tips, rest)) is not None:
         axis, in_plane = told
-        up = next((name for name, turn in _UP.items() if np.dot(_axis_of(turn), axis) > np.cos(np.radians(_AXIS))), "")
-        angle = float(np.degrees(np.arccos(np.clip(axis[2], -1, 1))))
-        likely = f"the robot lies along {up} of the tracker: --set up={up}{how}" if up else f"the robot is turned{how}"
+        angle = _from_z(axis)
+        likely = f"the robot lies along {_nearest_axis(axis, choices)}{how}"
         if in_plane:
             angle = abs(90 - angle)
-            likely = f"the tips move in one plane, which z is not in{how.replace('else', 'say up=y or x,', 1)[1:]}"
+            likely = f"the tips move in one plane, in which z is not: --set up=y, or another{how}"
         found.append(Check("angle between the robot by its motion and z", angle, (0, _AXIS), ANY, likely, "deg"))
-    far = float(np.linalg.norm(rest))
-    if far > 0 and choices.number("length_mm") is None:
-        tilt = float(np.degrees(np.arccos(np.clip(rest[2] / far, -1, 1))))
-        up = next(
-            (name for name, turn in _UP.items() if np.dot(_axis_of(turn), rest / far) > np.cos(np.radians(_STRAIGHT))),
-            "",
-        )
-        likely = f"the tips are in the frame of the tracker{f', whose {up} axis the robot is along: --set up={up}' if up else ''}{how}"
-        found.append(Check("angle between the rest tip and z", tilt, (0, _STRAIGHT), ANY, likely, "deg"))
+    if np.any(rest) and choices.number("length_mm") is None:
+        likely = f"the tips are not in the frame of the robot, but along {_nearest_axis(rest, choices)}{how}"
+        found.append(Check("angle between the rest tip and z", _from_z(rest), (0, _STRAIGHT), ANY, likely, "deg"))
     return found
 
 
-def _axis_of(turn: Sequence[float]) -> Array:
-    """Return the axis that a rotation vector brings onto z."""
+def _from_z(axis: Array) -> float:
+    """Return the angle between an axis and z [deg]."""
+    return float(np.degrees(np.arccos(np.clip(axis[2] / np.linalg.norm(axis), -1, 1))))
+
+
+def _nearest_axis(axis: Array, choices: Choices) -> str:
+    """Return in words which axis of the tracker is near to another, and how that becomes z."""
     from scipy.spatial.transform import Rotation
 
-    return np.asarray(Rotation.from_rotvec(turn).inv().apply([0.0, 0.0, 1.0]))
+    near = [name for name, turn in _UP.items() if _from_z(Rotation.from_rotvec(turn).apply(axis)) < _AXIS]
+    if not near or choices.used.get("up", "z") != "z":
+        return "none of its axes"
+    return f"{near[0]} of the tracker: --set up={near[0]}"
