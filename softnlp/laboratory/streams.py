@@ -19,7 +19,7 @@ from softnlp.studies.check import Check
 
 Array = NDArray[np.float64]
 
-_SURE = 0.5  # R^2 below which a lag cannot be told
+_SURE = 0.6  # R^2 below which a lag cannot be told
 _SAME, _DAY = 0.02, 86400.0  # of the range, of equal pressures; [s]
 
 

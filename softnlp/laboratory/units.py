@@ -84,7 +84,7 @@ def split_unit(header: str) -> tuple[str, Unit | None]:
             if unit is not None and (inside != "1" or _RATIO.search(text)):  # "Pressure (1)" is the first one
                 return f"{found[1]} {found[3]}".strip(), unit
     found = _SUFFIX.match(text)
-    short = found is not None and found[2] not in _NO_SUFFIX and len(found[2]) < 6
+    short = found is not None and found[2].strip("()[]") not in _NO_SUFFIX and len(found[2]) < 6
     if found and short and (unit := unit_named(found[2])) is not None:
         return found[1].strip(" _,/"), unit
     return header.strip(), None
