@@ -6,7 +6,6 @@ import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
-from functools import partial
 from os import PathLike
 from pathlib import Path
 
@@ -32,7 +31,7 @@ from softnlp.studies.check import Check
 from softnlp.studies.compare import SHAPES, compare
 from softnlp.studies.comparison import Comparison
 from softnlp.studies.measurements import Measurements
-from softnlp.studies.predicted import unloaded_tips
+from softnlp.studies.predicted import free_tips
 from softnlp.studies.registration import Registration
 from softnlp.studies.tip_checks import frame_checks
 from softnlp.studies.variants import NAMED, OWN, Variant, every_variant, named_coefficients
@@ -169,14 +168,22 @@ def run_compare(task: CompareTask, progress: Callable[[int, int], None] | None =
 def comparison_checks(task: CompareTask, found: Comparison) -> tuple[Check, ...]:
     """Return the checks of the tips that were measured, by the first variant."""
     checks: list[Check] = []
-    if task.registration is not None and "frame" in task.registration.fit:
-        return ()
+    fit = () if task.registration is None else task.registration.fit
     variant, asked = found.variants[0], task.scenario
     for o, solved in zip(found.observed, found.simulated[0], strict=True):
-        placed, rows = solved.registration, o.measured[:, :3].all(axis=1)
+        placed, rows = solved.registration or Registration(), o.measured[:, :3].all(axis=1)
         model = Model(o.robot, variant.material, variant.coefficients, variant.conventions)
-        tips = None if asked.loads.act else partial(unloaded_tips, pose_solver(model, asked.numerics))
-        checks += frame_checks(o.pressure[rows], o.values[rows, :3], solved.values[rows, :3], o.robot, placed, tips)
+        poses = pose_solver(model, asked.numerics.without_ipopt())
+        checks += frame_checks(
+            o.pressure[rows],
+            o.values[rows, :3],
+            solved.values[rows, :3],
+            o.robot,
+            placed,
+            fit,
+            lambda P, loads, poses=poses: free_tips(poses, loads, P),  # type: ignore[misc]
+            asked.loads,
+        )
     return tuple(checks)
 
 
