@@ -5,7 +5,6 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
 
@@ -24,7 +23,15 @@ from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.scenario.data import Scenario
 from softnlp.scenario.laboratory import import_notes, laboratory_columns
-from softnlp.scenario.measured_rows import SCALARS, RobotRows, rows_by_robot
+from softnlp.scenario.measured_rows import (
+    ALIASES,
+    MEASURED_COLUMNS,
+    SCALARS,
+    RobotRows,
+    named_columns,
+    near_misses,
+    rows_by_robot,
+)
 from softnlp.scenario.registration import import_settings, registration_of
 from softnlp.statics.kept import pose_solver
 from softnlp.studies.check import Check
@@ -42,13 +49,8 @@ Array = NDArray[np.float64]
 STUDIES = ("forward", "blocked-force", "workspace")
 _TILT, _BACKBONE, _ELONGATION = (OUTPUTS[name] for name in ("tilt", "backbone_length", "elongation"))
 _FORCE_COLUMN = SCALARS["blocked_force"].measured
-_COMPARED = (*(OUTPUTS[f"tip_{x}"] for x in "xyz"), *SCALARS.values(), _TILT, _BACKBONE)
-_OWN = ("p1_bar", *(output.measured for output in _COMPARED))
-MEASURED_COLUMNS = tuple(output.measured for output in _COMPARED)
-ALIASES: Mapping[str, str] = {other: output.measured for output in _COMPARED for other in output.others_measured}
-"""Other names of columns, as results and people spell them."""
+_OWN = ("p1_bar", *MEASURED_COLUMNS)
 ALL = "all"
-_NEAR = 0.85
 
 
 @dataclass(frozen=True)
@@ -187,16 +189,6 @@ def comparison_checks(task: CompareTask, found: Comparison) -> tuple[Check, ...]
     return tuple(checks)
 
 
-def named_columns(columns: Columns) -> Columns:
-    """Return a file whose columns have the names of this package in place of `ALIASES`."""
-    header = [ALIASES.get(name, name) for name in columns.header]
-    for name in header:
-        if header.count(name) > 1 and name in MEASURED_COLUMNS:
-            both = [old for old, new in zip(columns.header, header, strict=True) if new == name]
-            raise InputError(f"expected {name!r} once, got {' and '.join(both)}", source=columns.file)
-    return replace(columns, header=tuple(header))
-
-
 def _require_study(scenario: Scenario) -> None:
     """Refuse a scenario that does not say how a pose at a pressure is solved."""
     source = str(scenario.path)
@@ -221,12 +213,7 @@ def _notes(columns: Columns, scenario: Scenario) -> list[str]:
     found = []
     if scenario.contact is None and _FORCE_COLUMN in columns:
         found.append(f"{_FORCE_COLUMN} is not compared: study {scenario.study!r} of {scenario.path} has no wall")
-    for name in columns.header:
-        if name not in (*MEASURED_COLUMNS, *ALIASES):
-            wanted = [known for known in MEASURED_COLUMNS if known not in columns]
-            if near := get_close_matches(name, wanted, n=1, cutoff=_NEAR):
-                found.append(f"column {shown(name)} is not compared; did you mean {near[0]!r}?")
-    return found
+    return found + near_misses(columns, (*MEASURED_COLUMNS, "robot"), "not compared")
 
 
 def _measured(scenario: Scenario, columns: Columns) -> tuple[tuple[RobotRows, ...], tuple[Measurements, ...]]:
