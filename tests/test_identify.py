@@ -574,6 +574,18 @@ GOOD = "p1_bar,p2_bar,p3_bar,bending_angle_deg\n1,0,0,80\n"
         (GOOD.replace("1,0,0", "1,,0"), 'free = ["k_b"]', ONE, "line 2: p2_bar: expected a pressure"),
         (GOOD.replace("1,0,0", "1000,0,0"), 'free = ["k_b"]', ONE, "1 bar = 100 kPa"),
         (GOOD.replace("80", ""), 'free = ["k_b"]', ONE, "at least one number"),
+        (
+            GOOD.replace("p2_bar", "p2_kPa"),
+            'free = ["k_b"]',
+            ONE,
+            "missing column 'p2_bar'; is it 'p2_kPa'?",
+        ),
+        (
+            GOOD.replace("bending_angle_deg", "bending_angle_rad"),
+            'free = ["k_b"]',
+            ONE,
+            "column 'bending_angle_rad' is not read; did you mean 'bending_angle_deg'?",
+        ),
         (GOOD, 'free = ["kb"]', ONE, "did you mean 'k_b'"),
         (
             "p4_bar," + GOOD.replace("\n1", "\n2,1"),
@@ -608,6 +620,20 @@ def test_a_broken_scenario_is_one_line(
     assert shown.out == ""
     assert len(shown.err.splitlines()) == 1
     assert said in shown.err
+
+
+def test_columns_that_differ_by_case_unit_or_a_letter_are_told(tmp_path: Path) -> None:
+    csv = "p1_bar,p2_bar,p3_bar,tip_z_mm,Tip_X_mm,tip_y_mn,elongation_m,Weight,t_s,note,y_offset_mm\n"
+    task = load_scenario(scenario(tmp_path, csv + "1,0,0,55,1,2,3,4,5,6,7\n", 'free = ["k_b"]', ONE)).task
+    assert isinstance(task, RobotTask)
+    pairs = [note.partition("column ")[2] for note in task.notes]
+    assert pairs == [
+        "'Tip_X_mm' is not read; did you mean 'x_mm'?",
+        "'tip_y_mn' is not read; did you mean 'y_mm'?",
+        "'elongation_m' is not read; did you mean 'elongation_mm'?",
+        "'Weight' is not read; did you mean 'weight'?",
+    ]
+    assert task.measurements[0].tip_position[0][2] == pytest.approx(0.055)  # as results spell it
 
 
 def test_json_alone_goes_to_standard_output(

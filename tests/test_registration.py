@@ -9,8 +9,10 @@ import pytest
 from laboratory_files import FOLDER, TRUTH
 from scipy.spatial.transform import Rotation
 
-from softnlp import BAR, Measurements, Numerics, compare, identify, material, robot
+from softnlp import BAR, Coefficients, Loads, Measurements, Numerics, compare, forward, identify, material, robot
+from softnlp.base.errors import InputError
 from softnlp.studies.identified import Identified
+from softnlp.studies.registered import sensor_places
 from softnlp.studies.registration import Registration
 from softnlp.studies.variants import Variant
 
@@ -34,6 +36,54 @@ def found(name: str, registration: Registration | None = None, numerics: Numeric
 
 
 WORLD = Registration(fit=("frame", "tip_offset"))
+NONE, HERE = Loads(), Registration()
+ACROSS, ALONG = Loads(tip_force=(0.1, 0.0, 0.0)), Loads(gravity=(0.0, 0.0, -9.81))
+TRUE = Coefficients(elongation=0.55, bending=2.2)
+FEW = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [0.5, 0, 1], [1, 0.5, 0.5]]
+
+
+def simulated(loads: Loads = NONE, order: tuple[int, ...] = (0, 1, 2), placed: Registration = HERE) -> Measurements:
+    """Return what a sensor sees of D25L60 at a few pressures, and the columns of pressures in another order."""
+    P = 1.2 * BAR * np.array(FEW)
+    run = forward(robot("D25L60"), SILICONE, P, loads=placed.in_sets(loads), coefficients=TRUE, numerics=NEWTON)
+    poses = [step.pose for step in run.steps if step.pose is not None]
+    tips = np.array([pose.tip_position for pose in poses])
+    turns = np.array([np.asarray(pose.tip_rotation).ravel(order="F") for pose in poses])
+    return Measurements(robot("D25L60"), P[:, list(order)], tip_position=sensor_places(placed, tips, turns))
+
+
+def said(measurements: Measurements, loads: Loads, registration: Registration | None = None) -> list[str]:
+    """Return what the checks of an identification warn of."""
+    fit = identify(measurements, SILICONE, ["k_e", "k_b"], loads=loads, registration=registration, numerics=NEWTON)
+    return [check.message for check in fit.checks if check.verdict != "passed"]
+
+
+@pytest.mark.parametrize("loads", [ALONG, ACROSS])
+def test_a_mirrored_order_is_named_where_loads_act(loads: Loads) -> None:
+    assert not said(simulated(loads), loads)
+    (message,) = (words for words in said(simulated(loads, (1, 0, 2)), loads) if "order of the sets" in words)
+    assert "set_order = [2, 1, 3] in [registration], the mirror" in message
+
+
+def test_a_mirrored_order_is_named_where_the_frame_is_fitted() -> None:
+    placed = Registration(rotation=Rotation.random(random_state=3).as_matrix(), translation=(0.1, 0.0, -0.2))
+    assert not said(simulated(placed=placed), Loads(), WORLD)
+    assert any("mirror image" in words for words in said(simulated(order=(0, 2, 1), placed=placed), Loads(), WORLD))
+
+
+def test_loads_keep_their_direction_where_the_sets_are_turned() -> None:
+    placed = Registration(clock=np.deg2rad(40))
+    rows = simulated(ACROSS, placed=placed)
+    for registration, numerics in ((placed, NEWTON), (Registration(fit=("clock",)), Numerics())):
+        fit = identify(rows, SILICONE, ["k_e", "k_b"], loads=ACROSS, registration=registration, numerics=numerics)
+        np.testing.assert_allclose(fit.constants[:2], [0.55, 2.2], rtol=1e-5)
+        assert fit.registration is not None
+        assert fit.registration.clock == pytest.approx(placed.clock, abs=1e-6)
+    assert fit.ipopt is not None  # it moved the loads with the clock
+    variant = Variant(SILICONE, TRUE, named="scenario")
+    assert compare(rows, variant, loads=ACROSS, registration=placed).statistics(0, "tip_position").largest < 1e-8
+    with pytest.raises(InputError, match="identify fits it"):
+        compare(rows, variant, loads=ACROSS, registration=Registration(fit=("clock",)))
 
 
 def test_frame_place_and_constants_are_found_together() -> None:

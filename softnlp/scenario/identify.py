@@ -12,7 +12,7 @@ from pydantic import Field
 
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import Columns
-from softnlp.base.errors import InputError, located, of_table
+from softnlp.base.errors import InputError, listed, located, of_table
 from softnlp.base.ranges import noise_note, unit_note
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import Coefficients
@@ -21,7 +21,15 @@ from softnlp.model.robot import Robot
 from softnlp.scenario.blocked_force import SEVERAL
 from softnlp.scenario.data import Read, Scenario
 from softnlp.scenario.laboratory import import_notes, laboratory_columns
-from softnlp.scenario.measured_rows import SCALARS, TIP_COLUMNS, RobotRows, rows_by_robot
+from softnlp.scenario.measured_rows import (
+    ALIASES,
+    SCALARS,
+    TIP_COLUMNS,
+    RobotRows,
+    named_columns,
+    near_misses,
+    rows_by_robot,
+)
 from softnlp.scenario.registration import import_settings, registration_of
 from softnlp.scenario.schema import (
     ContactTable,
@@ -37,7 +45,9 @@ from softnlp.studies.identified import free_constants
 from softnlp.studies.measurements import OBSERVABLES, Measurements, RobotTask, TensileTask, checked_measurements
 from softnlp.studies.registration import Registration
 
-_OWN = ("p1_bar", *TIP_COLUMNS, *(output.measured for output in SCALARS.values()))
+_MEASURED = (*TIP_COLUMNS, *(output.measured for output in SCALARS.values()))
+_OWN = ("p1_bar", *_MEASURED, *ALIASES)
+_KNOWN = (*_MEASURED, "robot", "weight", *(f"sigma_{OUTPUTS[name].key}" for name in OBSERVABLES))
 
 if TYPE_CHECKING:  # imported where needed: to read a scenario takes none of them
     from softnlp.studies.identified import Identified
@@ -121,16 +131,20 @@ def _robots(given: Read, table: MeasurementsTable) -> RobotTask:
     files = table.named()
     groups = [files] if settings is not None else [(file,) for file in files]
     every = [laboratory_columns(given.folder, group, "tips", _OWN, settings) for group in groups]
-    tables = [columns for columns, _ in every]
+    tables = [named_columns(columns) for columns, _ in every]
     told = tuple(note for _, imported in every if imported is not None for note in import_notes(imported))
     own = {}
     for name, described in given.file.robots.items():
         with located(table=f"robots.{name}"):
             own[name] = described.made()[0]
     header = tuple(dict.fromkeys(name for columns in tables for name in columns.header))
+    misses = tuple(f"{c.file}: {words}" for c in tables for words in near_misses(c, _KNOWN, "not read"))
     for columns in tables:
         if "robot" not in columns and "robot" not in given.data:
             raise InputError(f"{columns.file}: expected a column robot, or a table [robot] for every row", key="file")
+    if not any(name in header for name in _MEASURED):
+        why = f" ({misses[0]})" if misses else ""
+        raise InputError(f"expected a column of {', '.join(_MEASURED)}; it has {listed(header)}{why}", key="file")
 
     def unnamed(columns: Columns, row: int) -> Robot:
         if "robot" in given.data:
@@ -145,7 +159,7 @@ def _robots(given: Read, table: MeasurementsTable) -> RobotTask:
         cells.append(tuple(tuple(_cell(c, k, column) for column in header) for c, k in rows.places))
     free, bounds = _free(table, given.material)
     pressed = np.concatenate(readings)
-    notes = (*told, *noise_note(pressed), *unit_note(pressed))
+    notes = (*told, *misses, *noise_note(pressed), *unit_note(pressed))
     sets = made[0].robot.chamber_sets
     return RobotTask(tuple(made), free, bounds, header, tuple(cells), notes, registration_of(registration, sets))
 

@@ -26,7 +26,7 @@ from softnlp.studies.comparison import NUMBERS, Comparison, Solved
 from softnlp.studies.forward import checked_loads, followed
 from softnlp.studies.measurements import Measurements, Observed, observed
 from softnlp.studies.registered import fitted, sensor_places
-from softnlp.studies.registration import Registration
+from softnlp.studies.registration import Registration, across
 from softnlp.studies.variants import Variant
 
 Array = NDArray[np.float64]
@@ -94,6 +94,10 @@ def compare(
             raise InputError(f"expected one of {', '.join(CLOSURES)}, got {variant.closure!r}", key="closure")
     robots = tuple(observed(m, NUMBERS) for m in given)
     loads, contact = checked_loads(loads), checked_contact(contact, [o.robot for o in robots])
+    if registration is not None:
+        if "clock" in registration.fit and across(loads):
+            raise InputError("loads across the axis need it given; identify fits it", key="registration.clock")
+        loads = registration.in_sets(loads)
     done, total = 0, _solves(robots, asked, shape == "blocked")
 
     def tell(rows: int) -> None:

@@ -53,7 +53,7 @@ from softnlp.studies.measurements import (
 from softnlp.studies.predicted import Predicted, Prediction
 from softnlp.studies.registered import Registered, begun, with_registration
 from softnlp.studies.registration import NAMES as REGISTRATION_NAMES
-from softnlp.studies.registration import Registration
+from softnlp.studies.registration import Registration, across
 from softnlp.studies.tip_checks import tip_checks
 
 Array = NDArray[np.float64]
@@ -128,27 +128,39 @@ def identify(
     if contact.closure == "weighted" and any(np.any(d.measured[:, -1]) for d in data):
         raise InputError("expected a closure that has a definite force; 'weighted' depends on weights", key="closure")
     searching = numerics if numerics.engine == "ipopt" else numerics.without_ipopt()
+    clocked = registration is not None and "clock" in registration.fit and across(loads)
+    if clocked and any(np.any(d.measured[:, -1]) for d in data):
+        raise InputError(
+            "a clock is not fitted to blocked forces under loads across the axis; give it", key="registration"
+        )
+    in_base = loads
+    loads = loads if clocked or registration is None else registration.in_sets(loads)
     models = []
     for d in data:
         # Where nothing loads free shapes they are known in closed form.
         model = Model(d.robot, material, coefficients, conventions)
         poses = pose_solver(model, searching, unloaded_accuracy=searching.accuracy)
         blocked = blocked_solver(model, searching, contact) if np.any(d.measured[:, -1]) else None
-        models.append(Predicted(d, poses, blocked, constants, loads))
+        models.append(Predicted(d, poses, blocked, constants, loads, clocked))
     registered: Sequence[Predicted | Registered] = models
     if registration is not None:
-        tips = [model.evaluate(constants.values(constants.start), True).values[:, :3] for model in models]
+        there = registration.in_sets(in_base)
+        tips = [
+            model.tips(constants.values(constants.start), d.pressure, there)[0]
+            for model, d in zip(models, data, strict=True)
+        ]
         registration = begun(registration, data, tips)
         chosen = with_registration(constants, registration)
-        registered = [Registered(model, registration) for model in models]
+        registered = [Registered(model, registration, clocked) for model in models]
     found = _Fit(data, registered, chosen, material, coefficients, progress).solve()
     if found.status is Status.SOLVED:
         placed = None if registration is None else registration.found(found.constants[len(constants.names) :])
-        framed = registration is None or "frame" not in registration.fit
+        fit = () if registration is None else registration.fit
         checks: list[Check] = []
         for d, after, predicted, m in zip(data, found.after, models, given, strict=True):
-            tips_at = None if loads.act else partial(predicted.tips, constants.values(constants.start))
-            checks += tip_checks(d, after[:, :3], placed, tips_at, framed, "tip_position" in m.sigma)
+            tips_at = partial(predicted.tips, constants.values(constants.start))
+            at = placed or Registration()
+            checks += tip_checks(d, after[:, :3], at, fit, tips_at, in_base, "tip_position" in m.sigma)
         found = replace(found, registration=placed, checks=(*constant_checks(found), *checks))
     if found.status is not Status.SOLVED:
         return found

@@ -31,38 +31,47 @@ def with_registration(free: FreeConstants, registration: Registration) -> FreeCo
 
 
 class Registered:
-    """What is measured of one robot by a sensor somewhere: `Predicted`, with its tips where the sensor is."""
+    """What is measured of one robot by a sensor somewhere: `Predicted`, with its tips where the sensor is.
 
-    def __init__(self, model: Predicted, registration: Registration) -> None:
+    clocked : as of the model.
+    """
+
+    def __init__(self, model: Predicted, registration: Registration, clocked: bool = False) -> None:
         self._model = model
+        self._clocked = clocked
         self._registration = registration
         self._function = registration.function()
 
     def fit(self, constants: Mapping[str, float], row: int) -> Fit | None:
         """See `Predicted.fit`."""
-        return self._model.fit(_plain(constants), row)
+        return self._model.fit(constants, row)
 
     def evaluate(self, constants: Mapping[str, float], anew: bool) -> Prediction:
         """See `Predicted.evaluate`; the slopes by the numbers of the registration come last."""
         g = np.array([constants[PREFIX + name] for name in self._registration.names])
-        found = self._model.evaluate(_plain(constants), anew)
-        rows, columns, n = found.slopes.shape
+        found = self._model.evaluate(constants, anew)
+        rows = len(found.values)
         values = found.values.copy()
-        slopes = np.concatenate([found.slopes, np.zeros((rows, columns, g.size))], axis=2)
         assert found.turns is not None
         assert found.turn_slopes is not None
-        for row in range(rows):
-            sensor, by_tip, by_turn, by_g = (
-                np.asarray(part) for part in self._function(values[row, :3], found.turns[row], g)
-            )
-            values[row, :3] = sensor.ravel()
-            slopes[row, :3, :n] = by_tip @ found.slopes[row, :3] + by_turn @ found.turn_slopes[row]
-            slopes[row, :3, n:] = by_g
+        moved, turned = (self._widened(part, g.size) for part in (found.slopes, found.turn_slopes))
+        slopes = moved.copy()
+        sensor, by_tip, by_turn, by_g = (
+            np.asarray(part).reshape(3, rows, -1).transpose(1, 0, 2)
+            for part in self._function(values[:, :3].T, found.turns.T, g)
+        )
+        values[:, :3] = sensor[:, :, 0]
+        slopes[:, :3] = by_tip @ moved[:, :3] + by_turn @ turned
+        slopes[:, :3, slopes.shape[2] - g.size :] += by_g
         return Prediction(values, slopes, found.failures)
 
-
-def _plain(constants: Mapping[str, float]) -> Mapping[str, float]:
-    return {name: value for name, value in constants.items() if not name.startswith(PREFIX)}
+    def _widened(self, slopes: Array, count: int) -> Array:
+        """Return slopes of the model (rows, m, constants) with those by the registration behind them."""
+        own = slopes.shape[2] - self._clocked
+        wide = np.concatenate([slopes[:, :, :own], np.zeros((*slopes.shape[:2], count))], axis=2)
+        if self._clocked:
+            wide[:, :, own + self._registration.names.index("clock")] = slopes[:, :, own]
+        return wide
 
 
 def begun(registration: Registration, data: Sequence[Data], tips: Sequence[Array]) -> Registration:
@@ -87,10 +96,7 @@ def _laid(registration: Registration, p: Array, q: Array) -> Registration:
 
 def sensor_places(registration: Registration, tips: Array, turns: Array) -> Array:
     """Return where the sensor is (rows, 3) [m], of tips (rows, 3) [m] and their rotations by columns (rows, 9)."""
-    g = registration.start()
-    function = registration.function()
-    found = [np.asarray(function(p, R, g)[0]).ravel() for p, R in zip(tips, turns, strict=True)]
-    return np.array(found).reshape(-1, 3)
+    return np.asarray(registration.function()(tips.T, turns.T, registration.start())[0]).T
 
 
 def fitted(registration: Registration, tips: Array, turns: Array, measured: Array) -> Registration:
@@ -106,9 +112,8 @@ def fitted(registration: Registration, tips: Array, turns: Array, measured: Arra
     function = begin.function()
 
     def at(g: Array) -> tuple[Array, Array]:
-        parts = [function(a, b, g) for a, b in zip(p, R, strict=True)]
-        places = np.array([np.asarray(part[0]).ravel() for part in parts])
-        return (places - q).ravel(), np.concatenate([np.asarray(part[3]) for part in parts])
+        places, _, _, slopes = (np.asarray(part) for part in function(p.T, R.T, g))
+        return (places.T - q).ravel(), slopes.reshape(3, len(p), count).transpose(1, 0, 2).reshape(-1, count)
 
     done = least_squares(lambda g: at(g)[0], begin.start(), jac=lambda g: at(g)[1], x_scale=begin.scales())
     return begin.found(done.x)

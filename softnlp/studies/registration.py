@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 
 from softnlp.base.quantity import Quantity, quantity
 from softnlp.base.units import DEGREE, MILLIMETRE
+from softnlp.model.quantities import LOADS
+from softnlp.model.rod import Loads
 
 Array = NDArray[np.float64]
 
@@ -31,6 +33,8 @@ _GROUPS = {
 }
 NAMES = tuple(name for names in _GROUPS.values() for name in names)
 """Of the numbers that may be fitted."""
+CLOCK = f"{PREFIX}clock"
+"""The quantity of the clock."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +119,25 @@ class Registration:
         array
             (rows, 3) with the clock taken off too [m].
         """
-        c, s = np.cos(self.clock), np.sin(self.clock)
-        turn = np.asarray(self.rotation) @ [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
+        turn = np.asarray(self.rotation) @ _about_z(self.clock)
         return np.asarray((place - np.asarray(self.translation)) @ turn)
+
+    def in_sets(self, loads: Loads, clock: float | None = None) -> Loads:
+        """Return loads of the base's frame in that of the model, whose sets the clock turns.
+
+        Parameters
+        ----------
+        loads
+            In the frame of the base [N, N m, m/s^2].
+        clock
+            In place of that of the registration [rad].
+
+        Returns
+        -------
+        Loads
+            Turned by the clock about z, the other way [N, N m, m/s^2].
+        """
+        return turned(loads, -(self.clock if clock is None else clock))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -234,6 +254,22 @@ def unit_of(name: str) -> tuple[str, float]:
     """Return the key that files have for a fitted number, and its unit there in SI."""
     turns = name == "clock" or name.startswith("frame_rotation")
     return (f"{name}_deg", DEGREE) if turns else (f"{name}_mm", MILLIMETRE)
+
+
+def across(loads: Loads) -> bool:
+    """Whether loads are other ones where the sets are turned about z."""
+    return any(bool(np.any(np.asarray(getattr(loads, name), float)[:2])) for name in LOADS)
+
+
+def turned(loads: Loads, angle: float, rate: float | None = None) -> Loads:
+    """Return loads turned about z by an angle [rad], or how they change while it does so at a rate."""
+    R = _about_z(angle) if rate is None else rate * _about_z(angle + np.pi / 2) @ np.diag([1.0, 1.0, 0.0])
+    return Loads(*(R @ np.asarray(getattr(loads, name), float) for name in LOADS))
+
+
+def _about_z(angle: float) -> Array:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _cayley(turn: Any) -> Any:
