@@ -36,7 +36,12 @@ Directions = Annotated[list[Normal], Field(min_length=1, max_length=MOST_STEPS)]
 
 
 class TargetTable(Table):
-    """[target]: where the tip is to be, which way it is to point, or both row by row."""
+    """[target]: where the tip is to be, which way it is to point, or both row by row.
+
+    tip_position_mm : rows of x, y, z; as in [[10.0, 0.0, 60.0]]
+    tip_direction : rows of a vector along which the tip is to point; as in [[0.0, 0.0, 1.0]]
+    length_per_radian_mm : weighs a direction against a position; by default the robot's length; as in 60.0
+    """
 
     tip_position_mm: Rows | None = None
     tip_direction: Directions | None = None
@@ -44,7 +49,10 @@ class TargetTable(Table):
 
 
 class BoundsTable(Table):
-    """[bounds]: lowest and highest pressure, for all sets or for each."""
+    """[bounds]: lowest and highest pressure, for all sets or for each.
+
+    pressure_bar : lowest and highest of all sets, or such a pair for each
+    """
 
     pressure_bar: Bounds = Field(default=[0.0, 1.5])
 
