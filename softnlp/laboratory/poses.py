@@ -30,6 +30,7 @@ _TOOL = re.compile(r"^(tool|sensor|body|marker|rigid ?body|port ?handle|tool ?in
 _LENGTH_UNIT = re.compile(r"length ?units? *[:=]? *([a-zµ]+)", re.IGNORECASE)
 _REACH = (1e-3, 3.0)  # [m]: how far a tip moves in a test
 _SHORT = 0.04  # [m]: a robot for which positions in mm may as well be in cm
+_CAPPED = 0.3  # the correlation of how high tips are with the square of how far out
 _FLAT, _ROUND = 0.03, 0.3  # of the largest standard deviation: tips in a plane; tips all around
 _FARTHEST = 10.0  # [m]: beyond what any tracker sees
 
@@ -313,4 +314,6 @@ def motion_axis(position: Array, rest: Array) -> tuple[Array, bool] | None:
         return None
     along = centred @ axes[2]
     away = np.linalg.norm(centred @ axes[:2].T - (rest - position.mean(axis=0)) @ axes[:2].T, axis=1)
-    return axes[2] * (-1.0 if np.corrcoef(along, away**2)[0, 1] > 0 else 1.0), False
+    rises = -float(np.corrcoef(along, away**2)[0, 1])
+    # a robot that grows longer while it bends may lie on no cap: the rest tip then says on which side it is
+    return axes[2] * np.sign(rises if abs(rises) > _CAPPED else float(axes[2] @ rest)), False
