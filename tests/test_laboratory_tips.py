@@ -241,6 +241,15 @@ def test_a_robot_that_only_grows_longer_is_not_turned_round(tmp_path: Path) -> N
     assert check.verdict == "passed"
 
 
+def test_a_sensor_that_was_never_seen_is_asked_about(tmp_path: Path) -> None:
+    header = "x (m),y (m),z (m)"
+    np.savetxt(tmp_path / "tips.csv", CAP, delimiter=",", header=header, comments="", fmt="%.4f")
+    with pytest.raises(AskError, match=r"seen in no row, or only beyond 10 m.*unit\.NAME=mm"):
+        imported(str(tmp_path / "tips.csv"))
+    found = imported(str(tmp_path / "tips.csv"), unit__x="mm", unit__y="mm", unit__z="mm")
+    np.testing.assert_allclose(tips(found), CAP, atol=1e-3)
+
+
 def test_one_unit_for_all_sensors_and_tools_by_number(tmp_path: Path) -> None:
     rows = [
         f"{s},{k / 10},{','.join(f'{v:.4f}' for v in (tip if s == 2 else 0 * tip + 0.1))}"
