@@ -233,6 +233,23 @@ def test_a_robot_that_is_not_along_z_is_named(tip: np.ndarray, up: str, turn: fl
         np.testing.assert_allclose(tips(again), tip, atol=0.2)
 
 
+def test_a_robot_that_only_grows_longer_is_not_turned_round(tmp_path: Path) -> None:
+    p = np.random.default_rng(0).uniform(0, 1, (300, 3)) * (np.arange(300) > 0)[:, None]
+    rows = np.column_stack([20 * p[:, 0] - 10 * (p[:, 1] + p[:, 2]), 17 * (p[:, 1] - p[:, 2]), 60 + p.sum(axis=1)])
+    np.savetxt(tmp_path / "tips.csv", rows, delimiter=",", header="x_mm,y_mm,z_mm", comments="")
+    check = check_of(imported(str(tmp_path / "tips.csv")), "angle between the robot by its motion and z")
+    assert check.verdict == "passed"
+
+
+def test_a_sensor_that_was_never_seen_is_asked_about(tmp_path: Path) -> None:
+    header = "x (m),y (m),z (m)"
+    np.savetxt(tmp_path / "tips.csv", CAP, delimiter=",", header=header, comments="", fmt="%.4f")
+    with pytest.raises(AskError, match=r"seen in no row, or only beyond 10 m.*unit\.NAME=mm"):
+        imported(str(tmp_path / "tips.csv"))
+    found = imported(str(tmp_path / "tips.csv"), unit__x="mm", unit__y="mm", unit__z="mm")
+    np.testing.assert_allclose(tips(found), CAP, atol=1e-3)
+
+
 def test_one_unit_for_all_sensors_and_tools_by_number(tmp_path: Path) -> None:
     rows = [
         f"{s},{k / 10},{','.join(f'{v:.4f}' for v in (tip if s == 2 else 0 * tip + 0.1))}"

@@ -24,7 +24,7 @@ from softnlp.studies.check import Check
 Array = NDArray[np.float64]
 
 _FORCE, _MOMENT = r"^(force[ _]?)?f?[xyz]$", r"^(torque[ _]?|moment[ _]?)?[tm][xyz]$"
-_COUNTS = r"counts? per {} *[:=]? *([\d.]+)"
+_COUNTS = r"counts? per {} {{0,3}}[:=]? {{0,3}}([\d.]+)"
 _SETTLED = 0.2  # of the spread of a plateau: the first one stands for the bias
 
 

@@ -27,11 +27,12 @@ _PREFIXED = re.compile(
 _STATE = re.compile(r"state|status", re.IGNORECASE)
 _SEEN = ("ok", "valid", "visible", "tracked", "enabled", "good", "1", "true")
 _TOOL = re.compile(r"^(tool|sensor|body|marker|rigid ?body|port ?handle|tool ?info|name)s?\b", re.IGNORECASE)
-_LENGTH_UNIT = re.compile(r"length ?units? *[:=]? *([a-zµ]+)", re.IGNORECASE)
+_LENGTH_UNIT = re.compile(r"length ?units? {0,3}[:=]? {0,3}([a-zµ]+)", re.IGNORECASE)
 _REACH = (1e-3, 3.0)  # [m]: how far a tip moves in a test
 _SHORT = 0.04  # [m]: a robot for which positions in mm may as well be in cm
+_CAPPED = 0.3  # the correlation of how high tips are with the square of how far out
 _FLAT, _ROUND = 0.03, 0.3  # of the largest standard deviation: tips in a plane; tips all around
-_FARTHEST = 10.0  # [m]: beyond what any tracker sees
+FARTHEST = 10.0  # [m]: beyond what any tracker sees
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +158,7 @@ def _sensor(
         seen &= ~zeros | bool(np.mean(zeros) > 0.5)
     known = [column for column in columns if column is not None]
     position = np.column_stack(known) if len(known) == 3 else raw * scale
-    seen &= np.linalg.norm(position, axis=1) < _FARTHEST
+    seen &= np.linalg.norm(position, axis=1) < FARTHEST
     asked = choices.get("quaternion")
     if q is not None and asked is not None:
         if asked not in ("wxyz", "xyzw"):
@@ -313,4 +314,6 @@ def motion_axis(position: Array, rest: Array) -> tuple[Array, bool] | None:
         return None
     along = centred @ axes[2]
     away = np.linalg.norm(centred @ axes[:2].T - (rest - position.mean(axis=0)) @ axes[:2].T, axis=1)
-    return axes[2] * (-1.0 if np.corrcoef(along, away**2)[0, 1] > 0 else 1.0), False
+    rises = -float(np.corrcoef(along, away**2)[0, 1])
+    # a robot that grows longer while it bends may lie on no cap: the rest tip then says on which side it is
+    return axes[2] * np.sign(rises if abs(rises) > _CAPPED else float(axes[2] @ rest)), False

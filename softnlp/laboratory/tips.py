@@ -13,7 +13,16 @@ from softnlp.base.units import MILLIMETRE
 from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.clock import time_of
 from softnlp.laboratory.imported import ANY, Imported, require_possible
-from softnlp.laboratory.poses import Sensor, motion_axis, order_misfits, pose_groups, sensors, tip_and_base, turn_sense
+from softnlp.laboratory.poses import (
+    FARTHEST,
+    Sensor,
+    motion_axis,
+    order_misfits,
+    pose_groups,
+    sensors,
+    tip_and_base,
+    turn_sense,
+)
 from softnlp.laboratory.pressure import is_pressure, pressure_columns, pressures_of
 from softnlp.laboratory.samples import sample_checks, spikes
 from softnlp.laboratory.signals import noise
@@ -59,6 +68,11 @@ def import_tips(tables: Sequence[RawTable], choices: Choices) -> Imported:
     tip_name, base_name = tip_and_base({name: sensor for name, (_, sensor) in found.items()}, choices)
     table, tip = found[tip_name]
     lost = int(np.sum(~tip.seen))
+    if lost == len(tip.seen):
+        raise AskError(
+            f"{table.file}: sensor {tip_name} was seen in no row, or only beyond {FARTHEST:g} m: where its positions are "
+            "in another unit say --set unit.NAME=mm of each of their columns"
+        )
     choices.drop(lost, "rows in which the sensor was not seen")
     checks = _quaternion_checks(tip)
     position, quaternion, more = _in_frame(tip, None if base_name is None else found[base_name][1], choices)
