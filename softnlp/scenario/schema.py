@@ -85,10 +85,10 @@ def _number_or_fit(value: Any) -> float | None:
     return None if value == "fit" else float(value)
 
 
-def _vector_or_fit(value: Any) -> list[float] | None:
-    """Return three numbers, None for "fit"."""
-    if value != "fit" and not (isinstance(value, list) and len(value) == 3 and all(map(_is_number, value))):
-        raise wrong(f"expected a list of 3 numbers or 'fit', got {shown(value)}")
+def _vector_or_fit(size: int, value: Any) -> list[float] | None:
+    """Return so many numbers, None for "fit"."""
+    if value != "fit" and not (isinstance(value, list) and len(value) == size and all(map(_is_number, value))):
+        raise wrong(f"expected a list of {size} numbers or 'fit', got {shown(value)}")
     return None if value == "fit" else [float(v) for v in value]
 
 
@@ -324,12 +324,18 @@ class RegistrationTable(Table):
     """[registration] of measured tips: their frame, the sensor's place on the tip, and how the sets are turned."""
 
     frame: Literal["given", "base sensor", "fit"] = "given"
-    tip_offset_mm: Annotated[list[float] | None, PlainValidator(_vector_or_fit)] = [0.0, 0.0, 0.0]
+    tip_offset_mm: Annotated[list[float] | None, PlainValidator(partial(_vector_or_fit, 3))] = [0.0, 0.0, 0.0]
     clock_deg: Annotated[float | None, PlainValidator(_number_or_fit)] = 0.0
     set_order: Annotated[list[int], Field(min_length=1)] | None = None
     rotation_world_from_base_quat_xyzw: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
     translation_mm: Vector | None = None
     base_sensor_mm: Vector | None = None
+    tip_sensor_quat_xyzw: Annotated[list[float] | None, PlainValidator(partial(_vector_or_fit, 4))] = [
+        0.0,
+        0.0,
+        0.0,
+        1.0,
+    ]
 
 
 class ForwardFile(ScenarioFile):
