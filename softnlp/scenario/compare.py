@@ -26,13 +26,14 @@ from softnlp.scenario.laboratory import import_notes, laboratory_columns
 from softnlp.scenario.measured_rows import (
     ALIASES,
     MEASURED_COLUMNS,
+    ORIENTATION_COLUMNS,
     SCALARS,
     RobotRows,
     named_columns,
     near_misses,
     rows_by_robot,
 )
-from softnlp.scenario.registration import import_settings, registration_of
+from softnlp.scenario.registration import import_settings, registration_of, takes_orientations
 from softnlp.statics.kept import pose_solver
 from softnlp.studies.check import Check
 from softnlp.studies.compare import SHAPES, compare
@@ -213,11 +214,16 @@ def _notes(columns: Columns, scenario: Scenario) -> list[str]:
     found = []
     if scenario.contact is None and _FORCE_COLUMN in columns:
         found.append(f"{_FORCE_COLUMN} is not compared: study {scenario.study!r} of {scenario.path} has no wall")
-    return found + near_misses(columns, (*MEASURED_COLUMNS, "robot"), "not compared")
+    asked = scenario.registration is not None and takes_orientations(scenario.registration)
+    if not asked and any(name in columns for names in ORIENTATION_COLUMNS for name in names):
+        found.append("orientations are not compared; [registration] tip_sensor_quat_xyzw says how the sensor lies")
+    return found + near_misses(columns, (*MEASURED_COLUMNS, "robot", *sum(ORIENTATION_COLUMNS, ())), "not compared")
 
 
 def _measured(scenario: Scenario, columns: Columns) -> tuple[tuple[RobotRows, ...], tuple[Measurements, ...]]:
     """Return the rows of each robot and what was measured of it."""
+    table = scenario.registration
+    oriented = table is not None and takes_orientations(table)
     own: dict[str, Robot] = {scenario.robot.name: scenario.robot}
     rows = tuple(rows_by_robot([columns], own, lambda _, row: scenario.robot))
     measurements = []
@@ -237,6 +243,7 @@ def _measured(scenario: Scenario, columns: Columns) -> tuple[tuple[RobotRows, ..
                 **seen,
                 tilt=tilt,
                 label=of_robot.label,
+                orientation=of_robot.orientation() if oriented else None,
             )
         )
     kept = [k for k, m in enumerate(measurements) if _has_numbers(m)]
@@ -246,8 +253,8 @@ def _measured(scenario: Scenario, columns: Columns) -> tuple[tuple[RobotRows, ..
 
 
 def _has_numbers(m: Measurements) -> bool:
-    parts = (m.tip_position, m.bending_angle, m.elongation, m.tilt, m.blocked_force)
-    return any(np.isfinite(part).any() for part in parts)
+    parts = (m.tip_position, m.bending_angle, m.elongation, m.tilt, m.blocked_force, m.orientation)
+    return any(np.isfinite(part).any() for part in parts if part is not None)
 
 
 def _variants(scenario: Scenario, asked: Asked, against_wall: bool) -> tuple[Variant, ...]:

@@ -23,6 +23,7 @@ from softnlp.scenario.data import Read, Scenario
 from softnlp.scenario.laboratory import import_notes, laboratory_columns
 from softnlp.scenario.measured_rows import (
     ALIASES,
+    ORIENTATION_COLUMNS,
     SCALARS,
     TIP_COLUMNS,
     RobotRows,
@@ -30,7 +31,7 @@ from softnlp.scenario.measured_rows import (
     near_misses,
     rows_by_robot,
 )
-from softnlp.scenario.registration import import_settings, registration_of
+from softnlp.scenario.registration import import_settings, registration_of, takes_orientations
 from softnlp.scenario.schema import (
     ContactTable,
     MaterialTable,
@@ -47,7 +48,13 @@ from softnlp.studies.registration import Registration
 
 _MEASURED = (*TIP_COLUMNS, *(output.measured for output in SCALARS.values()))
 _OWN = ("p1_bar", *_MEASURED, *ALIASES)
-_KNOWN = (*_MEASURED, "robot", "weight", *(f"sigma_{OUTPUTS[name].key}" for name in OBSERVABLES))
+_KNOWN = (
+    *_MEASURED,
+    "robot",
+    "weight",
+    *sum(ORIENTATION_COLUMNS, ()),
+    *(f"sigma_{OUTPUTS[name].key}" for name in OBSERVABLES),
+)
 
 if TYPE_CHECKING:  # imported where needed: to read a scenario takes none of them
     from softnlp.studies.identified import Identified
@@ -75,7 +82,7 @@ class MeasurementsTable(DataTable):
 def _sigma_keys() -> Iterator[str]:
     for name in OBSERVABLES:
         yield OUTPUTS[name].key
-        if name != "tip_position":
+        if name not in ("tip_position", "orientation"):
             yield f"{name}_percent"
 
 
@@ -159,11 +166,17 @@ def _robots(given: Read, table: MeasurementsTable) -> RobotTask:
     for rows in rows_by_robot(tables, own, unnamed):
         readings.append(rows.readings().ravel())
         placed = registration_of(registration, rows.robot.chamber_sets)
-        made.append(_measurements(rows, given.file.sigma, placed))
+        made.append(_measurements(rows, given.file.sigma, placed, takes_orientations(registration)))
         cells.append(tuple(tuple(_cell(c, k, column) for column in header) for c, k in rows.places))
     free, bounds = _free(table, given.material)
     pressed = np.concatenate(readings)
     notes = (*told, *misses, *noise_note(pressed), *unit_note(pressed))
+    unused = any(c in header for names in ORIENTATION_COLUMNS for c in names)
+    if unused and all(m.orientation is None for m in made):
+        notes = (
+            *notes,
+            f"orientations are not fitted; [sigma] {OUTPUTS['orientation'].key}, their noise, makes them count",
+        )
     sets = made[0].robot.chamber_sets
     return RobotTask(tuple(made), free, bounds, header, tuple(cells), notes, registration_of(registration, sets))
 
@@ -172,8 +185,10 @@ def _cell(columns: Columns, row: int, name: str) -> str:
     return columns.rows[row][columns.header.index(name)].strip() if name in columns else ""
 
 
-def _measurements(rows: RobotRows, sigmas: SigmaTable, registration: Registration | None) -> Measurements:
-    """Return the measurements of one robot."""
+def _measurements(
+    rows: RobotRows, sigmas: SigmaTable, registration: Registration | None, oriented: bool
+) -> Measurements:
+    """Return the measurements of one robot; orientations count where they are asked for, or their noise is stated."""
     pressure, seen = rows.pressure(), rows.scalars()
     if registration is not None:
         pressure = registration.ordered(pressure)
@@ -195,6 +210,8 @@ def _measurements(rows: RobotRows, sigmas: SigmaTable, registration: Registratio
     weight = np.where(np.isnan(weight), 1.0, weight)
     tip = rows.tip_position()
     made = Measurements(rows.robot, pressure, tip_position=tip, **seen, sigma=sigma, weight=weight, label=rows.label)
+    if oriented or "orientation" in sigma:
+        made = replace(made, orientation=rows.orientation())
     try:
         checked_measurements(made)
     except InputError as error:

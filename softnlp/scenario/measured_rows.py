@@ -22,6 +22,8 @@ from softnlp.model.robot import ROBOTS, Robot
 Array = NDArray[np.float64]
 
 TIP_COLUMNS = tuple(OUTPUTS[f"tip_{x}"].measured for x in "xyz")
+ORIENTATION_COLUMNS = ("qx", "qy", "qz", "qw"), ("dx", "dy", "dz")
+"""Of the quaternion of the tip's sensor, or of the direction of its z axis."""
 SCALARS: Mapping[str, Output] = {name: OUTPUTS[name] for name in ("bending_angle", "elongation", "blocked_force")}
 """What is measured beside the tip."""
 _COMPARED = (*(OUTPUTS[f"tip_{x}"] for x in "xyz"), *SCALARS.values(), OUTPUTS["tilt"], OUTPUTS["backbone_length"])
@@ -93,6 +95,14 @@ class RobotRows:
     def tip_position(self) -> Array:
         """Return the tips (rows, 3) [m]."""
         return np.column_stack([self.column(name) for name in TIP_COLUMNS]) * OUTPUTS["tip_position"].scale
+
+    def orientation(self) -> Array | None:
+        """Return the quaternions (rows, 4) or directions (rows, 3) of the tip's sensor, None where there are none."""
+        for names in ORIENTATION_COLUMNS:
+            found = np.column_stack([self.column(name) for name in names])
+            if np.isfinite(found).all(axis=1).any():
+                return found
+        return None
 
     def scalars(self) -> dict[str, Any]:
         """Return each of `SCALARS` (rows,), SI."""

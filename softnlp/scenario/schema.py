@@ -332,15 +332,22 @@ class RegistrationTable(Table):
     rotation_world_from_base_quat_xyzw : of a given frame, a quaternion x, y, z, w; as in [0.0, 0.0, 0.0, 1.0]
     translation_mm : of a given frame; as in [0.0, 0.0, 0.0]
     base_sensor_mm : where the base sensor sits in the robot's frame; as in [0.0, 0.0, 0.0]
+    tip_sensor_quat_xyzw : the sensor's turn in the frame of the tip, a quaternion x, y, z, w, or "fit"
     """
 
     frame: Literal["given", "base sensor", "fit"] = "given"
-    tip_offset_mm: Annotated[list[float] | None, PlainValidator(vector_or_fit)] = [0.0, 0.0, 0.0]
+    tip_offset_mm: Annotated[list[float] | None, PlainValidator(partial(vector_or_fit, 3))] = [0.0, 0.0, 0.0]
     clock_deg: Annotated[float | None, PlainValidator(number_or_fit)] = 0.0
     set_order: Annotated[list[int], Field(min_length=1)] | None = None
     rotation_world_from_base_quat_xyzw: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
     translation_mm: Vector | None = None
     base_sensor_mm: Vector | None = None
+    tip_sensor_quat_xyzw: Annotated[list[float] | None, PlainValidator(partial(vector_or_fit, 4))] = [
+        0.0,
+        0.0,
+        0.0,
+        1.0,
+    ]
 
 
 class ForwardFile(ScenarioFile):

@@ -72,10 +72,10 @@ def number_or_fit(value: Any) -> float | None:
     return None if value == "fit" else float(value)
 
 
-def vector_or_fit(value: Any) -> list[float] | None:
-    """Return three numbers, None for "fit"."""
-    if value != "fit" and not (isinstance(value, list) and len(value) == 3 and all(map(_is_number, value))):
-        raise wrong(f"expected a list of 3 numbers or 'fit', got {shown(value)}")
+def vector_or_fit(size: int, value: Any) -> list[float] | None:
+    """Return so many numbers, None for "fit"."""
+    if value != "fit" and not (isinstance(value, list) and len(value) == size and all(map(_is_number, value))):
+        raise wrong(f"expected a list of {size} numbers or 'fit', got {shown(value)}")
     return None if value == "fit" else [float(v) for v in value]
 
 

@@ -119,7 +119,11 @@ def identify(
     data = tuple(checked_measurements(m) for m in given)
     chosen = constants = free_constants(free, material, coefficients, bounds)
     count = sum(int(np.sum(d.fitted)) for d in data)
-    registration = registration if registration is not None and registration.acts else None
+    whole = np.concatenate([d.whole for d in data])
+    if registration is None or not registration.acts:  # orientations are those of a sensor
+        registration = Registration() if np.any(np.isfinite(whole)) else None
+    elif "tip_sensor" in registration.fit and not np.any(whole == 1):
+        raise InputError("expected quaternions of the sensor to fit its axes to", key="registration.tip_sensor")
     total = len(free) + (0 if registration is None else len(registration.names))
     if count < total:
         raise InputError(f"{count} numbers measured cannot determine {total} constants", key="free")
@@ -145,13 +149,13 @@ def identify(
     registered: Sequence[Predicted | Registered] = models
     if registration is not None:
         there = registration.in_sets(in_base)
-        tips = [
-            model.tips(constants.values(constants.start), d.pressure, there)[0]
+        poses_there = [
+            model.tips(constants.values(constants.start), d.pressure, there)
             for model, d in zip(models, data, strict=True)
         ]
-        registration = begun(registration, data, tips)
+        registration = begun(registration, data, poses_there)
         chosen = with_registration(constants, registration)
-        registered = [Registered(model, registration, clocked) for model in models]
+        registered = [Registered(model, registration, d, clocked) for model, d in zip(models, data, strict=True)]
     found = _Fit(data, registered, chosen, material, coefficients, progress).solve()
     if found.status is Status.SOLVED:
         placed = None if registration is None else registration.found(found.constants[len(constants.names) :])
@@ -160,7 +164,7 @@ def identify(
         for d, after, predicted, m in zip(data, found.after, models, given, strict=True):
             tips_at = partial(predicted.tips, constants.values(constants.start))
             at = placed or Registration()
-            checks += tip_checks(d, after[:, :3], at, fit, tips_at, in_base, "tip_position" in m.sigma)
+            checks += tip_checks(d, after, at, fit, tips_at, in_base, "tip_position" in m.sigma)
         found = replace(found, registration=placed, checks=(*constant_checks(found), *checks))
     if found.status is not Status.SOLVED:
         return found

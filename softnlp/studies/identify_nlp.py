@@ -35,7 +35,7 @@ from softnlp.statics.pose_grid import Solved
 from softnlp.statics.unloaded import unloaded_case
 from softnlp.statics.wall import standing_wall
 from softnlp.studies.identified import FreeConstants, Identified, constants_text, file_name
-from softnlp.studies.measurements import COLUMNS, POSE_COLUMNS, RELATIVE_NOISE, Data
+from softnlp.studies.measurements import COLUMNS, POSE_COLUMNS, RELATIVE_NOISE, Data, column_slice
 from softnlp.studies.predicted import STRAIGHT
 from softnlp.studies.registration import CLOCK, Registration, across, turned
 
@@ -46,6 +46,7 @@ MOST_RODS = 200
 
 TOLERANCE = 1e-10
 _ANGLE = POSE_COLUMNS.index("bending_angle")  # which has no derivative where a shape is straight
+_TURNS = range(*column_slice("orientation").indices(len(COLUMNS)))
 _OF_ERROR = 1e-3  # of a constant's standard error: what IPOPT may move it by
 _MISFITS = "misfits"  # residuals times the noise that is assumed, so that they are about as large as the equations
 
@@ -69,11 +70,12 @@ class AtOnce:
         self.loads = loads
         self.clock: ca.MX | None = None  # which turns the loads, where it is fitted and they act across the axis
         self.sensor: Callable[[LoadCase], list[ca.MX]] | None = None
+        self.turn: Callable[[LoadCase, Data, int], list[ca.MX]] | None = None
         if registration is not None:
             self.declared = {q.name: q for q in registration.quantities()}
-            self.sensor = partial(
-                _sensor, registration.function(), ca.vertcat(*(q.symbol for q in self.declared.values()))
-            )
+            g = ca.vertcat(*(q.symbol for q in self.declared.values()))
+            self.sensor = partial(_sensor, registration.function(), g)
+            self.turn = partial(_turn, registration.orientation(), g)
             if CLOCK in self.declared and across(loads):
                 self.clock = self.declared[CLOCK].symbol
         self.cases: list[LoadCase] = []
@@ -126,6 +128,8 @@ class AtOnce:
             if self.sensor is not None:
                 observed[:3] = self.sensor(free)
             self._add_squares([observed[k] for k in columns], data, row, columns)
+            if self.turn is not None:
+                self._add_squares(self.turn(free, data, row), data, row, _TURNS)
             if not mask[-1]:
                 continue
             assert wall is not None
@@ -206,6 +210,13 @@ def _sensor(function: ca.Function, g: ca.MX, case: LoadCase) -> list[ca.MX]:
     """Return the position of the sensor of a load case; g : numbers of the registration."""
     place = function(case.outputs["tip_position"], ca.vec(case.outputs["tip_rotation"]), g)[0]
     return [place[0], place[1], place[2]]
+
+
+def _turn(function: ca.Function, g: ca.MX, case: LoadCase, data: Data, row: int) -> list[ca.MX]:
+    """Return the turn of the sensor of a load case from the one measured in a row."""
+    whole = float(np.nan_to_num(data.whole[row]))
+    turn = function(ca.vec(case.outputs["tip_rotation"]), data.axes[row], whole, g)[0]
+    return [turn[0], turn[1], turn[2]]
 
 
 def closed_fit(

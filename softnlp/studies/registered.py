@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 
 from softnlp.statics.body import Fit
 from softnlp.studies.identified import FreeConstants
-from softnlp.studies.measurements import Data
+from softnlp.studies.measurements import (
+    ORIENTATION_NOISE,
+    RELATIVE_NOISE,
+    Data,
+    Observed,
+    column_slice,
+)
 from softnlp.studies.predicted import Predicted, Prediction
 from softnlp.studies.registration import PREFIX, Registration
 
@@ -36,9 +42,11 @@ class Registered:
     clocked : as of the model.
     """
 
-    def __init__(self, model: Predicted, registration: Registration, clocked: bool = False) -> None:
+    def __init__(self, model: Predicted, registration: Registration, data: Data, clocked: bool = False) -> None:
         self._model = model
+        self._data = data
         self._clocked = clocked
+        self._orientation = registration.orientation()
         self._registration = registration
         self._function = registration.function()
 
@@ -63,6 +71,15 @@ class Registered:
         values[:, :3] = sensor[:, :, 0]
         slopes[:, :3] = by_tip @ moved[:, :3] + by_turn @ turned
         slopes[:, :3, slopes.shape[2] - g.size :] += by_g
+        if np.any(at := np.isfinite(self._data.whole)):
+            turn, by_turn, by_g = (
+                np.asarray(part).reshape(3, int(np.sum(at)), -1).transpose(1, 0, 2)
+                for part in self._orientation(found.turns[at].T, self._data.axes[at].T, self._data.whole[None, at], g)
+            )
+            where = column_slice("orientation")
+            values[at, where] = turn[:, :, 0]
+            slopes[at, where] = by_turn @ turned[at]
+            slopes[at, where, slopes.shape[2] - g.size :] += by_g
         return Prediction(values, slopes, found.failures)
 
     def _widened(self, slopes: Array, count: int) -> Array:
@@ -74,24 +91,44 @@ class Registered:
         return wide
 
 
-def begun(registration: Registration, data: Sequence[Data], tips: Sequence[Array]) -> Registration:
+def begun(registration: Registration, data: Sequence[Data], poses: Sequence[tuple[Array, Array]]) -> Registration:
     """Return a registration whose frame begins where the model's tips lie best on those measured (Kabsch 1976).
 
-    tips : of the model with the tip's offset and clock that are given, for each robot (rows, 3) [m].
+    poses : tips of the model, for each robot (rows, 3) [m], and their rotations by columns (rows, 9). The axes of a
+    sensor begin at the mean of what the frame leaves of the orientations.
     """
-    pairs = [np.column_stack([p, d.values[:, :3]]) for d, p in zip(data, tips, strict=True)]
-    both = np.concatenate(pairs)
-    both = both[np.isfinite(both).all(axis=1)]
-    return _laid(registration, both[:, :3], both[:, 3:])
+    p, turns = (np.concatenate(part) for part in zip(*poses, strict=True))
+    seen, axes, whole = (
+        np.concatenate(part)
+        for part in ([d.values[:, :3] for d in data], [d.axes for d in data], [d.whole for d in data])
+    )
+    return _laid(registration, p, turns, seen, axes, whole)
 
 
-def _laid(registration: Registration, p: Array, q: Array) -> Registration:
-    """Return a registration whose frame, if it is fitted, lays places p on q (rows, 3) [m]."""
-    if "frame" not in registration.fit or len(p) < 3:
-        return registration
-    U, _, Vt = np.linalg.svd((p - p.mean(axis=0)).T @ (q - q.mean(axis=0)))
-    R = Vt.T @ np.diag([1.0, 1.0, np.sign(np.linalg.det(Vt.T @ U.T))]) @ U.T
-    return replace(registration, rotation=R, translation=q.mean(axis=0) - R @ p.mean(axis=0))
+def _laid(registration: Registration, p: Array, turns: Array, q: Array, axes: Array, whole: Array) -> Registration:
+    """Return a registration whose frame, if it is fitted, lays places p on q (rows, 3) [m], then the sensor's axes."""
+    known = np.isfinite(np.column_stack([p, q])).all(axis=1)
+    if "frame" in registration.fit and np.sum(known) >= 3:
+        a, b = p[known], q[known]
+        R = _nearest((b - b.mean(axis=0)).T @ (a - a.mean(axis=0)))
+        registration = replace(registration, rotation=R, translation=b.mean(axis=0) - R @ a.mean(axis=0))
+    known = (whole == 1) & np.isfinite(turns).all(axis=1)
+    if "tip_sensor" in registration.fit and np.any(known):
+        T, M = (_matrices(part[known]) for part in (turns, axes))
+        base = registration.in_base(np.asarray(registration.translation) + np.eye(3)).T  # (R Rz)^T
+        registration = replace(registration, tip_sensor=_nearest(np.mean(T.transpose(0, 2, 1) @ base @ M, axis=0)))
+    return registration
+
+
+def _nearest(H: Array) -> Array:
+    """Return the rotation nearest to a matrix (3, 3)."""
+    U, _, Vt = np.linalg.svd(H)
+    return np.asarray(U @ np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))]) @ Vt)
+
+
+def _matrices(columns: Array) -> Array:
+    """Return rotations (rows, 3, 3) of those by columns (rows, 9)."""
+    return np.asarray(columns.reshape(-1, 3, 3).transpose(0, 2, 1))
 
 
 def sensor_places(registration: Registration, tips: Array, turns: Array) -> Array:
@@ -99,21 +136,43 @@ def sensor_places(registration: Registration, tips: Array, turns: Array) -> Arra
     return np.asarray(registration.function()(tips.T, turns.T, registration.start())[0]).T
 
 
-def fitted(registration: Registration, tips: Array, turns: Array, measured: Array) -> Registration:
-    """Return a registration with what it fits at the least squares of places of the sensor (rows, 3) [m]."""
+def sensor_turns(registration: Registration, turns: Array, o: Observed) -> Array:
+    """Return the turns (rows, 3) [rad] from the orientations measured, of rotations of tips by columns (rows, 9)."""
+    found = registration.orientation()(turns.T, o.axes.T, np.nan_to_num(o.whole)[None], registration.start())[0]
+    return np.where(np.isfinite(o.whole)[:, None], np.asarray(found).T, np.nan)
+
+
+def fitted(registration: Registration, tips: Array, turns: Array, o: Observed) -> Registration:
+    """Return a registration with what it fits at the least squares of places and orientations of the sensor.
+
+    tips, turns : of the model (rows, 3) [m], rotations by columns (rows, 9). A degree counts as one percent of length.
+    """
     from scipy.optimize import least_squares
 
+    measured = o.values[:, :3]
     known = np.isfinite(np.column_stack([tips, turns, measured])).all(axis=1)
+    also = np.isfinite(o.whole) & np.isfinite(turns).all(axis=1)
     count = len(registration.names)
-    if not count or 3 * np.sum(known) < count:
+    if not count or 3 * np.sum(known) + 2 * np.sum(also) < count:
         return registration.found(registration.start())
-    p, R, q = tips[known], turns[known], measured[known]
-    begin = _laid(registration, p, q)
-    function = begin.function()
+    begin = _laid(registration, tips, turns, measured, o.axes, o.whole)
+    function, orientation = begin.function(), begin.orientation()
+    arm = RELATIVE_NOISE * float(o.robot.length) / ORIENTATION_NOISE
 
     def at(g: Array) -> tuple[Array, Array]:
-        places, _, _, slopes = (np.asarray(part) for part in function(p.T, R.T, g))
-        return (places.T - q).ravel(), slopes.reshape(3, len(p), count).transpose(1, 0, 2).reshape(-1, count)
+        places, _, _, slopes = (np.asarray(part) for part in function(tips[known].T, turns[known].T, g))
+        r, J = [(places.T - measured[known]).ravel()], [_by_row(slopes, int(np.sum(known)), count)]
+        if np.any(also):
+            turn, _, slopes = (
+                np.asarray(part) for part in orientation(turns[also].T, o.axes[also].T, o.whole[None, also], g)
+            )
+            r, J = [*r, arm * turn.T.ravel()], [*J, arm * _by_row(slopes, int(np.sum(also)), count)]
+        return np.concatenate(r), np.concatenate(J)
 
     done = least_squares(lambda g: at(g)[0], begin.start(), jac=lambda g: at(g)[1], x_scale=begin.scales())
     return begin.found(done.x)
+
+
+def _by_row(slopes: Array, rows: int, count: int) -> Array:
+    """Return slopes (3 rows, numbers) of the blocks (3, numbers) that a mapped function returns side by side."""
+    return slopes.reshape(3, rows, count).transpose(1, 0, 2).reshape(-1, count)

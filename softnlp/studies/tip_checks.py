@@ -14,7 +14,7 @@ from softnlp.base.units import DEGREE, MILLIMETRE
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.studies.check import Check
-from softnlp.studies.measurements import Data
+from softnlp.studies.measurements import Data, Observed, column_slice
 from softnlp.studies.registered import fitted, sensor_places
 from softnlp.studies.registration import Registration, across, turned
 
@@ -42,18 +42,34 @@ def tip_checks(
 ) -> tuple[Check, ...]:
     """Return the checks of the tips that were measured of one robot.
 
-    after : (rows, 3) of the model, where the sensor is, with the constants found [m]. placed : the registration as it
+    after : (rows, 9) of the model with the constants found, as `COLUMNS`. placed : the registration as it
     was found. fit : what it fitted. tips : of the model at the constants that the search began with. loads : in the
     frame of the base.
     """
-    known = np.isfinite(data.values[:, :3]).all(axis=1) & np.isfinite(after).all(axis=1)
+    oriented = _orientations(data, after)
+    known = np.isfinite(data.values[:, :3]).all(axis=1) & np.isfinite(after[:, :3]).all(axis=1)
     if np.sum(known) < _FEWEST:
-        return ()
-    P, seen, model = data.pressure[known], data.values[known, :3], after[known]
+        return oriented
+    P, seen, model = data.pressure[known], data.values[known, :3], after[known, :3]
     return (
+        *oriented,
         _residual(seen, model, data.sigma[known, :3], sigma_given),
         *frame_checks(P, seen, model, data.robot, placed, fit, tips, loads),
     )
+
+
+def _orientations(data: Data, after: Array) -> tuple[Check, ...]:
+    """Return the check of what is left of orientations over their noise."""
+    where = column_slice("orientation")
+    left = (after[:, where] / data.sigma[:, where])[data.measured[:, where]]
+    if left.size < _FEWEST:
+        return ()
+    likely = (
+        "the axes of the sensor are turned on the tip ([registration] tip_sensor_quat_xyzw), or the quaternions have "
+        "another order or sense, or their noise in [sigma] is another"
+    )
+    ratio = float(np.sqrt(np.mean(left**2)))
+    return (Check("residual of the orientations over their noise", ratio, (0.0, 3.0), _ANY, likely),)
 
 
 def frame_checks(
@@ -79,7 +95,8 @@ def frame_checks(
         unloaded = np.array([0.0, 0.0, float(robot.length)]) + np.asarray(placed.tip_offset)
         found += _rest(P, here, there, None if loads.act else unloaded, float(robot.length))
     follows = np.sum((model - seen) ** 2) < _FOLLOWS * np.sum((seen - seen.mean(axis=0)) ** 2)
-    found += _orders(P, seen, placed, fit, tips, loads, bool(follows))
+    fit = tuple(name for name in fit if name != "tip_sensor")  # orientations say nothing of the order
+    found += _orders(_places(robot, P, seen, loads.act), placed, fit, tips, loads, bool(follows))
     moved = float(np.linalg.norm(np.ptp(here, axis=0))) / MILLIMETRE
     if np.ptp(P) > 1e4:
         likely = "the tip does not move while the pressure does: a wrong sensor, unit or valve"
@@ -127,46 +144,49 @@ class _Order:
 
 
 def _orders(
-    P: Array, seen: Array, placed: Registration, fit: Sequence[str], tips: Tips, loads: Loads, settled: bool
+    o: Observed, placed: Registration, fit: Sequence[str], tips: Tips, loads: Loads, settled: bool
 ) -> Iterator[Check]:
     """Yield the check of the clock, and of the order of the sets where another one does far better.
 
     All by the constants that the search began with: those that were fitted to another order are not to be trusted.
     settled : whether no other order is to be tried.
     """
-    framed, sets = "frame" not in fit, P.shape[1]
-    rows = np.linspace(0, len(P) - 1, min(len(P), _MOST_LOADED if loads.act else _MOST_ROWS)).round().astype(int)
-    P, seen = P[rows], seen[rows]
+    framed, sets = "frame" not in fit, o.pressure.shape[1]
     given = tuple(range(sets))
-    as_given = _left(P, seen, given, placed, fit, tips, loads, turns=False)
-    turned = _left(P, seen, given, placed, fit, tips, loads) if framed else as_given
-    if as_given is None or turned is None:
+    as_given = _left(o, given, placed, fit, tips, loads, turns=False)
+    with_turn = _left(o, given, placed, fit, tips, loads) if framed else as_given
+    if as_given is None or with_turn is None:
         return
-    found = [as_given, turned]
+    found = [as_given, with_turn]
     for order in permutations(given) if 2 <= sets <= _MOST_SETS and not settled else ():
         if order != given:
-            each = [_left(P, seen, order, placed, fit, tips, loads, turns=turns) for turns in {framed, False}]
+            each = [_left(o, order, placed, fit, tips, loads, turns=turns) for turns in {framed, False}]
             found += [one for one in each if one is not None]
     least = min(one.squares for one in found)
     best = min((one for one in found if one.squares <= 2 * least), key=lambda one: (one.turn != 0, one.squares))
-    if best.squares < _BETTER * turned.squares:
+    if best.squares < _BETTER * with_turn.squares:
         sets_of = [placed.set_order[k] if placed.set_order else int(k) + 1 for k in np.argsort(best.order)]
         clock = f" with clock_deg = {(placed.clock + best.turn) / DEGREE:.1f}" if best.turn else ""
         mirror = ", the mirror image of the sets" if _is_mirror(best.order) else ""
         likely = f"looks like set_order = {sets_of} in [registration]{clock}{mirror}"
         share = best.squares / as_given.squares
         yield Check("order of the sets: what another one leaves", share, (_BETTER, inf), _ANY, likely)
-    elif framed and "clock" not in fit and turned.squares <= _BETTER * as_given.squares:
+    elif framed and "clock" not in fit and with_turn.squares <= _BETTER * as_given.squares:
         # a turn that explains too little is not what is wrong
-        limit = max(2.0, 4 * turned.error / DEGREE)
-        clock = f"{(placed.clock + turned.turn) / DEGREE:.1f}"
+        limit = max(2.0, 4 * with_turn.error / DEGREE)
+        clock = f"{(placed.clock + with_turn.turn) / DEGREE:.1f}"
         likely = f'the sets are turned about the base\'s axis; [registration] clock_deg = {clock}, or "fit"'
-        yield Check("clock of the sets", turned.turn / DEGREE, (-limit, limit), _ANY, likely, "deg")
+        yield Check("clock of the sets", with_turn.turn / DEGREE, (-limit, limit), _ANY, likely, "deg")
+
+
+def _places(robot: Robot, P: Array, seen: Array, loaded: bool) -> Observed:
+    """Return some rows of places that were measured, without orientations."""
+    rows = np.linspace(0, len(P) - 1, min(len(P), _MOST_LOADED if loaded else _MOST_ROWS)).round().astype(int)
+    return Observed(robot, "", P[rows], seen[rows], np.zeros((len(rows), 9)), np.full(len(rows), np.nan))
 
 
 def _left(
-    P: Array,
-    seen: Array,
+    o: Observed,
     order: tuple[int, ...],
     placed: Registration,
     fit: Sequence[str],
@@ -178,13 +198,13 @@ def _left(
     asked = replace(placed, fit=(*fit, "clock") if turns and "clock" not in fit else tuple(fit))
     clock = placed.clock
     for _ in range(_TURNS if across(loads) and "clock" in asked.fit else 1):
-        model, rotations = tips(P[:, list(order)], turned(loads, -clock))
+        model, rotations = tips(o.pressure[:, list(order)], turned(loads, -clock))
         if not np.isfinite(model).all():
             return None
-        found = fitted(asked, model, rotations, seen)
+        found = fitted(asked, model, rotations, o)
         clock = found.clock
-    left = float(np.sum((sensor_places(found, model, rotations) - seen) ** 2))
-    spread = np.sqrt(left / max(1, seen.size - len(asked.names)))
+    left = float(np.sum((sensor_places(found, model, rotations) - o.values) ** 2))
+    spread = np.sqrt(left / max(1, o.values.size - len(asked.names)))
     size = np.linalg.norm(model[:, :2])
     turn = (clock - placed.clock + np.pi) % (2 * np.pi) - np.pi
     return _Order(left, float(turn) if turns else 0.0, float(spread / max(size, 1e-12)), order)

@@ -46,7 +46,7 @@ _SIGMAS = {
     for name in OBSERVABLES
     for key, unit in (
         (OUTPUTS[name].key, OUTPUTS[name].unit.label),
-        *([(f"{name}_percent", "%")] if name != "tip_position" else []),
+        *([(f"{name}_percent", "%")] if name not in ("tip_position", "orientation") else []),
     )
 }
 _MEASURED = [OUTPUTS[entry].measured for entries in OBSERVABLES.values() for entry in entries]
