@@ -55,7 +55,10 @@ class Curve:
 def fitted(stretches: Array, values: Array, low: float, high: float, order: int) -> Curve:
     """Return the polynomial of this order nearest to values in the sense of least squares."""
     series = np.polynomial.chebyshev.chebfit(Curve((), low, high).place(np.log(stretches)), values, order)
-    return Curve(tuple(float(c) for c in np.polynomial.chebyshev.cheb2poly(series)), low, high)
+    powers = np.zeros(order + 1)  # the conversion leaves out zeros of high order
+    short = np.polynomial.chebyshev.cheb2poly(series)
+    powers[: len(short)] = short
+    return Curve(tuple(float(c) for c in powers), low, high)
 
 
 def nodes(low: float, high: float, count: int) -> Array:
