@@ -12,7 +12,17 @@ from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, rich_text, say
 from softnlp.cli.figures import draw
 from softnlp.cli.report import Report, write_report
-from softnlp.cli.study import Json, Out, require_file, results_folder, show, stepwise, stopped_after
+from softnlp.cli.study import (
+    AllErrors,
+    Json,
+    Out,
+    require_file,
+    results_folder,
+    scenario_at,
+    show,
+    stepwise,
+    stopped_after,
+)
 from softnlp.model.contact_settings import ContactTask
 
 if TYPE_CHECKING:
@@ -39,6 +49,7 @@ def run(
     branches: int = 0,
     ipopt_log: bool = False,
     report: Report = None,
+    all_errors: AllErrors = False,
 ) -> int:
     """Solve every step of a scenario file in order, each started from the last.
 
@@ -55,9 +66,7 @@ def run(
     ipopt_log
         Print the log of IPOPT on standard error.
     """
-    from softnlp.scenario.read import load_scenario
-
-    asked = load_scenario(scenario)
+    asked = scenario_at(scenario, all_errors)
     if ipopt_log:
         asked = _with_log(asked)
     _require_branches(asked, branches)

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
 from softnlp.cli.figures import draw
-from softnlp.cli.study import Json, Out, results_folder, scenario_for
+from softnlp.cli.study import AllErrors, Json, Out, results_folder, scenario_for
 from softnlp.model.gravity import gravity_lines
 
 
@@ -23,6 +23,7 @@ def sensitivity(
     samples: int = 200,
     out: Out = None,
     json: Json = False,
+    all_errors: AllErrors = False,
 ) -> int:
     """Differentiate the tip and shape of one step of a forward scenario, and draw what follows from it.
 
@@ -47,7 +48,7 @@ def sensitivity(
     from softnlp.results.sensitivity import sensitivity_document, table_rows
     from softnlp.studies.report import named_tolerances, sensitivity_report
 
-    asked = scenario_for(scenario, "forward", "expected study 'forward', got {}")
+    asked = scenario_for(scenario, "forward", "expected study 'forward', got {}", all_errors)
     count = len(asked.pressures)
     chosen = count if step is None else step
     if not 1 <= chosen <= count:

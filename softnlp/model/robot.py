@@ -11,7 +11,7 @@ from typing import Any
 
 import casadi as ca
 
-from softnlp.base.errors import RobotError, nearest
+from softnlp.base.errors import RobotError, first_of, nearest
 from softnlp.base.ranges import SIZE
 from softnlp.base.reading import choices, did_you_mean, shown
 from softnlp.base.units import DEGREE, MILLIMETRE
@@ -262,9 +262,8 @@ def check(robot: Robot, *, allow: Collection[str] = (), minimum_wall: float = MI
     found = violations(robot, minimum_wall)
     refused = [v for v in found if v.rule not in allow]
     if refused:
-        first, more = refused[0], len(refused) - 1
-        hint = f'; allow = ["{first.rule}"] lowers this to a warning' if first.lowerable else ""
-        raise RobotError(f"{first.rule}: {first.message}{hint}{f' (and {more} more)' if more else ''}")
+        hints = [f'; allow = ["{v.rule}"] lowers this to a warning' if v.lowerable else "" for v in refused]
+        raise first_of([RobotError(f"{v.rule}: {v.message}{hint}") for v, hint in zip(refused, hints, strict=True)])
     return (*(f"{v.rule}: {v.message}" for v in found), *size_notes(robot))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from os import PathLike, fspath
 from pathlib import Path
@@ -11,17 +12,17 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from softnlp.base.errors import InputError, of_table
+from softnlp.base.errors import InputError, first_of, of_table
 from softnlp.base.ranges import file_unit_note
 from softnlp.base.reading import BACKSLASH_HINT, LARGEST_TOML, LONGEST_NAME, one_line, read_text, toml_tables
 from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
 from softnlp.model.conventions import COEFFICIENT_SETS, CONVENTIONS, Coefficients
 from softnlp.model.materials import material_from_table
 from softnlp.model.numerics import Numerics
-from softnlp.model.robot import Robot, Violation, violations
+from softnlp.model.robot import MOST_CHAMBERS, Robot, Violation, violations
 from softnlp.model.rod import Loads
 from softnlp.scenario.blocked_force import contact_settings, contact_task
-from softnlp.scenario.check import first_of, parse
+from softnlp.scenario.check import HOW, parse, parse_parts
 from softnlp.scenario.data import Read, Task
 from softnlp.scenario.data import Scenario as Scenario
 from softnlp.scenario.design import design_task
@@ -74,7 +75,8 @@ def scenario_from_text(text: str, path: str | PathLike[str]) -> Scenario:
         return _scenario(text, Path(path))
     except InputError as error:
         if "no such file" in error.message and _ESCAPED.search(text):
-            error = type(error)(f"{error.message}; {BACKSLASH_HINT}", table=error.table, key=error.key)
+            message = f"{error.message}; {BACKSLASH_HINT}"
+            error = type(error)(message, table=error.table, key=error.key, every=error.every)
         raise placed(error, fspath(path)) from None
 
 
@@ -97,23 +99,27 @@ def robot_of_scenario(path: str | PathLike[str]) -> tuple[Robot, tuple[Violation
 def _scenario(text: str, path: Path) -> Scenario:
     """Build a scenario; errors do not name the file yet."""
     data = parse_toml(text)
-    file = parse(data)
-    errors: list[InputError] = []
-    made = _attempt(errors, "robot", file.robot.made)
-    silicone = data.get("material") or file.material.model_dump(exclude_none=True)
-    chosen = _attempt(errors, "material", lambda: material_from_table(silicone, folder=path.parent))
-    steps = made and _attempt(errors, "pressure", lambda: _steps(file, made[0].chamber_sets, path.parent))
-    contact = task = None
-    if (wall := getattr(file, "contact", None)) is not None:
+    file, errors, bad = parse_parts(data)  # what does not fit is in no table of the file
+    made = _attempt(errors, "robot", file.robot.made) if "robot" not in bad else None
+    chosen = steps = contact = task = numerics = None
+    if "material" not in bad:
+        silicone = data.get("material") or file.material.model_dump(exclude_none=True)
+        chosen = _attempt(errors, "material", lambda: material_from_table(silicone, folder=path.parent))
+    if not bad & {"robot", "pressure"}:
+        with suppress(InputError):  # of a robot that is not described, which was said
+            sets = min(file.robot.described().chamber_sets, MOST_CHAMBERS)
+            steps = _attempt(errors, "pressure", lambda: _steps(file, sets, path.parent))
+    if "contact" not in bad and (wall := getattr(file, "contact", None)) is not None:
         single = None if made is None or file.study == "design" else made[0]  # a design judges each candidate
         contact = _attempt(errors, "contact", lambda: contact_settings(wall, single))
-    if file.study in TASKS and made is not None and chosen is not None and steps is not None:
+    if file.study in TASKS and not bad and made is not None and chosen is not None and steps is not None:
         table, read_task = TASKS[file.study]
         given = Read(file, data, made[0], chosen, steps, path.parent)
         task = _attempt(errors, table, lambda: read_task(given))
-    numerics = _attempt(errors, "solver", lambda: _numerics(file))
+    if "solver" not in bad:
+        numerics = _attempt(errors, "solver", lambda: _numerics(file))
     if errors or made is None or chosen is None or steps is None or numerics is None:
-        raise first_of(errors)
+        raise first_of(errors, HOW)
     robot, warnings = made
     # Where constants are to be found, those given only begin the search.
     unlikely = () if file.study == "identify" else modulus_notes(chosen.name, float(chosen.shear_modulus(1.0)))
@@ -163,7 +169,8 @@ def placed(error: InputError, source: str) -> InputError:
     """Return an error that names the file; whatever it quotes stays printable and on the same line."""
     table = error.table and one_line(error.table, LONGEST_NAME)
     key = error.key and one_line(error.key, LONGEST_NAME)
-    return type(error)(one_line(error.message), source=one_line(source), table=table, key=key)
+    every = [placed(one, source) for one in error.every]
+    return type(error)(one_line(error.message), source=one_line(source), table=table, key=key, every=every)
 
 
 def parse_toml(text: str) -> dict[str, Any]:

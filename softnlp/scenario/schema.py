@@ -92,7 +92,8 @@ class RobotTable(Table):
             return robot, check(robot, allow=self.allow, minimum_wall=self.minimum_wall_mm * MILLIMETRE)
         except InputError as error:
             file_keys = {d.field: d.file_key for d in DIMENSIONS}
-            raise type(error)(error.message, key=file_keys.get(error.key or "", error.key)) from None
+            key = file_keys.get(error.key or "", error.key)
+            raise type(error)(error.message, key=key, every=error.every) from None
 
     def described(self) -> Robot:
         """Return the robot, whether it can be made or not."""
