@@ -196,6 +196,7 @@ class MaterialTable(Table):
 
     name: Label = Field(description="a silicone of the library, or a name for your own")
     model: str = Field(description="linear, neo-hookean, mooney-rivlin, yeoh, ogden or a law of your own")
+    set: Label | None = None
     density_kg_m3: Positive | None = None
     file: FileName | None = None
     constants: dict[str, float] | None = None
