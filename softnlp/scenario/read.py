@@ -18,6 +18,7 @@ from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
 from softnlp.model.conventions import COEFFICIENT_SETS, CONVENTIONS, Coefficients
 from softnlp.model.materials import material_from_table
 from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot, Violation, violations
 from softnlp.model.rod import Loads
 from softnlp.scenario.blocked_force import contact_settings, contact_task
@@ -29,6 +30,7 @@ from softnlp.scenario.identify import identify_task
 from softnlp.scenario.inverse import inverse_task
 from softnlp.scenario.pressures import PressurePath, pressure_path
 from softnlp.scenario.schema import ScenarioFile
+from softnlp.scenario.uncertainty import uncertainty_of
 from softnlp.scenario.workspace import workspace_task
 from softnlp.studies.plausibility import modulus_notes
 
@@ -112,6 +114,13 @@ def _scenario(text: str, path: Path) -> Scenario:
         given = Read(file, data, made[0], chosen, steps, path.parent)
         task = _attempt(errors, table, lambda: read_task(given))
     numerics = _attempt(errors, "solver", lambda: _numerics(file))
+    scatter = None
+    if (said := getattr(file, "uncertainty", None)) is not None and made is not None and chosen is not None:
+        model = Model(made[0], chosen, _coefficients(file), CONVENTIONS[file.corrections.conventions])
+        pressed = contact if file.study == "blocked-force" else None
+        scatter = _attempt(
+            errors, "uncertainty", lambda: uncertainty_of(said, model, silicone, path.parent, pressed, task)
+        )
     if errors or made is None or chosen is None or steps is None or numerics is None:
         raise first_of(errors)
     robot, warnings = made
@@ -134,6 +143,7 @@ def _scenario(text: str, path: Path) -> Scenario:
         task=task,
         warnings=(*warnings, *unlikely, *file_unit_note(data), *steps.notes),
         registration=getattr(file, "registration", None) if "registration" in data else None,
+        uncertainty=scatter,
     )
 
 

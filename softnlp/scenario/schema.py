@@ -92,6 +92,13 @@ def _vector_or_fit(value: Any) -> list[float] | None:
     return None if value == "fit" else [float(v) for v in value]
 
 
+def _deviation(value: Any) -> float | str:
+    """Return a standard deviation as it is written: a number, or text that says what it is a part of."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise wrong(f"expected a number, or text such as '3%', got {shown(value)}")
+    return value
+
+
 def _file_name(value: str) -> str:
     r"""Refuse control characters, which are escapes that nobody meant: in TOML "data\table.csv" holds a tab."""
     if not value.strip():
@@ -333,9 +340,14 @@ class RegistrationTable(Table):
     base_sensor_mm: Vector | None = None
 
 
+UncertaintyTable = dict[str, Annotated[float | str, PlainValidator(_deviation)]]
+"""[uncertainty]: a standard deviation by the key of what scatters."""
+
+
 class ForwardFile(ScenarioFile):
     """A whole scenario of `forward`."""
 
+    uncertainty: UncertaintyTable | None = None
     registration: RegistrationTable = RegistrationTable()
     pressure: PressureTable = Field(description="a table with one of sequence_bar, ramp, file")
 
