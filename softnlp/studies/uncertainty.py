@@ -133,6 +133,9 @@ class Deviations:
     ) -> None:
         if any(f"material.{FACTOR}" in source.moves for source in uncertainty.sources):
             model = replace(model, material=scalable(model.material))
+        if contact is None:  # a pose of a scenario that has a wall, too
+            kept = [s for s in uncertainty.sources if not any(name.startswith("contact.") for name in s.moves)]
+            uncertainty = replace(uncertainty, sources=tuple(kept), wall=0.0)
         self.uncertainty, self.loads, self.model = uncertainty, loads, model
         self._poses = PoseDerivatives(pose_solver(model, numerics))
         self._blocked = None if contact is None else blocked_solver(model, numerics, contact)
