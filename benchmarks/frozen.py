@@ -39,7 +39,7 @@ CLOSE = 1e-9
 LEFT_OUT = {
     *("solve_time_s", "seconds", "iterations", "evaluations", "intervals", "residual", "certificate"),
     *("discretisation_error", "engine", "ipopt_status", "ipopt_iterations", "ipopt_multipliers", "softnlp", "versions"),
-    *("residual_by_equation", "time_s", "optimality", "kkt", "left_by_weights"),
+    *("residual_by_equation", "time_s", "optimality", "kkt", "left_by_weights", "material_set"),
 }
 
 

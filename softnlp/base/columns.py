@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from typing import Any
 
@@ -159,6 +160,10 @@ def written(value: float | None, form: str, nothing: str = "-") -> str:
     return text.removeprefix("-") if float(text) == 0 else text
 
 
+def _deviation(name: str, step: Any) -> Any:
+    return None if step.deviation is None else step.deviation.values.get(name)
+
+
 _X, _ROTATION, _N = ("axis",), ("row", "col"), ("chamber",)
 _TIP = ("tip x", "y", "z")
 _EVERY = (
@@ -239,6 +244,12 @@ _EVERY = (
     Output("nearest", MM, "the reachable tip position found", _X, "target", "aimed.tip_position", short=_TIP),
     Output("nearest_direction", ONE, "the tip's axis there", _X, "target", "aimed.tip_direction"),
     Output("optimal", ONE, "whether nothing that was left to choose is better nearby", group="target"),
+    # --- standard deviations, where uncertainties were given
+    *(Output(f"std_{name}", unit, f"standard deviation of {name.replace('_', ' ')}, first order", dims, "std",
+             partial(_deviation, name))
+      for name, unit, dims in (
+          ("tip_position", MM, _X), ("bending_angle", DEG, ()), ("tilt", DEG, ()), ("backbone_length", MM, ()),
+          ("elongation", MM, ()), ("stretch", ONE, ()), ("chamber_length", MM, _N), ("blocked_force", N, ()))),
     # --- of comparisons and designs
     Output("elongation", MM),
     Output("orientation", DEG, words="turn of the tip from the one measured", short=("turn",)),

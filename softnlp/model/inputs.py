@@ -124,6 +124,7 @@ def asked_tables(model: Model, loads: Loads) -> dict[str, Any]:
     return {
         "robot": robot_table(model.robot),
         "material": material_table(model.material),
+        **({"material_set": model.material.set} if model.material.set else {}),
         "coefficients": coefficients_table(model.coefficients),
         "loads": loads_table(loads),
     }

@@ -17,7 +17,14 @@ from softnlp.model.inputs import asked_tables, contact_table, package_version, p
 from softnlp.model.quantities import Model
 from softnlp.nlp.solver import EquationResidual, Ipopt
 from softnlp.statics.step import Run, Step
-from softnlp.studies.fields import BLOCKED_FORCE, closure_of, document_outputs, left_by_weights, value
+from softnlp.studies.fields import (
+    BLOCKED_FORCE,
+    closure_of,
+    deviation_outputs,
+    document_outputs,
+    left_by_weights,
+    value,
+)
 
 _SAID = ("status", "iterations", "multipliers")
 
@@ -28,6 +35,7 @@ def run_document(run: Run) -> dict[str, Any]:
         **document_head(run.title, run.study, run.conventions.name),
         **asked_tables(Model(run.robot, run.material, run.coefficients), run.loads),
         **({} if run.contact is None else {"contact": contact_table(run.contact)}),
+        **({"uncertainty": dict(run.uncertainty)} if run.uncertainty else {}),
         "warnings": list(run.warnings),
         "steps": [_step(run, step) for step in run.steps],
     }
@@ -80,7 +88,11 @@ def _step(run: Run, step: Step) -> dict[str, Any]:
         table["t_s"] = tidy(step.time)
     table["status"] = step.status.value
     table["message"] = step.message
-    table |= {output.key: plain(value(output, step)) for output in document_outputs(run)}
+    deviations = deviation_outputs(run)
+    table |= {o.key: plain(value(o, step)) for o in document_outputs(run) if o not in deviations}
+    if deviations:
+        table["std"] = {o.key.removeprefix("std_"): plain(value(o, step)) for o in deviations}
+        table["std_message"] = "" if step.deviation is None else step.deviation.message
     if run.study == BLOCKED_FORCE:
         table["closure"] = closure_of(run, step)
         if table["closure"] == "weighted":

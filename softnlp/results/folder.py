@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,13 +25,15 @@ from softnlp.results.dataset import netcdf_bytes
 from softnlp.results.document import json_text, require_run
 from softnlp.results.table import table_text
 from softnlp.statics.step import Run, SectionRadii
-from softnlp.studies.fields import BLOCKED_FORCE, INVERSE, closure_of, series, si_value, solved_pose
+from softnlp.studies.fields import BLOCKED_FORCE, INVERSE, closure_of, deviation_outputs, series, si_value, solved_pose
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
 RESULTS_FILE = "results.nc"
+DEVIATING = ("bending_angle", "elongation", "blocked_force")
+"""What figures draw with a band of one standard deviation, where there is one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +93,7 @@ class RunView:
     material : its name and law. pressure : (S, sets) [Pa]. time : (S,) [s] or None.
     stable : (S,) of `STABLE_FLAGS`, undefined where unsolved. stretch : (S,). bending_angle : (S,) [rad].
     backbone_length : (S,) [m]. bodies : S entries. contact : of a blocked force, else None. targets : of inverse
-    kinematics, else None.
+    kinematics, else None. std : standard deviations (S,) of outputs by name [SI], none where nothing scatters.
     """
 
     title: str
@@ -110,6 +112,7 @@ class RunView:
     bodies: tuple[Body | None, ...]
     contact: ContactView | None = None
     targets: TargetView | None = None
+    std: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def solved(self) -> tuple[int, ...]:
@@ -128,6 +131,7 @@ def view_of_run(run: Run) -> RunView:
             pose = None if contact is None else contact.free
         return None if pose is None else Body(pose.shape.position, pose.shape.rotation, pose.radii)
 
+    known = {output.name for output in deviation_outputs(run)}
     return _view(
         lambda name: series(OUTPUTS[name], run.steps, sizes, si_value),
         body,
@@ -141,6 +145,7 @@ def view_of_run(run: Run) -> RunView:
         status=tuple(step.status for step in run.steps),
         pressure=np.array([step.pressure for step in run.steps], dtype=float),
         time=None if np.all(np.isnan(times)) else np.array(times),
+        std=[name for name in DEVIATING if f"std_{name}" in known],
     )
 
 
@@ -181,11 +186,16 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
         status=tuple(Status(str(word)) for word in values["status"]),
         pressure=number("pressure"),
         time=values.get(OUTPUTS["t"].key),
+        std=[name for name in DEVIATING if OUTPUTS[f"std_{name}"].key in values],
     )
 
 
 def _view(number: Callable[[str], Any], body: Callable[[int, str], Body | None], closures: Any, **head: Any) -> RunView:
-    """Return a view. number : an output of every step by name, SI. body : of a step, with "free_" its free shape."""
+    """Return a view.
+
+    number : an output of every step by name, SI. body : of a step, with "free_" its free shape. head : the other
+    fields, `std` as the names of what has standard deviations.
+    """
     solved = [status.has_solution for status in head["status"]]
     contact = targets = None
     if head["study"] == INVERSE:
@@ -202,7 +212,7 @@ def _view(number: Callable[[str], Any], body: Callable[[int, str], Body | None],
             free=tuple(body(k, "free_") if k in known else None for k in range(len(solved))),
         )
     return RunView(
-        **head,
+        **{**head, "std": {name: np.asarray(number(f"std_{name}"), dtype=float) for name in head["std"]}},
         **{name: number(name) for name in ("stable", "stretch", "bending_angle", "backbone_length")},
         bodies=tuple(body(k, "") if solution else None for k, solution in enumerate(solved)),
         contact=contact,

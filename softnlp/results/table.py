@@ -141,8 +141,16 @@ def _numbers(study: str, step: Step) -> list[str]:
         else:
             found = value(output, step)
             entries = [found] * len(output.headings) if found is None else np.ravel(found).tolist()
-            cells += [written(entry, output.form) for entry in entries]
+            cells += [written(entry, output.form) + _spread(output, step, k) for k, entry in enumerate(entries)]
     return cells
+
+
+def _spread(output: Output, step: Step, entry: int) -> str:
+    """Return the standard deviation of an entry of an output, in words, where there is one."""
+    scatter = OUTPUTS.get(f"std_{output.name}")
+    found = None if scatter is None or step.deviation is None else value(scatter, step)
+    spread = "" if found is None else written(float(np.ravel(found)[entry]), output.form, "")
+    return f" ± {spread}" if spread else ""
 
 
 def _shown(study: str) -> list[Output]:

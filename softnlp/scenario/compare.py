@@ -291,7 +291,7 @@ def _materials(scenario: Scenario, names: Sequence[str]) -> tuple[Material, ...]
     known: dict[str, Material] = {own.law.name: own}
     if "constants" not in table and "formula" not in table:
         file = scenario.path.parent / table["file"] if "file" in table else None
-        models = load_materials(file)[own.name].models
+        models = load_materials(file)[own.name].chosen(table.get("set")).models
         known = {law: replace(found, density=own.density) for law, found in models.items()} | known
         known = {law: known[law] for law in models}
     wanted = [law for name in names for law in (known if name == ALL else (name,))]

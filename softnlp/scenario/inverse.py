@@ -12,7 +12,16 @@ from pydantic import ConfigDict, Field, PlainValidator, TypeAdapter
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.scenario.data import Read, Scenario, run_of
-from softnlp.scenario.schema import MOST_STEPS, Normal, NotNegative, Positive, ScenarioFile, Table, Vector
+from softnlp.scenario.schema import (
+    MOST_STEPS,
+    Normal,
+    NotNegative,
+    Positive,
+    ScenarioFile,
+    Table,
+    UncertaintyTable,
+    Vector,
+)
 from softnlp.statics.step import Run, Step
 from softnlp.studies.forward import followed
 from softnlp.studies.inverse_solver import InverseKinematics
@@ -62,6 +71,7 @@ class InverseFile(ScenarioFile):
 
     target: TargetTable = Field(description="a table with tip_position_mm, tip_direction or both")
     bounds: BoundsTable = BoundsTable()
+    uncertainty: UncertaintyTable | None = None
 
 
 def inverse_task(given: Read) -> InverseTask:

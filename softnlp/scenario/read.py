@@ -19,6 +19,7 @@ from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
 from softnlp.model.conventions import COEFFICIENT_SETS, CONVENTIONS, Coefficients
 from softnlp.model.materials import material_from_table
 from softnlp.model.numerics import Numerics
+from softnlp.model.quantities import Model
 from softnlp.model.robot import MOST_CHAMBERS, Robot, Violation, violations
 from softnlp.model.rod import Loads
 from softnlp.scenario.blocked_force import contact_settings, contact_task
@@ -30,6 +31,7 @@ from softnlp.scenario.identify import identify_task
 from softnlp.scenario.inverse import inverse_task
 from softnlp.scenario.pressures import PressurePath, pressure_path
 from softnlp.scenario.schema import ScenarioFile
+from softnlp.scenario.uncertainty import uncertainty_of
 from softnlp.scenario.workspace import workspace_task
 from softnlp.studies.plausibility import modulus_notes
 
@@ -118,6 +120,14 @@ def _scenario(text: str, path: Path) -> Scenario:
         task = _attempt(errors, table, lambda: read_task(given))
     if "solver" not in bad:
         numerics = _attempt(errors, "solver", lambda: _numerics(file))
+    scatter = None
+    said = getattr(file, "uncertainty", None)
+    if said is not None and not errors and made is not None and chosen is not None:
+        model = Model(made[0], chosen, _coefficients(file), CONVENTIONS[file.corrections.conventions])
+        pressed = contact if file.study == "blocked-force" else None
+        scatter = _attempt(
+            errors, "uncertainty", lambda: uncertainty_of(said, model, silicone, path.parent, pressed, task)
+        )
     if errors or made is None or chosen is None or steps is None or numerics is None:
         raise first_of(errors, HOW)
     robot, warnings = made
@@ -140,6 +150,7 @@ def _scenario(text: str, path: Path) -> Scenario:
         task=task,
         warnings=(*warnings, *unlikely, *file_unit_note(data), *steps.notes),
         registration=getattr(file, "registration", None) if "registration" in data else None,
+        uncertainty=scatter,
     )
 
 

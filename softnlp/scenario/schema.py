@@ -24,7 +24,7 @@ from softnlp.model.numerics import EngineName, Numerics, Transcribing
 from softnlp.model.robot import DIMENSIONS, MINIMUM_WALL, ROBOTS, Robot, check
 from softnlp.scenario.values import MOST_STEPS as MOST_STEPS
 from softnlp.scenario.values import Count as Count
-from softnlp.scenario.values import Direction, intervals_of, number_or_fit, vector_or_fit
+from softnlp.scenario.values import Direction, deviation, intervals_of, number_or_fit, vector_or_fit
 from softnlp.scenario.values import FileName as FileName
 from softnlp.scenario.values import Label as Label
 from softnlp.scenario.values import Normal as Normal
@@ -133,6 +133,7 @@ class MaterialTable(Table):
 
     name: Label = Field(description="a silicone of the library, or a name for your own")
     model: str = Field(description="linear, neo-hookean, mooney-rivlin, yeoh, ogden or a law of your own")
+    set: Label | None = None
     density_kg_m3: Positive | None = None
     file: FileName | None = None
     constants: dict[str, float] | None = None
@@ -351,9 +352,14 @@ class RegistrationTable(Table):
     ]
 
 
+UncertaintyTable = dict[str, Annotated[float | str, PlainValidator(deviation)]]
+"""[uncertainty]: a standard deviation by the key of what scatters."""
+
+
 class ForwardFile(ScenarioFile):
     """A whole scenario of `forward`."""
 
+    uncertainty: UncertaintyTable | None = None
     registration: RegistrationTable = RegistrationTable()
     pressure: PressureTable = Field(description="a table with one of sequence_bar, ramp, file")
 

@@ -79,6 +79,13 @@ def vector_or_fit(size: int, value: Any) -> list[float] | None:
     return None if value == "fit" else [float(v) for v in value]
 
 
+def deviation(value: Any) -> float | str:
+    """Return a standard deviation as it is written: a number, or text that says what it is a part of."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise wrong(f"expected a number, or text such as '3%', got {shown(value)}")
+    return value
+
+
 def _file_name(value: str) -> str:
     r"""Refuse control characters, which are escapes that nobody meant: in TOML "data\table.csv" holds a tab."""
     if not value.strip():

@@ -229,7 +229,7 @@ def _check_varied(task: WorkspaceTask, file: WorkspaceFile, robot: Robot, materi
         part = table[start : start + _MATERIALS_AT_ONCE]
         constants = {**material.constants, **{name: part[:, k] for name, k in of_material.items()}}
         try:
-            Material(material.name, material.law, constants, material.density, material.fitted_stretch)
+            Material(material.name, material.law, constants, material.density, material.fitted_stretch, material.set)
         except InputError as error:
             raise InputError(error.message, key="vary") from None
 

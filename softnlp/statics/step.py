@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -215,6 +216,22 @@ class Aimed:
 
 
 @dataclass(frozen=True, eq=False)
+class Deviation:
+    """Standard deviations of the outputs of a step, to first order.
+
+    Attributes
+    ----------
+    values
+        By the name of the output, a number or one for each entry [SI]; NaN where there is none.
+    message
+        Why there is none of some output, else "".
+    """
+
+    values: Mapping[str, Array]
+    message: str = ""
+
+
+@dataclass(frozen=True, eq=False)
 class Step:
     """One step of a run: its input, how it ended, and the pose when it was solved.
 
@@ -248,6 +265,8 @@ class Step:
         Which engine solved it, of `Numerics`; None without a solution.
     ipopt
         What IPOPT said, None where it took no part.
+    deviation
+        Where uncertainties were given, else None.
     """
 
     pressure: Array
@@ -266,6 +285,7 @@ class Step:
     aimed: Aimed | None = None
     engine: str | None = None
     ipopt: Ipopt | None = None
+    deviation: Deviation | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,6 +306,8 @@ class Run:
         Of the robot.
     contact
         Of a blocked force, else None.
+    uncertainty
+        What scatters and how much, as a scenario says it; empty where nothing was said.
     """
 
     study: str
@@ -298,6 +320,7 @@ class Run:
     title: str = ""
     warnings: tuple[str, ...] = field(default=())
     contact: ContactSettings | None = None
+    uncertainty: Mapping[str, float | str] = field(default_factory=dict)
 
     @property
     def failed(self) -> tuple[Step, ...]:

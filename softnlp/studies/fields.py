@@ -61,8 +61,15 @@ def document_outputs(run: Run) -> tuple[Output, ...]:
         *outputs("pose"),
         *(outputs("wall") if run.study == BLOCKED_FORCE else ()),
         *(outputs("weights") if weights else ()),
+        *deviation_outputs(run),
         *outputs("solve"),
     )
+
+
+def deviation_outputs(run: Run) -> tuple[Output, ...]:
+    """Return the standard deviations that a run has."""
+    known = outputs("std") if run.uncertainty else ()
+    return tuple(o for o in known if run.study == BLOCKED_FORCE or o.name != "std_blocked_force")
 
 
 def dataset_outputs(run: Run) -> tuple[Output, ...]:
