@@ -49,6 +49,7 @@ def mesh(
     """
     from softnlp.figures.mesh import FACETS, HOLES, body_solid, format_of, mould_body, require
     from softnlp.figures.mesh import cores as core_solids
+    from softnlp.model.segments import require_one_segment
 
     target = out or Path(f"{_stem(scenario)}.stl")
     format_of(target)
@@ -66,6 +67,8 @@ def mesh(
         if holes is not None:
             raise InputError("expected only together with --undeformed", key="--holes")
         view, number = _view_of(scenario, step)
+        if view is not None:
+            require_one_segment(view.robot, "softnlp mesh")
         if view is None:
             complain(f"stopped before step {number}; nothing was written")
             return STOPPED
@@ -111,10 +114,13 @@ def _is_run(path: Path) -> bool:
 
 
 def _robot(path: Path) -> Robot:
+    from softnlp.model.segments import require_one_segment
     from softnlp.results import load_run
     from softnlp.scenario.read import load_scenario
 
-    return load_run(path).robot if _is_run(path) else load_scenario(path).robot
+    found = load_run(path).robot if _is_run(path) else load_scenario(path).robot
+    require_one_segment(found, "softnlp mesh")
+    return found
 
 
 def _view_of(path: Path, step: int | None) -> tuple[RunView | None, int]:

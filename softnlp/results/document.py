@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.model.inputs import asked_tables, contact_table, package_version, pressure_bar, tidy
 from softnlp.model.quantities import Model
 from softnlp.nlp.solver import EquationResidual, Ipopt
 from softnlp.statics.step import Run, Step
-from softnlp.studies.fields import BLOCKED_FORCE, closure_of, document_outputs, left_by_weights, value
+from softnlp.studies.fields import BLOCKED_FORCE, closure_of, document_outputs, left_by_weights, solved_pose, value
 
 _SAID = ("status", "iterations", "multipliers")
 
@@ -81,6 +82,7 @@ def _step(run: Run, step: Step) -> dict[str, Any]:
     table["status"] = step.status.value
     table["message"] = step.message
     table |= {output.key: plain(value(output, step)) for output in document_outputs(run)}
+    table["segments"] = segments_of(step)
     if run.study == BLOCKED_FORCE:
         table["closure"] = closure_of(run, step)
         if table["closure"] == "weighted":
@@ -90,6 +92,16 @@ def _step(run: Run, step: Step) -> dict[str, Any]:
     table["certificate"] = _lines(step.certificate)
     table["warnings"] = list(step.warnings)
     return table
+
+
+def segments_of(step: Step) -> list[dict[str, Any]] | None:
+    """Return each segment of a step's pose by itself, None without a solution."""
+    if (pose := solved_pose(step)) is None:
+        return None
+    names = ("tip_position", "tip_rotation", "stretch", "bending_angle")
+    return [
+        {OUTPUTS[name].key: plain(OUTPUTS[name].shown(getattr(part, name))) for name in names} for part in pose.parts
+    ]
 
 
 def engine_table(engine: str | None, ipopt: Ipopt | None) -> dict[str, Any]:

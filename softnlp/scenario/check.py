@@ -15,6 +15,7 @@ from softnlp.scenario.design import DesignFile
 from softnlp.scenario.identify import IdentifyFile
 from softnlp.scenario.inverse import InverseFile
 from softnlp.scenario.schema import BlockedForceFile, ForwardFile, ScenarioFile
+from softnlp.scenario.segments import OF_SEGMENTS, of_segment, of_segments
 from softnlp.scenario.workspace import WorkspaceFile
 
 SCHEMAS: Mapping[str, type[ScenarioFile]] = {
@@ -27,7 +28,7 @@ SCHEMAS: Mapping[str, type[ScenarioFile]] = {
 }
 """The studies that this version runs, and the file of each."""
 
-_TABLES = {name for schema in SCHEMAS.values() for name in schema.model_fields} - {"title", "study"}
+_TABLES = {"segment", *(name for schema in SCHEMAS.values() for name in schema.model_fields)} - {"title", "study"}
 
 
 def parse(data: Mapping[str, Any]) -> ScenarioFile:
@@ -39,7 +40,7 @@ def parse(data: Mapping[str, Any]) -> ScenarioFile:
         For the first key that does not fit, with the number of the others.
     """
     study = _study(data)
-    schema = SCHEMAS[study]
+    schema = schema_of(data, study)
     details, file = [], None
     try:
         file = schema.model_validate(data)
@@ -50,7 +51,7 @@ def parse(data: Mapping[str, Any]) -> ScenarioFile:
         if not any(loc[: len(place)] == place[: len(loc)] for loc in wrong):
             details.append({"type": "own", "loc": place, "msg": text, "input": number, "ctx": {"text": text}})
     if file is None or details:
-        raise first_of(list(_errors(study, details)))
+        raise first_of(list(_errors(study, schema, details)))
     return file
 
 
@@ -73,9 +74,25 @@ def _study(data: Mapping[str, Any]) -> str:
     return study
 
 
-def _errors(study: str, details: list[ErrorDetails]) -> Iterator[InputError]:
+def schema_of(data: Mapping[str, Any], study: str) -> type[ScenarioFile]:
+    """Return the tables that a file of a study may hold: with [[segment]] in place of [robot] and [material].
+
+    Raises
+    ------
+    InputError
+        For segments in a study that does not take them, and a single table of that name.
+    """
+    if "segment" not in data:
+        return SCHEMAS[study]
+    if study not in OF_SEGMENTS:
+        raise InputError(f"study {study!r} takes [robot] and [material] so far, not [[segment]]", table="segment")
+    if not isinstance(data["segment"], list):
+        raise InputError("expected one table [[segment]], in two brackets, for each segment", table="segment")
+    return of_segments(SCHEMAS[study])
+
+
+def _errors(study: str, schema: type[ScenarioFile], details: list[ErrorDetails]) -> Iterator[InputError]:
     """Yield an error of ours for each of pydantic's: unknown keys first, they explain missing ones."""
-    schema = SCHEMAS[study]
     meant = set()
     for detail in (d for d in details if d["type"] == "extra_forbidden"):
         *place, key = detail["loc"]
@@ -130,6 +147,10 @@ _EXPECTED = {
 
 def _placed(detail: ErrorDetails, message: str) -> InputError:
     """Name the table and the key: ("pressure", "sequence_bar", 2, 0) is row 3, column 1."""
+    if len(detail["loc"]) > 1 and detail["loc"][0] == "segment":
+        _, number, *rest = detail["loc"]
+        inner = _placed({**detail, "loc": tuple(rest)}, message) if rest else InputError(message)
+        return of_segment(int(number), inner)
     *path, last = [part for part in detail["loc"] if isinstance(part, str)]
     numbers = [part + 1 for part in detail["loc"] if isinstance(part, int)]
     where = [f"{word} {n}" for word, n in zip(("row", "column"), numbers, strict=False)]

@@ -15,11 +15,13 @@ from softnlp.base.errors import InputError, of_table
 from softnlp.base.ranges import file_unit_note
 from softnlp.base.reading import BACKSLASH_HINT, LARGEST_TOML, LONGEST_NAME, one_line, read_text, toml_tables
 from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
+from softnlp.model.body import Segment
 from softnlp.model.conventions import COEFFICIENT_SETS, CONVENTIONS, Coefficients
-from softnlp.model.materials import material_from_table
+from softnlp.model.materials import Material, material_from_table
 from softnlp.model.numerics import Numerics
-from softnlp.model.robot import Robot, Violation, violations
+from softnlp.model.robot import DIMENSIONS, Robot, Violation, violations
 from softnlp.model.rod import Loads
+from softnlp.model.segments import SegmentedRobot, segmented_robot
 from softnlp.scenario.blocked_force import contact_settings, contact_task
 from softnlp.scenario.check import first_of, parse
 from softnlp.scenario.data import Read, Task
@@ -29,6 +31,7 @@ from softnlp.scenario.identify import identify_task
 from softnlp.scenario.inverse import inverse_task
 from softnlp.scenario.pressures import PressurePath, pressure_path
 from softnlp.scenario.schema import ScenarioFile
+from softnlp.scenario.segments import OF_SEGMENTS, read_segments
 from softnlp.scenario.workspace import workspace_task
 from softnlp.studies.plausibility import modulus_notes
 
@@ -88,6 +91,8 @@ def robot_of_scenario(path: str | PathLike[str]) -> tuple[Robot, tuple[Violation
     """
     try:
         file = parse(parse_toml(read_text(Path(path), LARGEST_TOML)))
+        if getattr(file, "segment", None) is not None or file.robot.along:
+            raise InputError("the cross-section of a robot of one uniform segment is drawn so far", table="segment")
         robot = file.robot.described()
         return robot, violations(robot, file.robot.minimum_wall_mm * MILLIMETRE)
     except InputError as error:
@@ -99,9 +104,7 @@ def _scenario(text: str, path: Path) -> Scenario:
     data = parse_toml(text)
     file = parse(data)
     errors: list[InputError] = []
-    made = _attempt(errors, "robot", file.robot.made)
-    silicone = data.get("material") or file.material.model_dump(exclude_none=True)
-    chosen = _attempt(errors, "material", lambda: material_from_table(silicone, folder=path.parent))
+    made, chosen, unlikely = _robot(file, data, path.parent, errors)
     steps = made and _attempt(errors, "pressure", lambda: _steps(file, made[0].chamber_sets, path.parent))
     contact = task = None
     if (wall := getattr(file, "contact", None)) is not None:
@@ -115,8 +118,6 @@ def _scenario(text: str, path: Path) -> Scenario:
     if errors or made is None or chosen is None or steps is None or numerics is None:
         raise first_of(errors)
     robot, warnings = made
-    # Where constants are to be found, those given only begin the search.
-    unlikely = () if file.study == "identify" else modulus_notes(chosen.name, float(chosen.shear_modulus(1.0)))
     return Scenario(
         path=path,
         text=text,
@@ -135,6 +136,39 @@ def _scenario(text: str, path: Path) -> Scenario:
         warnings=(*warnings, *unlikely, *file_unit_note(data), *steps.notes),
         registration=getattr(file, "registration", None) if "registration" in data else None,
     )
+
+
+def _robot(
+    file: ScenarioFile, data: dict[str, Any], folder: Path, errors: list[InputError]
+) -> tuple[tuple[Robot, tuple[str, ...]] | None, Material | None, tuple[str, ...]]:
+    """Return the robot with its warnings, the silicone, and what is unlikely of it; None with an error for each."""
+
+    def notes(material: Material) -> tuple[str, ...]:
+        # Where constants are to be found, those given only begin the search.
+        known = file.study == "identify"
+        return () if known else modulus_notes(material.name, float(material.shear_modulus(1.0)))
+
+    if (tables := getattr(file, "segment", None)) is not None:
+        found = read_segments(tables, data["segment"], folder, errors)
+        if found is None:
+            return None, None, ()
+        robot, silicone, warnings = found
+        every = [s.material for s in robot.segments] if isinstance(robot, SegmentedRobot) else [silicone]
+        unlikely = dict.fromkeys(note for one in every for note in notes(one))
+        return (robot, warnings), silicone, tuple(unlikely)
+    made = _attempt(errors, "robot", file.robot.made)
+    written = data.get("material") or file.material.model_dump(exclude_none=True)
+    chosen = _attempt(errors, "material", lambda: material_from_table(written, folder=folder))
+    if made is None or chosen is None:
+        return made, chosen, ()
+    if along := file.robot.along:
+        if file.study not in OF_SEGMENTS:
+            key = next(iter(along)).removeprefix("robot.")
+            text = f"study {file.study!r} takes one number here so far, not one that varies along s"
+            errors.append(InputError(text, table="robot", key=next(d.file_key for d in DIMENSIONS if d.field == key)))
+        varying = segmented_robot([Segment(made[0], chosen, along=along)], made[0].name)
+        return (varying, made[1]), varying.material, notes(chosen)
+    return made, chosen, notes(chosen)
 
 
 def _numerics(file: ScenarioFile) -> Numerics:
