@@ -135,7 +135,7 @@ def range_of(*keys: str) -> Range | None:
     if "constants" in path:
         return STRESS if path[-1].endswith("_MPa") else CONSTANT
     for k in range(len(path) - 1, -1, -1):
-        if path[k] == "levels":
+        if path[k] in ("levels", "s"):
             break
         with_table = ".".join(path[max(k - 1, 0) : k + 1])
         units = (limits for unit, limits in _BY_UNIT.items() if path[k].endswith(unit))

@@ -22,6 +22,7 @@ from softnlp.studies.fields import (
     dataset_outputs,
     left_by_weights,
     series,
+    sizes_of,
     solved_pose,
 )
 
@@ -83,7 +84,7 @@ def _parts(run: Run) -> tuple[dict[str, Variable], dict[str, Variable], dict[str
     """Return variables, coordinates and attributes: a run is written without xarray, which takes long to import."""
     steps, pressure = run.steps, OUTPUTS["pressure"]
     points = max((_points(step) for step in steps), default=0)
-    sizes = {"axis": 3, "row": 3, "col": 3, "chamber": run.robot.chambers, "s": points}
+    sizes = {"axis": 3, "row": 3, "col": 3, **sizes_of(run), "s": points}
     variables: dict[str, Variable] = {
         pressure.key: (
             ("step", *pressure.dims),
@@ -165,6 +166,8 @@ def _coordinates(run: Run, arc: Array) -> dict[str, Variable]:
         "chamber_set": (("chamber",), np.array(robot.set_of_chamber) + 1, said("1", "set of each chamber, from 1")),
         **{name: ((name,), list("xyz"), said("1", meaning)) for name, meaning in axes.items()},
     }
+    if (count := sizes_of(run)["segment"]) > 1:
+        coordinates["segment"] = (("segment",), np.arange(1, count + 1), said("1", "segment, base first, from 1"))
     if any(step.time is not None for step in run.steps):
         times = [np.nan if step.time is None else float(step.time) for step in run.steps]
         coordinates["t_s"] = (("step",), times, said("s", OUTPUTS["t"].meaning))

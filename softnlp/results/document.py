@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.model.inputs import asked_tables, contact_table, package_version, pressure_bar, tidy
 from softnlp.model.quantities import Model
@@ -23,6 +24,7 @@ from softnlp.studies.fields import (
     deviation_outputs,
     document_outputs,
     left_by_weights,
+    solved_pose,
     value,
 )
 
@@ -90,6 +92,7 @@ def _step(run: Run, step: Step) -> dict[str, Any]:
     table["message"] = step.message
     deviations = deviation_outputs(run)
     table |= {o.key: plain(value(o, step)) for o in document_outputs(run) if o not in deviations}
+    table["segments"] = segments_of(step)
     if deviations:
         table["std"] = {o.key.removeprefix("std_"): plain(value(o, step)) for o in deviations}
         table["std_message"] = "" if step.deviation is None else step.deviation.message
@@ -102,6 +105,16 @@ def _step(run: Run, step: Step) -> dict[str, Any]:
     table["certificate"] = _lines(step.certificate)
     table["warnings"] = list(step.warnings)
     return table
+
+
+def segments_of(step: Step) -> list[dict[str, Any]] | None:
+    """Return each segment of a step's pose by itself, None without a solution."""
+    if (pose := solved_pose(step)) is None:
+        return None
+    names = ("tip_position", "tip_rotation", "stretch", "bending_angle")
+    return [
+        {OUTPUTS[name].key: plain(OUTPUTS[name].shown(getattr(part, name))) for name in names} for part in pose.parts
+    ]
 
 
 def engine_table(engine: str | None, ipopt: Ipopt | None) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.files import make_folder, write_whole
 from softnlp.base.status import Status
-from softnlp.model.inputs import loads_of_table, robot_of_table, versions
+from softnlp.model.inputs import loads_of_table, robot_of_segments, robot_of_table, versions
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.results.dataset import netcdf_bytes
@@ -40,12 +40,31 @@ DEVIATING = ("bending_angle", "elongation", "blocked_force")
 class Body:
     """The body of one solved step.
 
-    position : (M, 3) p [m]. rotation : (M, 3, 3) R, columns are the body axes. radii : of the deformed section.
+    position : (M, 3) p [m]. rotation : (M, 3, 3) R, columns are the body axes. radii : of the deformed section; (M,)
+    each where it is not the same along it. parts : of several segments each by itself, without connectors.
     """
 
     position: Array
     rotation: Array
     radii: SectionRadii
+    parts: tuple[Body, ...] = ()
+
+    @property
+    def pieces(self) -> tuple[Body, ...]:
+        """Its segments, itself where there is one."""
+        return self.parts or (self,)
+
+
+def chain_body(position: Array, rotation: Array, radii: Mapping[str, Array], segment: Array) -> Body:
+    """Return the body of several segments. radii : (M,) by name. segment : (M,) of each point from 1, 0 of none."""
+
+    def of(chosen: Any) -> SectionRadii:
+        there: dict[str, Any] = {name: values[chosen] for name, values in radii.items()}
+        return SectionRadii(**there)
+
+    numbers = range(1, int(segment.max(initial=0)) + 1)
+    parts = [Body(position[own], rotation[own], of(own)) for own in (segment == k for k in numbers)]
+    return Body(position, rotation, of(slice(None)), tuple(parts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +148,9 @@ def view_of_run(run: Run) -> RunView:
         pose, contact = solved_pose(run.steps[k]), run.steps[k].contact
         if prefix and pose is not None:
             pose = None if contact is None else contact.free
-        return None if pose is None else Body(pose.shape.position, pose.shape.rotation, pose.radii)
+        if pose is None or pose.outline is None:
+            return None if pose is None else Body(pose.shape.position, pose.shape.rotation, pose.radii)
+        return chain_body(pose.shape.position, pose.shape.rotation, vars(pose.outline), pose.segment)
 
     known = {output.name for output in deviation_outputs(run)}
     return _view(
@@ -158,7 +179,6 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
         When a variable or an attribute is missing or not what `to_dataset` writes.
     """
     attributes = dataset.attrs
-    material = json.loads(attributes["material"])
     values = {str(name): variable.values for name, variable in dataset.variables.items()}
 
     def number(name: str) -> Any:
@@ -170,8 +190,13 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
         points = np.isfinite(position).all(axis=1)
         if not points.any():
             return None
-        radii = {field.name: float(number(f"{field.name}_radius")[k]) for field in fields(SectionRadii)}
-        return Body(position[points], number(f"{prefix}rotation")[k][points], SectionRadii(**radii))
+        names = [field.name for field in fields(SectionRadii)]
+        place, turn = position[points], number(f"{prefix}rotation")[k][points]
+        if OUTPUTS["along_segment"].key in values and not prefix:
+            along = {name: number(f"along_{name}_radius")[k][points] for name in names}
+            return chain_body(place, turn, along, number("along_segment")[k][points].astype(int))
+        radii = {name: float(number(f"{name}_radius")[k]) for name in names}
+        return Body(place, turn, SectionRadii(**radii))
 
     return _view(
         number,
@@ -179,9 +204,9 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
         values.get("closure", ()),
         title=str(attributes["title"]),
         study=str(attributes["study"]),
-        material=_material_label(material["name"], material["model"]),
+        material=_material(attributes),
         conventions=str(attributes["conventions"]),
-        robot=robot_of_table(json.loads(attributes["robot"])),
+        robot=_robot(attributes),
         loads=loads_of_table(json.loads(attributes["loads"])),
         status=tuple(Status(str(word)) for word in values["status"]),
         pressure=number("pressure"),
@@ -218,6 +243,23 @@ def _view(number: Callable[[str], Any], body: Callable[[int, str], Body | None],
         contact=contact,
         targets=targets,
     )
+
+
+def _robot(attributes: Mapping[str, Any]) -> Robot:
+    """Return the robot of a file."""
+    if "segment" in attributes:
+        return robot_of_segments(json.loads(attributes["segment"]), json.loads(attributes["name"]))
+    return robot_of_table(json.loads(attributes["robot"]))
+
+
+def _material(attributes: Mapping[str, Any]) -> str:
+    """Return the label of the silicones of a file."""
+    if "segment" not in attributes:
+        tables = [json.loads(attributes["material"])]
+    else:
+        tables = [table["material"] for table in json.loads(attributes["segment"])]
+    words = (" + ".join(dict.fromkeys(str(table[key]) for table in tables)) for key in ("name", "model"))
+    return _material_label(*words)
 
 
 def _material_label(name: str, law: str) -> str:

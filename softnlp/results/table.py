@@ -18,7 +18,15 @@ from softnlp.model.gravity import gravity_lines
 from softnlp.model.inputs import pressure_bar, tidy
 from softnlp.results.document import csv_text
 from softnlp.statics.step import Run, Step
-from softnlp.studies.fields import BLOCKED_FORCE, closure_of, document_outputs, left_by_weights, solved_pose, value
+from softnlp.studies.fields import (
+    BLOCKED_FORCE,
+    closure_of,
+    left_by_weights,
+    sizes_of,
+    solved_pose,
+    table_outputs,
+    value,
+)
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -43,7 +51,7 @@ def table_text(run: Run) -> str:
     weighted = {line.equation: line.unit for step in run.steps for line in left_by_weights(step)}
     header = ["step"] + ["t_s"] * timed
     header += [f"p{k + 1}_bar" for k in range(run.robot.chamber_sets)]
-    columns = {output: output.keys({"chamber": run.robot.chambers}, "") for output in document_outputs(run)}
+    columns = {output: output.keys(sizes_of(run), "") for output in table_outputs(run)}
     header += ["status", *(key for keys in columns.values() for key in keys)]
     header += ["closure"] * (run.study == BLOCKED_FORCE)
     header += ["_".join(["weighted_residual", *name.split(), unit.replace(" ", "")]) for name, unit in weighted.items()]

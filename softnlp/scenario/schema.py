@@ -13,6 +13,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any, Literal
 
+from numpy import interp
 from pydantic import BaseModel, ConfigDict, Field, PlainValidator, create_model
 
 from softnlp.base.errors import InputError, nearest
@@ -32,6 +33,7 @@ from softnlp.scenario.values import NotNegative as NotNegative
 from softnlp.scenario.values import Positive as Positive
 from softnlp.scenario.values import Vector as Vector
 from softnlp.scenario.values import wrong as wrong
+from softnlp.scenario.varying import Along, Varying
 
 
 class Table(BaseModel):
@@ -73,38 +75,63 @@ class RobotTable(Table):
     """
 
     name: Label | None = None
-    outer_diameter_mm: Positive | None = None
-    lumen_diameter_mm: Positive | None = None
-    chamber_circle_diameter_mm: Positive | None = None
-    chamber_diameter_mm: Positive | None = None
-    chamber_wall_mm: Positive | None = None
+    outer_diameter_mm: Along[Positive] = None
+    lumen_diameter_mm: Along[Positive] = None
+    chamber_circle_diameter_mm: Along[Positive] = None
+    chamber_diameter_mm: Along[Positive] = None
+    chamber_wall_mm: Along[Positive] = None
     length_mm: Positive | None = None
     chamber_sets: Count | None = None
     chambers_per_set: Count | None = None
-    chamber_angle_deg: NotNegative | None = None
+    chamber_angle_deg: Along[NotNegative] = None
     allow: list[str] = []
     minimum_wall_mm: Positive = MINIMUM_WALL / MILLIMETRE
 
     def made(self) -> tuple[Robot, tuple[str, ...]]:
         """Return the robot and its warnings; raises `InputError` where it cannot be made."""
-        robot = self.described()
+        robot, warnings, where = self.described(), list[str](), ""
         try:
-            return robot, check(robot, allow=self.allow, minimum_wall=self.minimum_wall_mm * MILLIMETRE)
+            for place, there in self.sections(robot).items():
+                where = place
+                warnings += check(there, allow=self.allow, minimum_wall=self.minimum_wall_mm * MILLIMETRE)
+            return robot, tuple(dict.fromkeys(warnings))
         except InputError as error:
             file_keys = {d.field: d.file_key for d in DIMENSIONS}
             key = file_keys.get(error.key or "", error.key)
-            raise type(error)(error.message, key=key, every=error.every) from None
+            raise type(error)(f"{where}{error.message}", key=key, every=error.every) from None
+
+    @property
+    def along(self) -> dict[str, dict[str, Any]]:
+        """What varies along s, as `softnlp.Segment` takes it."""
+        return {
+            f"robot.{d.field}": {"s": value.s, "value": [v * (d.scale or 1.0) for v in value.value]}
+            for d in DIMENSIONS
+            if isinstance(value := getattr(self, d.file_key), Varying)
+        }
+
+    def sections(self, robot: Robot) -> dict[str, Robot]:
+        """Return the robot at each knot of what varies along s, by the place in words."""
+        knots = sorted({0.0, *(s for table in self.along.values() for s in table["s"])})
+        every: dict[str, dict[str, Any]] = {
+            f"at s = {s:g}: " if self.along else "": {
+                key.removeprefix("robot."): float(interp(s, t["s"], t["value"])) for key, t in self.along.items()
+            }
+            for s in knots
+        }
+        return {where: replace(robot, **sizes) for where, sizes in every.items()}
 
     def described(self) -> Robot:
-        """Return the robot, whether it can be made or not."""
+        """Return the robot, at the base where it varies along s, whether it can be made or not."""
         given: dict[str, Any] = {}
         for dimension in DIMENSIONS:
             value = getattr(self, dimension.file_key)
+            if isinstance(value, Varying):
+                value = value.value[0]
             if value is not None:
                 given[dimension.field] = value if dimension.scale is None else value * dimension.scale
         missing = [d.file_key for d in DIMENSIONS if d.field not in given]
         if self.name is not None and self.name in ROBOTS:
-            changed = any(getattr(ROBOTS[self.name], key) != value for key, value in given.items())
+            changed = bool(self.along) or any(getattr(ROBOTS[self.name], k) != v for k, v in given.items())
             return replace(ROBOTS[self.name], **given, name=f"{self.name} (modified)" if changed else self.name)
         if not missing:
             return Robot(name=self.name or "robot", **given)

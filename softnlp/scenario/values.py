@@ -61,20 +61,21 @@ def intervals_of(value: Any) -> int | None:
     return value
 
 
-def _is_number(value: Any) -> bool:
+def is_number(value: Any) -> bool:
+    """Whether a value is a finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 
 def number_or_fit(value: Any) -> float | None:
     """Return a number, None for "fit"."""
-    if value != "fit" and not _is_number(value):
+    if value != "fit" and not is_number(value):
         raise wrong(f"expected a number or 'fit', got {shown(value)}")
     return None if value == "fit" else float(value)
 
 
 def vector_or_fit(size: int, value: Any) -> list[float] | None:
     """Return so many numbers, None for "fit"."""
-    if value != "fit" and not (isinstance(value, list) and len(value) == size and all(map(_is_number, value))):
+    if value != "fit" and not (isinstance(value, list) and len(value) == size and all(map(is_number, value))):
         raise wrong(f"expected a list of {size} numbers or 'fit', got {shown(value)}")
     return None if value == "fit" else [float(v) for v in value]
 

@@ -62,6 +62,30 @@ class Grid:
         """The number of intervals."""
         return self.case.transcribed.node_index.size - 1
 
+    @property
+    def tip(self) -> slice:
+        """Where x holds the tip's position."""
+        return TIP
+
+    def last_state(self, x: Array) -> Array:
+        """Return the last state in x (18,)."""
+        return x[-STATE_SIZE:]
+
+    def tip_error(self, change: Array, solution: Solution) -> tuple[float, float]:
+        """Return how far a change (18,) of the last state moves the tip [L_0] and turns it [rad]."""
+        return float(np.linalg.norm(change[:3])), float(np.linalg.norm(change[3:12]) / np.sqrt(2))
+
+    def distance(self, change: Array) -> float:
+        """Return the largest change of a scaled position or of a direction cosine between two x."""
+        states = change[1:].reshape(-1, STATE_SIZE)
+        return float(np.max(np.abs(states[:, :12])))
+
+    def weight(self, x: Array) -> Array:
+        """Return the weight of each entry of x in an arc length, the mean over the nodes of the change of pose."""
+        states = np.zeros((x.size // STATE_SIZE, STATE_SIZE))
+        states[:, :12] = 1.0 / len(states)
+        return np.concatenate([[0.0], states.ravel()])
+
     def nodes(self, x: Array) -> Array:
         """Return the scaled node states (18, K + 1) in x."""
         states = x[1:].reshape(-1, STATE_SIZE).T
@@ -148,16 +172,3 @@ def next_size(wanted: float) -> int:
     while (size := 5 * round(2 ** (k / 2))) < wanted:
         k += 1
     return size
-
-
-def pose_weight(x: Array) -> Array:
-    """Return the weight of each entry of x in an arc length that is the mean over the nodes of the change of pose."""
-    states = np.zeros((x.size // STATE_SIZE, STATE_SIZE))
-    states[:, :12] = 1.0 / len(states)
-    return np.concatenate([[0.0], states.ravel()])
-
-
-def pose_distance(change: Array) -> float:
-    """Return the largest change of a scaled position or of a direction cosine between two x."""
-    states = change[1:].reshape(-1, STATE_SIZE)
-    return float(np.max(np.abs(states[:, :12])))

@@ -18,6 +18,7 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
+from softnlp.model.segments import require_one_segment
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
 from softnlp.statics.kept import blocked_solver, pose_solver
@@ -169,6 +170,7 @@ def sensitivities(
     RobotError
         For a robot that is geometrically impossible.
     """
+    require_one_segment(robot, "a sensitivity")
     check(robot, allow=LOWERABLE_RULES)
     P = pressure_table(pressure, robot.chamber_sets)
     if len(P) != 1:
