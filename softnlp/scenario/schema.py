@@ -151,6 +151,7 @@ class MaterialTable(Table):
 
     name : of a silicone of the library (`softnlp materials`) or of `file`, or your own; as in "Ecoflex 00-50"
     model : linear, neo-hookean, mooney-rivlin, yeoh, ogden, or a law of your own; as in "mooney-rivlin"
+    set : of constants, where the library has several of a silicone; by default "shi-2025"; as in "srmd"
     density_kg_m3 : for the weight; by default 1070.0
     file : a materials file of your own; as in "my_silicone.toml"
     constants : of the law, in place of the library's; as in { C10_MPa = 0.004, C01_MPa = 0.015, C20_MPa = 0.001 }
@@ -379,8 +380,18 @@ class RegistrationTable(Table):
     ]
 
 
-UncertaintyTable = dict[str, Annotated[float | str, PlainValidator(deviation)]]
-"""[uncertainty]: a standard deviation by the key of what scatters."""
+class UncertaintyTable(Table):
+    """[uncertainty]: standard deviations of the silicone, of pressures, and of any dimension of [robot] by its key.
+
+    material : relative, of the stress, or "sets", the spread of the library's sets; as in 0.15
+    pressure_bar : of each set, or in percent of its pressure; as in 0.01
+    """
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Annotated[float | str, PlainValidator(deviation)]] = Field(init=False)
+
+    material: Annotated[float | str | None, PlainValidator(deviation)] = None
+    pressure_bar: Annotated[float | str | None, PlainValidator(deviation)] = None
 
 
 class ForwardFile(ScenarioFile):
