@@ -70,8 +70,8 @@ def import_tips(tables: Sequence[RawTable], choices: Choices) -> Imported:
     lost = int(np.sum(~tip.seen))
     if lost == len(tip.seen):
         raise AskError(
-            f"{table.file}: sensor {tip_name} was seen in no row, or only beyond {FARTHEST:g} m: where its positions are "
-            "in another unit say --set unit.NAME=mm of each of their columns"
+            f"{table.file}: sensor {tip_name} was seen in no row, or only beyond {FARTHEST:g} m: where its positions "
+            "are in another unit say --set unit.NAME=mm of each of their columns"
         )
     choices.drop(lost, "rows in which the sensor was not seen")
     checks = _quaternion_checks(tip)
