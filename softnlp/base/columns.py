@@ -241,6 +241,7 @@ _EVERY = (
     Output("optimal", ONE, "whether nothing that was left to choose is better nearby", group="target"),
     # --- of comparisons and designs
     Output("elongation", MM),
+    *(Output(f"orientation_{x}", DEG) for x in "xyz"),
     Output("orientation", DEG, words="turn of the tip from the one measured", short=("turn",)),
     *(Output(f"tip_{x}", MM, column=x, others=(f"tip_{x}", f"tip_position_{x}")) for x in "xyz"),
     Output("tip_deflection", MM),
