@@ -59,10 +59,10 @@ def test_further_errors_are_counted() -> None:
     text = scenario(
         robot="[robot]\nname = 'D25L60'\nlength_mm = -1\n", more="[solver]\naccuracy = 'x'\ntolerance = 0\n"
     )
-    with pytest.raises(InputError, match=r"^f: .*length_mm: .*got -1 \(and 2 more\)$"):
+    with pytest.raises(InputError, match=r"^f: .*length_mm: .*got -1 \(and 2 more: --all-errors\)$"):
         scenario_from_text(text, "f")
     text = scenario(robot="[robot]\nname = 'D25'\n", material="[material]\nname = 'Ecoflex'\nmodel = 'yeoh'\n")
-    with pytest.raises(InputError, match=r"^f: .*D25.* \(and 1 more\)$"):
+    with pytest.raises(InputError, match=r"^f: .*D25.* \(and 1 more: --all-errors\)$"):
         scenario_from_text(text, "f")
 
 

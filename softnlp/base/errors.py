@@ -5,7 +5,7 @@ A solve that fails is not an exception: it is a step with a named `softnlp.base.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 
@@ -20,7 +20,8 @@ class InputError(SoftnlpError, ValueError):
     """A value from a person or a file is missing, of the wrong type, or impossible.
 
     The text is one line. `source` (a file), `table` and `key` say where, as far as they are known;
-    `located` adds them where the error passes a place that knows.
+    `located` adds them where the error passes a place that knows. `every` are all mistakes, this one first, where
+    there are several.
     """
 
     def __init__(
@@ -30,11 +31,13 @@ class InputError(SoftnlpError, ValueError):
         source: str | None = None,
         table: str | None = None,
         key: str | None = None,
+        every: Sequence[InputError] = (),
     ) -> None:
         self.message = " ".join(message.split())
         self.source = source
         self.table = table
         self.key = key
+        self.every = tuple(every)
         super().__init__(self.__str__())
 
     def located(self, *, source: str | None = None, table: str | None = None, key: str | None = None) -> InputError:
@@ -55,6 +58,7 @@ class InputError(SoftnlpError, ValueError):
             source=self.source or source,
             table=self.table or table,
             key=self.key or key,
+            every=[one.located(source=source, table=table, key=key) for one in self.every],
         )
 
     def __str__(self) -> str:
@@ -72,6 +76,16 @@ class MaterialError(InputError):
 
 class IllPosedError(SoftnlpError, ValueError):
     """The free quantities and the equations do not determine each other; the text names them."""
+
+
+def first_of(errors: Sequence[InputError], how: str = "") -> InputError:
+    """Return the first of some errors, which says how many more there are and has them all; how : to see them."""
+    every = [one for error in errors for one in (error.every or (error,))]
+    first, more = every[0], len(every) - 1
+    if not more:
+        return first
+    message = f"{first.message} (and {more} more{how})"
+    return type(first)(message, source=first.source, table=first.table, key=first.key, every=every)
 
 
 def nearest(word: str, known: Iterable[str]) -> str:

@@ -1,12 +1,14 @@
-"""Writing a file whole or not at all."""
+"""Writing a file whole or not at all, and values as TOML."""
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from softnlp.base.errors import InputError
 
@@ -67,3 +69,19 @@ def make_folder(path: str | PathLike[str]) -> Path:
 
 def _reason(error: OSError | ValueError) -> str:
     return getattr(error, "strerror", None) or str(error)
+
+
+def toml_text(value: Any) -> str:
+    """Return a value of a parsed TOML file as TOML, on one line."""
+    if isinstance(value, Mapping):
+        parts = ", ".join(f"{toml_key(key)} = {toml_text(item)}" for key, item in value.items())
+        return f"{{ {parts} }}" if parts else "{}"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return "[" + ", ".join(toml_text(item) for item in value) + "]"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def toml_key(name: str) -> str:
+    """Return a key as TOML writes it, in quotes where it needs them."""
+    bare = name.replace("-", "").replace("_", "")
+    return name if bare.isascii() and bare.isalnum() else json.dumps(name, ensure_ascii=False)

@@ -41,8 +41,9 @@ class Alone:
             self._free = self._free or self._solver()
             return self._free.with_model(model).solve(pressure, loads, near)
         if self._blocked is None:
-            equations = rod_equations(plan.model, (TipContact(plan.contact.closure),), by_machine=False)
             poses = self._solver(unloaded_accuracy=self._numerics.accuracy)
+            wall = (TipContact(plan.contact.closure),)
+            equations = rod_equations(plan.model, wall, by_machine=False, like=poses.equations)
             self._blocked = BlockedSolver(plan.model, self._numerics, plan.contact, poses=poses, equations=equations)
         # from zero pressure: the neighbours in a chunk are not on the way to each other
         return self._blocked.with_model(model).solve(pressure, loads, self.wall)

@@ -46,7 +46,8 @@ def _run(words: list[str]) -> int:
     except CycloptsError as error:
         complain(f"{' '.join(str(error).split())} (--help after any command lists what it takes)")
     except SoftnlpError as error:
-        complain(str(error))
+        for mistake in getattr(error, "errors", (error,)):
+            complain(str(mistake))
     return BAD_INPUT
 
 
@@ -70,7 +71,7 @@ def _app() -> App:
         suppress_keyboard_interrupt=False,
         default_parameter=Parameter(negative=()),
     )
-    add(app, "run workspace sweep inverse sensitivity identify compare design gui mesh example")
+    add(app, "run check workspace sweep inverse sensitivity identify compare design gui mesh example new")
     add(app, "robots materials", "library")
     app.command(import_module("softnlp.cli.importing").import_, name="import")
     plot = App(name="plot", help="Draw a cross-section, silicones, or the results of a run.")

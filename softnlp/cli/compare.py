@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
 from softnlp.cli.report import Report, write_report
-from softnlp.cli.study import Json, require_file, results_folder, show, write_results
+from softnlp.cli.study import AllErrors, Json, require_file, results_folder, scenario_at, show, write_results
 from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ def compare(
     out: Path | None = None,
     json: Json = False,
     report: Report = None,
+    all_errors: AllErrors = False,
 ) -> int:
     """Compare a model with measured tips, bending angles, elongations, tilts or blocked forces.
 
@@ -58,9 +59,8 @@ def compare(
     from softnlp.results.comparison import comparison_document, require_free_names
     from softnlp.results.document import document_text
     from softnlp.scenario.compare import Asked, compare_task
-    from softnlp.scenario.read import load_scenario
 
-    asked = load_scenario(scenario)
+    asked = scenario_at(scenario, all_errors)
     task = compare_task(asked, measured, Asked(law, coefficients, conventions, closure, shape))
     folder = results_folder(out, json, f"{scenario.stem}_compare")
     if folder is not None:

@@ -11,6 +11,7 @@ from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, rich_text, say
 from softnlp.cli.report import Report, write_report
 from softnlp.cli.study import (
+    AllErrors,
     Json,
     Out,
     require_file,
@@ -31,7 +32,14 @@ _TABLE_WIDTH = 110
 
 
 def design(
-    scenario: Path, /, *, out: Out = None, json: Json = False, workers: int | None = None, report: Report = None
+    scenario: Path,
+    /,
+    *,
+    out: Out = None,
+    json: Json = False,
+    workers: int | None = None,
+    report: Report = None,
+    all_errors: AllErrors = False,
 ) -> int:
     """Find the best design of a scenario of study "design".
 
@@ -46,7 +54,7 @@ def design(
     workers
         Processes; by default one for a few candidates, else one for each processor.
     """
-    asked = scenario_for(scenario, "design", "expected 'design', got {}; use softnlp run")
+    asked = scenario_for(scenario, "design", "expected 'design', got {}; use softnlp run", all_errors)
     if workers is not None and workers < 1:
         raise InputError(f"expected a number of at least 1, got {workers}", key="--workers")
     return run_study(asked, out, json, report, workers)

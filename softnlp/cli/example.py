@@ -36,7 +36,7 @@ def example(name: str | None = None, /, *, out: Path = Path("scenarios"), all: b
     if name is not None and name not in known:
         raise InputError(f"unknown example '{name}'{nearest(name, known)}", key="NAME")
     chosen = [known[name]] if name is not None else list(known.values())
-    root = _shipped_folder()
+    root = shipped_folder()
     wanted = {path.relative_to(root) for file, table in chosen for path in (file, *_named_files(table, file.parent))}
     require_writable(out)
     for place in sorted(wanted):
@@ -53,7 +53,7 @@ def example(name: str | None = None, /, *, out: Path = Path("scenarios"), all: b
 
 def shipped_scenarios() -> dict[str, tuple[Path, dict[str, Any]]]:
     """Return file and content of every scenario of the package by name, those of the top folder first."""
-    root = _shipped_folder()
+    root = shipped_folder()
     found = {}
     for file in sorted(root.rglob("*.toml"), key=lambda path: (len(path.parts), path)):
         table = tomllib.loads(file.read_text(encoding="utf-8"))
@@ -62,7 +62,7 @@ def shipped_scenarios() -> dict[str, tuple[Path, dict[str, Any]]]:
     return found
 
 
-def _shipped_folder() -> Path:
+def shipped_folder() -> Path:
     """Return where the scenarios are: beside the package when installed, at the top level of a checkout."""
     package = Path(__file__).parents[1]
     installed = package / "scenarios"

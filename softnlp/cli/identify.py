@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say, say_rows
 from softnlp.cli.report import Report, library_section, write_report
-from softnlp.cli.study import Json, Out, Stopped, require_file, results_folder, scenario_for, show, write_results
+from softnlp.cli.study import (
+    AllErrors,
+    Json,
+    Out,
+    Stopped,
+    require_file,
+    results_folder,
+    scenario_for,
+    show,
+    write_results,
+)
 from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
@@ -21,7 +31,9 @@ if TYPE_CHECKING:
 _GUESS = 40  # evaluations; nobody knows how many there will be
 
 
-def identify(scenario: Path, /, *, out: Out = None, json: Json = False, report: Report = None) -> int:
+def identify(
+    scenario: Path, /, *, out: Out = None, json: Json = False, report: Report = None, all_errors: AllErrors = False
+) -> int:
     """Find constants from a tensile test or from measurements of robots, as a scenario of study "identify" asks.
 
     Prints the constants with their standard errors and what is left of the data; writes identified.json, table.csv,
@@ -34,9 +46,8 @@ def identify(scenario: Path, /, *, out: Out = None, json: Json = False, report: 
     scenario
         TOML file; docs/identify.md lists what it may hold.
     """
-    return run_study(
-        scenario_for(scenario, "identify", "expected 'identify', got {}; softnlp run runs it"), out, json, report
-    )
+    asked = scenario_for(scenario, "identify", "expected 'identify', got {}; softnlp run runs it", all_errors)
+    return run_study(asked, out, json, report)
 
 
 def run_study(asked: Scenario, out: Path | None, json: bool, report: Path | None = None) -> int:

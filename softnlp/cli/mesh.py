@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, say
-from softnlp.cli.study import require_file, stepwise
+from softnlp.cli.study import AllErrors, require_file, scenario_at, stepwise
 
 if TYPE_CHECKING:
     from softnlp.figures.mesh import Solid
@@ -25,6 +25,7 @@ def mesh(
     holes: str | None = None,
     facets: int | None = None,
     out: Path | None = None,
+    all_errors: AllErrors = False,
 ) -> int:
     """Write the body of one step as a watertight solid in mm; --undeformed writes the body to cast, without a solve.
 
@@ -49,6 +50,7 @@ def mesh(
     """
     from softnlp.figures.mesh import FACETS, HOLES, body_solid, format_of, mould_body, require
     from softnlp.figures.mesh import cores as core_solids
+    from softnlp.model.segments import require_one_segment
 
     target = out or Path(f"{_stem(scenario)}.stl")
     format_of(target)
@@ -58,14 +60,16 @@ def mesh(
     if undeformed:
         if step is not None:
             raise InputError("expected no step together with --undeformed", key="--step")
-        robot = _robot(scenario)
+        robot = _robot(scenario, all_errors)
         chosen = holes or HOLES[0]
         solid = mould_body(robot, sides, chosen)
         inside = core_solids(robot, None, sides, chosen) if cores else ()
     else:
         if holes is not None:
             raise InputError("expected only together with --undeformed", key="--holes")
-        view, number = _view_of(scenario, step)
+        view, number = _view_of(scenario, step, all_errors)
+        if view is not None:
+            require_one_segment(view.robot, "softnlp mesh")
         if view is None:
             complain(f"stopped before step {number}; nothing was written")
             return STOPPED
@@ -110,23 +114,24 @@ def _is_run(path: Path) -> bool:
     return path.is_dir() or path.suffix == ".nc"
 
 
-def _robot(path: Path) -> Robot:
+def _robot(path: Path, all_errors: bool) -> Robot:
+    from softnlp.model.segments import require_one_segment
     from softnlp.results import load_run
-    from softnlp.scenario.read import load_scenario
 
-    return load_run(path).robot if _is_run(path) else load_scenario(path).robot
+    found = load_run(path).robot if _is_run(path) else scenario_at(path, all_errors).robot
+    require_one_segment(found, "softnlp mesh")
+    return found
 
 
-def _view_of(path: Path, step: int | None) -> tuple[RunView | None, int]:
+def _view_of(path: Path, step: int | None, all_errors: bool) -> tuple[RunView | None, int]:
     """Return the view up to a step, and its number; None where Ctrl-C came before it."""
     from softnlp.results import load_run, view_of_run
-    from softnlp.scenario.read import load_scenario
     from softnlp.scenario.run import STUDIES, partial_run, solve_steps
 
     if _is_run(path):
         view = load_run(path)
         return view, _number(step, len(view.bodies))
-    asked = load_scenario(path)
+    asked = scenario_at(path, all_errors)
     if asked.study not in STUDIES:
         raise InputError(
             f"expected {', '.join(map(repr, STUDIES))} for the body of a step, got {asked.study!r}; --undeformed "

@@ -12,7 +12,17 @@ from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, rich_text, say
 from softnlp.cli.figures import draw
 from softnlp.cli.report import Report, write_report
-from softnlp.cli.study import Json, Out, require_file, results_folder, show, stepwise, stopped_after
+from softnlp.cli.study import (
+    AllErrors,
+    Json,
+    Out,
+    require_file,
+    results_folder,
+    scenario_at,
+    show,
+    stepwise,
+    stopped_after,
+)
 from softnlp.model.contact_settings import ContactTask
 
 if TYPE_CHECKING:
@@ -28,6 +38,7 @@ _COMMANDS: Mapping[str, str] = {
 
 _TABLE_WIDTH = 100
 _SET_WIDTH = 12  # of what each chamber set beyond the third adds to the table
+_DEVIATION_WIDTH = 45  # of standard deviations beside the numbers
 
 
 def run(
@@ -39,6 +50,7 @@ def run(
     branches: int = 0,
     ipopt_log: bool = False,
     report: Report = None,
+    all_errors: AllErrors = False,
 ) -> int:
     """Solve every step of a scenario file in order, each started from the last.
 
@@ -55,9 +67,7 @@ def run(
     ipopt_log
         Print the log of IPOPT on standard error.
     """
-    from softnlp.scenario.read import load_scenario
-
-    asked = load_scenario(scenario)
+    asked = scenario_at(scenario, all_errors)
     if ipopt_log:
         asked = _with_log(asked)
     _require_branches(asked, branches)
@@ -132,5 +142,6 @@ def _table(done: Run) -> str:
     """Return the table of a run as text; never narrower than its numbers need."""
     from softnlp.results import table_lines
 
+    more = _DEVIATION_WIDTH if done.uncertainty else 0
     heading = f"{done.title}: {done.robot.name}, {done.material.name} ({done.material.law.name})"
-    return rich_text(heading, table_lines(done), _TABLE_WIDTH + _SET_WIDTH * max(0, done.robot.chamber_sets - 3))
+    return rich_text(heading, table_lines(done), _TABLE_WIDTH + _SET_WIDTH * max(0, done.robot.chamber_sets - 3) + more)

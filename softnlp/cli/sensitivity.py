@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
 from softnlp.cli.figures import draw
-from softnlp.cli.study import Json, Out, results_folder, scenario_for
+from softnlp.cli.study import AllErrors, Json, Out, results_folder, scenario_for
 from softnlp.model.gravity import gravity_lines
 
 
@@ -23,6 +23,7 @@ def sensitivity(
     samples: int = 200,
     out: Out = None,
     json: Json = False,
+    all_errors: AllErrors = False,
 ) -> int:
     """Differentiate the tip and shape of one step of a forward scenario, and draw what follows from it.
 
@@ -43,17 +44,19 @@ def sensitivity(
     samples
         Draws of the check; 0 leaves it out.
     """
+    from softnlp.model.segments import require_one_segment
     from softnlp.results.document import document_text
     from softnlp.results.sensitivity import sensitivity_document, table_rows
     from softnlp.studies.report import named_tolerances, sensitivity_report
 
-    asked = scenario_for(scenario, "forward", "expected study 'forward', got {}")
+    asked = scenario_for(scenario, "forward", "expected study 'forward', got {}", all_errors)
     count = len(asked.pressures)
     chosen = count if step is None else step
     if not 1 <= chosen <= count:
         raise InputError(f"expected a step from 1 to {count}, got {chosen}", key="--step")
     if samples < 0 or samples == 1:
         raise InputError(f"expected 0, or at least 2 samples, got {samples}", key="--samples")
+    require_one_segment(asked.robot, "softnlp sensitivity")
     folder = results_folder(out, json, scenario.stem)
     pressure = asked.pressures[chosen - 1]
     model = (asked.robot, asked.material, asked.coefficients)

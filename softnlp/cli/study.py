@@ -5,13 +5,13 @@ from __future__ import annotations
 import json as json_module
 import os
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from cyclopts import Parameter
 
-from softnlp.base.errors import InputError
+from softnlp.base.errors import InputError, SoftnlpError
 from softnlp.cli.console import STOPPED, complain, progress, say
 from softnlp.cli.figures import draw
 
@@ -26,17 +26,36 @@ _OUT = "Folder for the results; by default results/NAME, where NAME is that of t
 _JSON = "Print one JSON document and nothing else; no files are written unless --out is given."
 Out = Annotated[Path | None, Parameter(help=_OUT)]
 Json = Annotated[bool, Parameter(help=_JSON)]
+AllErrors = Annotated[bool, Parameter(help="Print every mistake of the scenario on a line of its own.")]
+
+
+class AllMistakes(SoftnlpError):
+    """Every mistake of a file, in place of the first one that counts the others."""
+
+    def __init__(self, errors: Sequence[InputError]) -> None:
+        self.errors = tuple(errors)
+        super().__init__("; ".join(map(str, errors)))
 
 
 class Stopped(Exception):
     """Ends a study between two of its steps."""
 
 
-def scenario_for(path: Path, study: str, refusal: str) -> Scenario:
-    """Read a scenario for a command that takes one study; refusal : of others, with {} for what it is."""
+def scenario_at(path: Path, all_errors: bool) -> Scenario:
+    """Read a scenario; all_errors : raise `AllMistakes` where there are several."""
     from softnlp.scenario.read import load_scenario
 
-    asked = load_scenario(path)
+    try:
+        return load_scenario(path)
+    except InputError as error:
+        if all_errors and error.every:
+            raise AllMistakes(error.every) from None
+        raise
+
+
+def scenario_for(path: Path, study: str, refusal: str, all_errors: bool) -> Scenario:
+    """Read a scenario for a command that takes one study; refusal : of others, with {} for what it is."""
+    asked = scenario_at(path, all_errors)
     if asked.study != study:
         raise InputError(refusal.format(repr(asked.study)), source=str(path), key="study")
     return asked

@@ -15,7 +15,7 @@ from softnlp.base.errors import InputError, reworded
 from softnlp.base.processes import processors
 from softnlp.base.units import MILLIMETRE
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, interrupt_asked, say
-from softnlp.cli.study import beside
+from softnlp.cli.study import AllErrors, beside, scenario_at
 from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ def sweep(
     cluster: str | None = None,
     resume: bool = False,
     csv: bool = False,
+    all_errors: AllErrors = False,
 ) -> int:
     """Solve every pose of a workspace.
 
@@ -60,13 +61,11 @@ def sweep(
     csv
         Write workspace.csv as well.
     """
-    from softnlp.scenario.read import load_scenario
-
     if workers is not None and workers < 1:
         raise InputError(f"expected a number of at least 1, got {workers}", key="--workers")
     if workers is not None and cluster is not None:
         raise InputError("not together with --cluster, whose workers are its own", key="--workers")
-    asked = load_scenario(scenario)
+    asked = scenario_at(scenario, all_errors)
     if asked.study != "workspace":
         raise InputError(f"expected a scenario of study 'workspace'; {asked.path} is of study {asked.study!r}")
     folder = out or Path("results") / scenario.stem

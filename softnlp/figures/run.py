@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softnlp.base.arrays import Array
-from softnlp.base.columns import OUTPUTS
+from softnlp.base.columns import OUTPUTS, Output
 from softnlp.base.units import MILLIMETRE
 from softnlp.figures.body import (
     Camera,
@@ -80,17 +80,24 @@ def run_figure(view: RunView, measured: Sequence[tuple[float, float]] = ()) -> F
     body_panel(figure, _CENTRE, view)
     x = abscissa(view)
     panels = new_panels(figure, 3 if x.with_pressures else 2)
-    series(panels[0], view, x, BENDING.shown(view.bending_angle), BENDING.heading)
+    series(panels[0], view, x, BENDING.shown(view.bending_angle), BENDING.heading, std=_std(view, BENDING))
     longer = ELONGATION.shown(view.backbone_length - view.robot.length)
-    series(panels[1], view, x, longer, ELONGATION.axis)
+    series(panels[1], view, x, longer, ELONGATION.axis, std=_std(view, ELONGATION))
     finish_panels(figure, panels, view, x)
     _explain_steps(figure, view)
     return figure
 
 
+def _std(view: RunView, output: Output) -> Array | None:
+    """Return one standard deviation of an output, None where the run has none."""
+    found = view.std.get(output.name)
+    return None if found is None else np.asarray(output.shown(found))
+
+
 def _begun(view: RunView, solved: str, *more: str) -> Figure:
     """Return a figure that says what was run."""
-    parts = [view.robot.name, view.material, *more, view.conventions, solved]
+    band = ["bands of one standard deviation"] if view.std else []
+    parts = [view.robot.name, view.material, *more, view.conventions, solved, *band]
     return new_figure(10.0, 5.4, view.title or view.robot.name, "  ·  ".join(parts))
 
 
@@ -140,7 +147,7 @@ def inverse_figure(view: RunView, targets: TargetView) -> Figure:
     x = Abscissa(np.arange(1, len(view.status) + 1, dtype=float), STEP, True)
     panels = new_panels(figure, 3)
     _left(panels[0], x, targets)
-    series(panels[1], view, x, BENDING.shown(view.bending_angle), BENDING.heading)
+    series(panels[1], view, x, BENDING.shown(view.bending_angle), BENDING.heading, std=_std(view, BENDING))
     finish_panels(figure, panels, view, x)
     panels[-1].set_xlabel("target")
     _explain_targets(figure, view, targets)
@@ -224,7 +231,7 @@ def blocked_figure(view: RunView, contact: ContactView, measured: Sequence[tuple
     _wall_panel(figure, view, contact)
     x = _wall_abscissa(view, contact)
     panels = new_panels(figure, 3 if x.with_pressures else 2)
-    series(panels[0], view, x, contact.force, FORCE.axis, least_span=0.01)
+    series(panels[0], view, x, contact.force, FORCE.axis, least_span=0.01, std=_std(view, FORCE))
     _draw_measured(panels[0], x, measured)
     _bending(panels[1], view, contact, x)
     finish_panels(figure, panels, view, x)
@@ -271,7 +278,7 @@ def _draw_measured(axes: Axes, x: Abscissa, measured: Sequence[tuple[float, floa
 
 def _bending(axes: Axes, view: RunView, contact: ContactView, x: Abscissa) -> None:
     """Draw the bending angle of the free shape as a dashed line, that of the blocked one as the steps."""
-    series(axes, view, x, BENDING.shown(view.bending_angle), BENDING.heading)
+    series(axes, view, x, BENDING.shown(view.bending_angle), BENDING.heading, std=_std(view, BENDING))
     free = BENDING.shown(contact.free_bending_angle)
     axes.plot(x.values, free, color=FREE, linewidth=1.4, linestyle=DASHES, zorder=2, label="free shape")
     both = np.concatenate([free, BENDING.shown(view.bending_angle)])

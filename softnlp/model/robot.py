@@ -11,7 +11,7 @@ from typing import Any
 
 import casadi as ca
 
-from softnlp.base.errors import RobotError, nearest
+from softnlp.base.errors import RobotError, first_of, nearest
 from softnlp.base.ranges import SIZE
 from softnlp.base.reading import choices, did_you_mean, shown
 from softnlp.base.units import DEGREE, MILLIMETRE
@@ -93,6 +93,16 @@ class Robot:
     def chambers(self) -> int:
         """Number of chambers N = n1 n2."""
         return self.chamber_sets * self.chambers_per_set
+
+    @property
+    def parts(self) -> Mapping[str, Robot]:
+        """The robots that it is made of by what messages call them; itself under ""."""
+        return {"": self}
+
+    @property
+    def notes(self) -> list[str]:
+        """What to know of it beside the rules of manufacture."""
+        return []
 
     @property
     def outer_radius(self) -> Any:
@@ -259,13 +269,23 @@ def check(robot: Robot, *, allow: Collection[str] = (), minimum_wall: float = MI
             reason = "which can never be lowered" if rule in RULES else "no such rule"
             hint = "" if rule in RULES else did_you_mean(str(rule), ALLOWABLE)
             raise RobotError(f"expected {choices(ALLOWABLE)}, got {shown(rule)}, {reason}{hint}", key="allow")
+    if "" not in robot.parts:
+        every = {part: _checked(part, one, allow, minimum_wall) for part, one in robot.parts.items()}
+        return (*(f"{part}: {note}" for part, notes in every.items() for note in notes), *robot.notes)
     found = violations(robot, minimum_wall)
     refused = [v for v in found if v.rule not in allow]
     if refused:
-        first, more = refused[0], len(refused) - 1
-        hint = f'; allow = ["{first.rule}"] lowers this to a warning' if first.lowerable else ""
-        raise RobotError(f"{first.rule}: {first.message}{hint}{f' (and {more} more)' if more else ''}")
+        hints = [f'; allow = ["{v.rule}"] lowers this to a warning' if v.lowerable else "" for v in refused]
+        raise first_of([RobotError(f"{v.rule}: {v.message}{hint}") for v, hint in zip(refused, hints, strict=True)])
     return (*(f"{v.rule}: {v.message}" for v in found), *size_notes(robot))
+
+
+def _checked(part: str, robot: Robot, allow: Collection[str], minimum_wall: float) -> tuple[str, ...]:
+    """Return what `check` does of a part of a robot; its errors name the part."""
+    try:
+        return check(robot, allow=allow, minimum_wall=minimum_wall)
+    except RobotError as error:
+        raise RobotError(f"{part}: {error.message}", key=error.key) from None
 
 
 def size_notes(robot: Robot) -> tuple[str, ...]:

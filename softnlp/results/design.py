@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from softnlp.base import columns
 from softnlp.base.columns import DEG, MM, ONE, Output
+from softnlp.base.files import toml_key, toml_text
 from softnlp.base.units import BAR
 from softnlp.model.gravity import gravity_lines
 from softnlp.model.inputs import asked_tables, contact_table, robot_table, tidy
@@ -237,7 +237,7 @@ def best_scenario(done: Design, asked: Mapping[str, Any]) -> str | None:
         return None
     material = dict(asked["material"])
     if "material" in best.choices:
-        kept = {key: material[key] for key in ("file", "density_kg_m3") if key in material}
+        kept = {key: material[key] for key in ("set", "file", "density_kg_m3") if key in material}
         material = {"name": best.material.name, "model": best.material.law.name, **kept}
     robot = robot_table(best.robot) | {
         k: asked["robot"][k] for k in ("allow", "minimum_wall_mm") if k in asked["robot"]
@@ -256,19 +256,10 @@ def best_scenario(done: Design, asked: Mapping[str, Any]) -> str | None:
     lines = []
     for key, value in tables.items():
         if isinstance(value, Mapping):
-            lines += ["", f"[{key}]", *(f"{name} = {_toml(item)}" for name, item in value.items())]
+            lines += ["", f"[{key}]", *(f"{toml_key(name)} = {toml_text(item)}" for name, item in value.items())]
         else:
-            lines.append(f"{key} = {_toml(value)}")
+            lines.append(f"{key} = {toml_text(value)}")
     return "\n".join(lines) + "\n"
-
-
-def _toml(value: Any) -> str:
-    """Return a value of a parsed TOML file as TOML."""
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return "[" + ", ".join(_toml(item) for item in value) + "]"
-    return json.dumps(value, ensure_ascii=False)
 
 
 def pressure_words(pressure: float | Range | PressureSteps) -> str:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softnlp.base.columns import OUTPUTS
+from softnlp.base.files import toml_key, toml_text
 from softnlp.base.statistics import Statistics
 from softnlp.base.units import MEGAPASCAL
 from softnlp.model.inputs import loads_table, pressure_bar, tidy
@@ -277,8 +277,7 @@ def robot_table_text(task: RobotTask, found: Identified) -> str:
 
 def _quoted(text: str, *, always: bool = False) -> str:
     """Return a key, or text, as TOML writes it."""
-    bare = text.replace("-", "").replace("_", "")
-    return text if not always and bare.isascii() and bare.isalnum() else json.dumps(text, ensure_ascii=False)
+    return toml_text(text) if always else toml_key(text)
 
 
 def _one_line(text: str) -> str:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, get_args
+from typing import Any, cast, get_args
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from softnlp.base.errors import InputError, nearest
+from softnlp.base.errors import InputError, first_of
 from softnlp.base.ranges import numbers_outside
 from softnlp.base.reading import choices, did_you_mean, one_line, shown
 from softnlp.scenario.design import DesignFile
 from softnlp.scenario.identify import IdentifyFile
 from softnlp.scenario.inverse import InverseFile
+from softnlp.scenario.near_keys import meant
 from softnlp.scenario.schema import BlockedForceFile, ForwardFile, ScenarioFile
+from softnlp.scenario.segments import OF_SEGMENTS, of_segment, of_segments
 from softnlp.scenario.workspace import WorkspaceFile
 
 SCHEMAS: Mapping[str, type[ScenarioFile]] = {
@@ -27,7 +29,10 @@ SCHEMAS: Mapping[str, type[ScenarioFile]] = {
 }
 """The studies that this version runs, and the file of each."""
 
-_TABLES = {name for schema in SCHEMAS.values() for name in schema.model_fields} - {"title", "study"}
+HOW = ": --all-errors"
+"""How to see all mistakes of a file."""
+
+_TABLES = {"segment", *(name for schema in SCHEMAS.values() for name in schema.model_fields)} - {"title", "study"}
 
 
 def parse(data: Mapping[str, Any]) -> ScenarioFile:
@@ -36,10 +41,24 @@ def parse(data: Mapping[str, Any]) -> ScenarioFile:
     Raises
     ------
     InputError
-        For the first key that does not fit, with the number of the others.
+        For the first key that does not fit, with the others.
+    """
+    file, errors, _ = parse_parts(data)
+    if errors:
+        raise first_of(errors, HOW)
+    return file
+
+
+def parse_parts(data: Mapping[str, Any]) -> tuple[ScenarioFile, list[InputError], set[str]]:
+    """Return the tables of a scenario, what does not fit, and the tables that it is in; those are not in the file.
+
+    Raises
+    ------
+    InputError
+        When the study is not one that this version runs.
     """
     study = _study(data)
-    schema = SCHEMAS[study]
+    schema = schema_of(data, study)
     details, file = [], None
     try:
         file = schema.model_validate(data)
@@ -49,17 +68,17 @@ def parse(data: Mapping[str, Any]) -> ScenarioFile:
     for place, number, text in numbers_outside(data):
         if not any(loc[: len(place)] == place[: len(loc)] for loc in wrong):
             details.append({"type": "own", "loc": place, "msg": text, "input": number, "ctx": {"text": text}})
-    if file is None or details:
-        raise first_of(list(_errors(study, details)))
-    return file
+    bad = {str(detail["loc"][0]) for detail in details}
+    return file or _without(schema, data, bad), list(_errors(study, schema, details)), bad
 
 
-def first_of(errors: list[InputError]) -> InputError:
-    """Return the first error, saying how many more there are."""
-    first, more = errors[0], len(errors) - 1
-    if not more:
-        return first
-    return type(first)(f"{first.message} (and {more} more)", source=first.source, table=first.table, key=first.key)
+def _without(schema: type[ScenarioFile], data: Mapping[str, Any], bad: set[str]) -> ScenarioFile:
+    """Return the file without the tables that do not fit."""
+    good = {name: schema.model_fields[name] for name in schema.model_fields if name in data and name not in bad}
+    tables = {
+        name: TypeAdapter[Any](cast(Any, field.annotation)).validate_python(data[name]) for name, field in good.items()
+    }
+    return schema.model_construct(**tables)
 
 
 def _study(data: Mapping[str, Any]) -> str:
@@ -73,22 +92,38 @@ def _study(data: Mapping[str, Any]) -> str:
     return study
 
 
-def _errors(study: str, details: list[ErrorDetails]) -> Iterator[InputError]:
+def schema_of(data: Mapping[str, Any], study: str) -> type[ScenarioFile]:
+    """Return the tables that a file of a study may hold: with [[segment]] in place of [robot] and [material].
+
+    Raises
+    ------
+    InputError
+        For segments in a study that does not take them, and a single table of that name.
+    """
+    if "segment" not in data:
+        return SCHEMAS[study]
+    if study not in OF_SEGMENTS:
+        raise InputError(f"study {study!r} takes [robot] and [material] so far, not [[segment]]", table="segment")
+    if not isinstance(data["segment"], list):
+        raise InputError("expected one table [[segment]], in two brackets, for each segment", table="segment")
+    return of_segments(SCHEMAS[study])
+
+
+def _errors(study: str, schema: type[ScenarioFile], details: list[ErrorDetails]) -> Iterator[InputError]:
     """Yield an error of ours for each of pydantic's: unknown keys first, they explain missing ones."""
-    schema = SCHEMAS[study]
-    meant = set()
+    aimed: set[tuple[int | str | None, ...]] = set()
     for detail in (d for d in details if d["type"] == "extra_forbidden"):
         *place, key = detail["loc"]
         if not place and key in _TABLES:
             yield _placed(detail, f"this table is not used by study {study!r}; remove it")
             continue
-        known = list(_model(schema, tuple(place)).model_fields)
-        suggestion = nearest(str(key), known)
-        meant |= {(*place, name) for name in known if suggestion == f"; did you mean {name!r}?"}
-        is_table = not place and isinstance(detail["input"], dict)
-        yield _placed(detail, f"unknown {'table' if is_table else 'key'}{suggestion}")
+        name, words = meant(str(key), detail["input"], _model(schema, tuple(place)).model_fields)
+        aimed |= {(*place, name)}
+        if not place and isinstance(detail["input"], dict):
+            words = words.replace("unknown key", "unknown table", 1)
+        yield _placed(detail, words)
     for detail in (d for d in details if d["type"] != "extra_forbidden"):
-        if detail["type"] != "missing" or detail["loc"] not in meant:
+        if detail["type"] != "missing" or detail["loc"] not in aimed:
             yield _placed(detail, _message(schema, detail))
 
 
@@ -130,6 +165,10 @@ _EXPECTED = {
 
 def _placed(detail: ErrorDetails, message: str) -> InputError:
     """Name the table and the key: ("pressure", "sequence_bar", 2, 0) is row 3, column 1."""
+    if len(detail["loc"]) > 1 and detail["loc"][0] == "segment":
+        _, number, *rest = detail["loc"]
+        inner = _placed({**detail, "loc": tuple(rest)}, message) if rest else InputError(message)
+        return of_segment(int(number), inner)
     *path, last = [part for part in detail["loc"] if isinstance(part, str)]
     numbers = [part + 1 for part in detail["loc"] if isinstance(part, int)]
     where = [f"{word} {n}" for word, n in zip(("row", "column"), numbers, strict=False)]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import TIME_COLUMN, Columns
-from softnlp.base.errors import InputError, listed, nearest
+from softnlp.base.errors import InputError, listed, located, nearest
 from softnlp.base.ranges import noise_note, unit_note
 from softnlp.base.reading import choices, read_text, shown
 from softnlp.model.contact_settings import CLOSURES, ContactSettings, ContactTask
@@ -21,6 +21,7 @@ from softnlp.model.conventions import CONVENTIONS, Coefficients, Conventions
 from softnlp.model.materials import Material, load_materials
 from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
+from softnlp.model.segments import require_one_segment
 from softnlp.scenario.data import Scenario
 from softnlp.scenario.laboratory import import_notes, laboratory_columns
 from softnlp.scenario.measured_rows import (
@@ -193,6 +194,8 @@ def comparison_checks(task: CompareTask, found: Comparison) -> tuple[Check, ...]
 def _require_study(scenario: Scenario) -> None:
     """Refuse a scenario that does not say how a pose at a pressure is solved."""
     source = str(scenario.path)
+    with located(source=source):
+        require_one_segment(scenario.robot, "a comparison with measurements")
     if scenario.study not in STUDIES:
         raise InputError(f"expected {choices(STUDIES)}, got {scenario.study!r}", source=source, key="study")
     task = scenario.task
@@ -291,7 +294,7 @@ def _materials(scenario: Scenario, names: Sequence[str]) -> tuple[Material, ...]
     known: dict[str, Material] = {own.law.name: own}
     if "constants" not in table and "formula" not in table:
         file = scenario.path.parent / table["file"] if "file" in table else None
-        models = load_materials(file)[own.name].models
+        models = load_materials(file)[own.name].chosen(table.get("set")).models
         known = {law: replace(found, density=own.density) for law, found in models.items()} | known
         known = {law: known[law] for law in models}
     wanted = [law for name in names for law in (known if name == ALL else (name,))]

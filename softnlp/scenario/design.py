@@ -89,43 +89,64 @@ _SIZES = {d.file_key: Counts if d.scale is None else Size for d in DIMENSIONS}
 
 
 class RobotChoices(optional_keys({"name": Names, **_SIZES})):  # type: ignore[misc]
-    """[choices.robot]: whole robots by name, and dimensions as lists or ranges."""
+    """[choices.robot]: whole robots by name, and dimensions as lists or ranges.
+
+    name : whole robots of the library, in place of dimensions; as in ["D25L60", "D20L60"]
+    """
 
 
 class MaterialChoices(Table):
-    """[choices.material]: every name with every model."""
+    """[choices.material]: every name with every model.
+
+    name : silicones; as in ["Ecoflex 00-50", "Ecoflex 00-30"]
+    model : laws; as in ["mooney-rivlin", "yeoh"]
+    """
 
     name: Names | None = None
     model: Names | None = None
 
 
 class ChoicesTable(Table):
-    """[choices]."""
+    """[choices]: what a design may choose."""
 
     robot: RobotChoices = RobotChoices()
     material: MaterialChoices = MaterialChoices()
 
 
 class ActuationTable(Table):
-    """[actuation]: one pressure in each of the sets, counted from 1."""
+    """[actuation]: one pressure in each of the sets, counted from 1.
+
+    pressure_bar : a number, a range { from = 0.0, to = 1.0 }, or the lowest step that suffices; as in 0.8
+    sets : that get the pressure, counted from 1
+    """
 
     pressure_bar: Pressure = Field(description="a pressure in bar, a range or steps")
     sets: Counts = Field(default=[1])
 
 
 class LimitsTable(Table):
-    """A requirement."""
+    """A requirement.
+
+    at_least : the lowest that will do; as in 1.0
+    at_most : the highest that will do; as in 2.0
+    """
 
     at_least: float | None = None
     at_most: float | None = None
 
 
 class RequirementsTable(optional_keys(dict.fromkeys(_BY_FILE_KEY, LimitsTable))):  # type: ignore[misc]
-    """[requirements]: the names of `softnlp.studies.design_task.OUTPUTS` as they are in files."""
+    """[requirements]: what a design must meet, at_least or at_most, of `softnlp.studies.design_task.OUTPUTS`."""
 
 
 class ObjectiveTable(Table):
-    """[objective]: exactly one of maximise, minimise."""
+    """[objective]: exactly one of maximise, minimise.
+
+    maximise : an output of the list of [requirements]; as in "bending_angle_deg"
+    minimise : or this; as in "pressure_bar"
+    starts : first guesses of each optimisation; by default 4, or 2 for one free number; as in 4
+    trials : of the search, where there are more than 5000 combinations
+    """
 
     maximise: str | None = None
     minimise: str | None = None
@@ -219,7 +240,7 @@ def _materials(table: MaterialChoices, base: Mapping[str, Any], folder: Path) ->
     for name in names:
         for model in models:
             try:
-                made = material(name, model, file=file)
+                made = material(name, model, set=base.get("set"), file=file)
             except InputError as error:
                 key = f"material.{error.key}" if error.key in ("name", "model") else "material"
                 raise InputError(error.message, table="choices", key=key) from None

@@ -12,7 +12,16 @@ from pydantic import ConfigDict, Field, PlainValidator, TypeAdapter
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.scenario.data import Read, Scenario, run_of
-from softnlp.scenario.schema import MOST_STEPS, Normal, NotNegative, Positive, ScenarioFile, Table, Vector
+from softnlp.scenario.schema import (
+    MOST_STEPS,
+    Normal,
+    NotNegative,
+    Positive,
+    ScenarioFile,
+    Table,
+    UncertaintyTable,
+    Vector,
+)
 from softnlp.statics.step import Run, Step
 from softnlp.studies.forward import followed
 from softnlp.studies.inverse_solver import InverseKinematics
@@ -36,7 +45,12 @@ Directions = Annotated[list[Normal], Field(min_length=1, max_length=MOST_STEPS)]
 
 
 class TargetTable(Table):
-    """[target]: where the tip is to be, which way it is to point, or both row by row."""
+    """[target]: where the tip is to be, which way it is to point, or both row by row.
+
+    tip_position_mm : rows of x, y, z; as in [[10.0, 0.0, 60.0]]
+    tip_direction : rows of a vector along which the tip is to point; as in [[0.0, 0.0, 1.0]]
+    length_per_radian_mm : weighs a direction against a position; by default the robot's length; as in 60.0
+    """
 
     tip_position_mm: Rows | None = None
     tip_direction: Directions | None = None
@@ -44,7 +58,10 @@ class TargetTable(Table):
 
 
 class BoundsTable(Table):
-    """[bounds]: lowest and highest pressure, for all sets or for each."""
+    """[bounds]: lowest and highest pressure, for all sets or for each.
+
+    pressure_bar : lowest and highest of all sets, or such a pair for each
+    """
 
     pressure_bar: Bounds = Field(default=[0.0, 1.5])
 
@@ -54,6 +71,7 @@ class InverseFile(ScenarioFile):
 
     target: TargetTable = Field(description="a table with tip_position_mm, tip_direction or both")
     bounds: BoundsTable = BoundsTable()
+    uncertainty: UncertaintyTable | None = None
 
 
 def inverse_task(given: Read) -> InverseTask:

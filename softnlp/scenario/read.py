@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from os import PathLike, fspath
 from pathlib import Path
@@ -11,17 +12,20 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 
-from softnlp.base.errors import InputError, of_table
+from softnlp.base.errors import InputError, first_of, of_table
 from softnlp.base.ranges import file_unit_note
 from softnlp.base.reading import BACKSLASH_HINT, LARGEST_TOML, LONGEST_NAME, one_line, read_text, toml_tables
 from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
+from softnlp.model.body import Segment
 from softnlp.model.conventions import COEFFICIENT_SETS, CONVENTIONS, Coefficients
-from softnlp.model.materials import material_from_table
+from softnlp.model.materials import Material, material_from_table
 from softnlp.model.numerics import Numerics
-from softnlp.model.robot import Robot, Violation, violations
+from softnlp.model.quantities import Model
+from softnlp.model.robot import DIMENSIONS, MOST_CHAMBERS, Robot, Violation, violations
 from softnlp.model.rod import Loads
+from softnlp.model.segments import SegmentedRobot, segmented_robot
 from softnlp.scenario.blocked_force import contact_settings, contact_task
-from softnlp.scenario.check import first_of, parse
+from softnlp.scenario.check import HOW, parse, parse_parts
 from softnlp.scenario.data import Read, Task
 from softnlp.scenario.data import Scenario as Scenario
 from softnlp.scenario.design import design_task
@@ -29,6 +33,8 @@ from softnlp.scenario.identify import identify_task
 from softnlp.scenario.inverse import inverse_task
 from softnlp.scenario.pressures import PressurePath, pressure_path
 from softnlp.scenario.schema import ScenarioFile
+from softnlp.scenario.segments import OF_SEGMENTS, read_segments
+from softnlp.scenario.uncertainty import uncertainty_of
 from softnlp.scenario.workspace import workspace_task
 from softnlp.studies.plausibility import modulus_notes
 
@@ -74,7 +80,8 @@ def scenario_from_text(text: str, path: str | PathLike[str]) -> Scenario:
         return _scenario(text, Path(path))
     except InputError as error:
         if "no such file" in error.message and _ESCAPED.search(text):
-            error = type(error)(f"{error.message}; {BACKSLASH_HINT}", table=error.table, key=error.key)
+            message = f"{error.message}; {BACKSLASH_HINT}"
+            error = type(error)(message, table=error.table, key=error.key, every=error.every)
         raise placed(error, fspath(path)) from None
 
 
@@ -88,6 +95,8 @@ def robot_of_scenario(path: str | PathLike[str]) -> tuple[Robot, tuple[Violation
     """
     try:
         file = parse(parse_toml(read_text(Path(path), LARGEST_TOML)))
+        if getattr(file, "segment", None) is not None or file.robot.along:
+            raise InputError("the cross-section of a robot of one uniform segment is drawn so far", table="segment")
         robot = file.robot.described()
         return robot, violations(robot, file.robot.minimum_wall_mm * MILLIMETRE)
     except InputError as error:
@@ -97,26 +106,40 @@ def robot_of_scenario(path: str | PathLike[str]) -> tuple[Robot, tuple[Violation
 def _scenario(text: str, path: Path) -> Scenario:
     """Build a scenario; errors do not name the file yet."""
     data = parse_toml(text)
-    file = parse(data)
-    errors: list[InputError] = []
-    made = _attempt(errors, "robot", file.robot.made)
-    silicone = data.get("material") or file.material.model_dump(exclude_none=True)
-    chosen = _attempt(errors, "material", lambda: material_from_table(silicone, folder=path.parent))
-    steps = made and _attempt(errors, "pressure", lambda: _steps(file, made[0].chamber_sets, path.parent))
-    contact = task = None
-    if (wall := getattr(file, "contact", None)) is not None:
+    file, errors, bad = parse_parts(data)  # what does not fit is in no table of the file
+    made, chosen, unlikely = _robot(file, data, path.parent, errors, bad)
+    steps = contact = task = numerics = None
+    if "pressure" not in bad and (made is not None or not bad & {"robot", "segment"}):
+        with suppress(InputError, AttributeError):  # of a robot that is not described, which was said
+            sets = made[0].chamber_sets if made is not None else file.robot.described().chamber_sets
+            steps = _attempt(errors, "pressure", lambda: _steps(file, min(sets, MOST_CHAMBERS), path.parent))
+    if "contact" not in bad and (wall := getattr(file, "contact", None)) is not None:
         single = None if made is None or file.study == "design" else made[0]  # a design judges each candidate
         contact = _attempt(errors, "contact", lambda: contact_settings(wall, single))
-    if file.study in TASKS and made is not None and chosen is not None and steps is not None:
+    if file.study in TASKS and not bad and made is not None and chosen is not None and steps is not None:
         table, read_task = TASKS[file.study]
         given = Read(file, data, made[0], chosen, steps, path.parent)
         task = _attempt(errors, table, lambda: read_task(given))
-    numerics = _attempt(errors, "solver", lambda: _numerics(file))
+    if "solver" not in bad:
+        numerics = _attempt(errors, "solver", lambda: _numerics(file))
+    scatter = None
+    said = getattr(file, "uncertainty", None)
+    if said is not None and made is not None and isinstance(made[0], SegmentedRobot):
+        errors.append(
+            InputError(
+                "a robot of several segments, or one that varies along s, takes none so far", table="uncertainty"
+            )
+        )
+    if said is not None and not errors and made is not None and chosen is not None:
+        silicone = data.get("material") or file.material.model_dump(exclude_none=True)
+        model = Model(made[0], chosen, _coefficients(file), CONVENTIONS[file.corrections.conventions])
+        pressed = contact if file.study == "blocked-force" else None
+        scatter = _attempt(
+            errors, "uncertainty", lambda: uncertainty_of(said, model, silicone, path.parent, pressed, task)
+        )
     if errors or made is None or chosen is None or steps is None or numerics is None:
-        raise first_of(errors)
+        raise first_of(errors, HOW)
     robot, warnings = made
-    # Where constants are to be found, those given only begin the search.
-    unlikely = () if file.study == "identify" else modulus_notes(chosen.name, float(chosen.shear_modulus(1.0)))
     return Scenario(
         path=path,
         text=text,
@@ -134,7 +157,49 @@ def _scenario(text: str, path: Path) -> Scenario:
         task=task,
         warnings=(*warnings, *unlikely, *file_unit_note(data), *steps.notes),
         registration=getattr(file, "registration", None) if "registration" in data else None,
+        uncertainty=scatter,
     )
+
+
+def _robot(
+    file: ScenarioFile, data: dict[str, Any], folder: Path, errors: list[InputError], bad: set[str]
+) -> tuple[tuple[Robot, tuple[str, ...]] | None, Material | None, tuple[str, ...]]:
+    """Return the robot with its warnings, the silicone, and what is unlikely of it; None with an error for each.
+
+    bad : the tables that do not fit, of which nothing is read.
+    """
+
+    def notes(material: Material) -> tuple[str, ...]:
+        # Where constants are to be found, those given only begin the search.
+        known = file.study == "identify"
+        return () if known else modulus_notes(material.name, float(material.shear_modulus(1.0)))
+
+    if "segment" in bad:
+        return None, None, ()
+    if (tables := getattr(file, "segment", None)) is not None:
+        found = read_segments(tables, data["segment"], folder, errors)
+        if found is None:
+            return None, None, ()
+        robot, silicone, warnings = found
+        every = [s.material for s in robot.segments] if isinstance(robot, SegmentedRobot) else [silicone]
+        unlikely = dict.fromkeys(note for one in every for note in notes(one))
+        return (robot, warnings), silicone, tuple(unlikely)
+    made = chosen = None
+    if "robot" not in bad:
+        made = _attempt(errors, "robot", file.robot.made)
+    if "material" not in bad:
+        written = data.get("material") or file.material.model_dump(exclude_none=True)
+        chosen = _attempt(errors, "material", lambda: material_from_table(written, folder=folder))
+    if made is None or chosen is None:
+        return made, chosen, ()
+    if along := file.robot.along:
+        if file.study not in OF_SEGMENTS:
+            key = next(iter(along)).removeprefix("robot.")
+            text = f"study {file.study!r} takes one number here so far, not one that varies along s"
+            errors.append(InputError(text, table="robot", key=next(d.file_key for d in DIMENSIONS if d.field == key)))
+        varying = segmented_robot([Segment(made[0], chosen, along=along)], made[0].name)
+        return (varying, made[1]), varying.material, notes(chosen)
+    return made, chosen, notes(chosen)
 
 
 def _numerics(file: ScenarioFile) -> Numerics:
@@ -163,7 +228,8 @@ def placed(error: InputError, source: str) -> InputError:
     """Return an error that names the file; whatever it quotes stays printable and on the same line."""
     table = error.table and one_line(error.table, LONGEST_NAME)
     key = error.key and one_line(error.key, LONGEST_NAME)
-    return type(error)(one_line(error.message), source=one_line(source), table=table, key=key)
+    every = [placed(one, source) for one in error.every]
+    return type(error)(one_line(error.message), source=one_line(source), table=table, key=key, every=every)
 
 
 def parse_toml(text: str) -> dict[str, Any]:

@@ -49,7 +49,12 @@ def _cycle(value: Any) -> int | str:
 
 
 class DataTable(optional_keys({"import": ImportSettings})):  # type: ignore[misc]
-    """What every table with data may hold: one file or several."""
+    """What every table with data may hold: one file or several.
+
+    file : CSV with what was measured, or a file as a laboratory wrote it; as in "measured.csv"
+    files : several of them; as in ["first.csv", "second.csv"]
+    import : settings of a file as a laboratory wrote it; as in { "unit.stress" = "kPa" }
+    """
 
     file: FileName | None = None
     files: Annotated[list[FileName], Field(min_length=1)] | None = None
@@ -62,7 +67,21 @@ class DataTable(optional_keys({"import": ImportSettings})):  # type: ignore[misc
 
 
 class TensileTable(DataTable):
-    """[tensile]: tests of one silicone, and the laws to fit."""
+    """[tensile]: tests of one silicone, and the laws to fit.
+
+    name : of the silicone in the materials file that is written; by default that of [material]; as in "My silicone"
+    laws : to fit; by default all; as in ["mooney-rivlin", "yeoh"]
+    stress : what stress_MPa means
+    gauge_length_mm : of the specimen, for displacement_mm; as in 25.0
+    width_mm : of a flat specimen, for force_N; as in 4.0
+    thickness_mm : of a flat specimen; as in 2.0
+    diameter_mm : of a round specimen; as in 6.0
+    area_mm2 : in place of these sizes; as in 8.0
+    cycle : of several load cycles: "first loading", the number of a loading, "unloading" or "all";
+        by default "first loading"; as in 1
+    stretch : only points from the first to the second stretch are fitted; by default all; as in [1.0, 2.0]
+    density_kg_m3 : of the silicone; by default that of [material]; as in 1070.0
+    """
 
     name: Label | None = None
     laws: Annotated[list[str], Field(min_length=1)] | None = None

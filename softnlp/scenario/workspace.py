@@ -45,6 +45,14 @@ class WorkspaceTable(Table):
     """[workspace]: a grid or samples of pressures, and what else differs between poses.
 
     `vary` holds a table for each varied key, which `_axes` reads.
+
+    levels : a grid, so many equal steps in each set; as in 5
+    samples : or so many pressures scattered evenly; as in 1000
+    from_bar : the lowest pressure of grid and samples
+    to_bar : the highest; as in 1.0
+    sets : that are swept, counted from 1; by default all; as in [1, 2]
+    seed : of samples: another seed, other samples
+    vary : what else differs between poses; as in { "robot.length_mm" = { from = 40.0, to = 60.0, levels = 3 } }
     """
 
     levels: Annotated[int, Field(ge=1, le=MOST_LEVELS)] | None = None
@@ -221,7 +229,7 @@ def _check_varied(task: WorkspaceTask, file: WorkspaceFile, robot: Robot, materi
         part = table[start : start + _MATERIALS_AT_ONCE]
         constants = {**material.constants, **{name: part[:, k] for name, k in of_material.items()}}
         try:
-            Material(material.name, material.law, constants, material.density, material.fitted_stretch)
+            Material(material.name, material.law, constants, material.density, material.fitted_stretch, material.set)
         except InputError as error:
             raise InputError(error.message, key="vary") from None
 

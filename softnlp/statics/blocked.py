@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
@@ -41,18 +42,33 @@ _MOST_STEPS, _MOST_STEPS_MINIMUM = 5, 24  # to a point of a path; what takes mor
 _MOST_WORK, _LEAST = 20_000, 100  # to follow a branch, in intervals of Newton's iterations; iterations on any grid
 _SOUND = 0.5  # of the largest determinant: nearer to a fold an error is that of the place of the fold
 _NEAR_END = 0.98  # of a path: a fold that a coarse grid finds beyond it may lie behind the end
+_BACK = 0.9  # of where a coarse grid lost the branch: the next grid goes on from there
 _SURE = 1e-3  # estimated error of a shape on that grid below which the end of the branch after it is believed
 
 
 @dataclass(frozen=True, eq=False)
+class _Reached:
+    """A point of a branch: the fraction of the way, its solution, the determinants up to there and the last step."""
+
+    fraction: float
+    solution: Blocked
+    trace: list[tuple[float, tuple[float, float]]]
+    step: float
+
+
+@dataclass(frozen=True, eq=False)
 class _Ended:
-    """Where a branch was lost, whether it had turned, the iterations, the error there and whether work ran out."""
+    """Where a branch was lost, whether it had turned, the iterations, the error there and whether work ran out.
+
+    before : a point well before that, from which a finer grid may go on.
+    """
 
     situation: Situation
     folded: bool
     iterations: int
     error: float = 0.0
     stopped: bool = False
+    before: _Reached | None = None
 
 
 class BlockedSolver:
@@ -78,7 +94,8 @@ class BlockedSolver:
         self.has_wall = wall
         # Without loads the free lengths and tip are taken from the closed form, so the grid need not show it.
         self.poses = poses or PoseSolver(model, numerics, unloaded_accuracy=numerics.accuracy)
-        self.equations = equations or rod_equations(model, (TipContact(contact.closure, wall),))
+        loads = (TipContact(contact.closure, wall),)
+        self.equations = equations or rod_equations(model, loads, like=self.poses.equations)
 
     def with_contact(self, contact: ContactSettings) -> BlockedSolver:
         """Return a solver with other settings that shares what both need compiled."""
@@ -193,10 +210,13 @@ class BlockedSolver:
             tried = [(_SEARCHED_ON, SEARCHED_BY), (max(like, 2 * _SEARCHED_ON), SEARCHED_BY), (first, own)]
         elif first > _SEARCHED_ON:
             tried.insert(0, (_SEARCHED_ON, own))
+        found: Blocked | _Ended | None = None
         for size, name in tried:
             cost, shown = iteration_cost(size, name), name == own and size >= first
             grid = self.grid(size, plane, name)
-            found = self._followed(grid, route, situation, pressed, free, plane, near, max(left // cost, _LEAST))
+            before = found.before if isinstance(found, _Ended) else None
+            most = max(left // cost, _LEAST)
+            found = self._followed(grid, route, situation, pressed, free, plane, near, most, before)
             more = found.solution.iterations if isinstance(found, Blocked) else found.iterations
             spent, left = spent + more, left - more * cost
             if isinstance(found, _Ended) and found.folded and (shown or size >= like or found.error <= _SURE):
@@ -205,6 +225,7 @@ class BlockedSolver:
                 finer = found if shown else self._refined(found, self.grid(first, plane))
                 if finer is not None:
                     return finer, spent + (0 if finer is found else finer.solution.iterations)
+        assert found is not None
         return found, spent
 
     def plane(self, situation: Situation) -> Array | None:
@@ -307,8 +328,12 @@ class BlockedSolver:
         plane: Array | None,
         near: Blocked | None,
         most: int,
+        before: _Reached | None = None,
     ) -> Blocked | _Ended:
-        """Follow the branch along a route to `end`, in so many iterations at most."""
+        """Follow the branch along a route to `end`, in so many iterations at most.
+
+        before : where another grid came on it, which this one goes on from where it has the same point.
+        """
         begin, shapes = route.begin, route.shapes
         shapes.begin(*route.start)
 
@@ -316,35 +341,47 @@ class BlockedSolver:
             lengths = free.lengths if u >= 1.0 else route.lengths(u)
             return grid.problem.pack(self.values(begin.towards(end, u), pressed, lengths))
 
-        if near is not None:
-            x = transferred(near, grid.case, self.equations.shape)
-        else:
-            free_x = shapes.guess(begin, grid.case.transcribed.points)
-            x = np.concatenate([free_x, np.zeros(self.functions.tip_unknowns)])
         trace: list[tuple[float, tuple[float, float]]] = []
         sound: list[Solution] = []
+        points: list[Solution] = []
+        begun, first = self._resumed(grid, path, plane, before), 0.0
+        if begun is not None and before is not None:
+            first, trace = before.fraction, list(before.trace)
+        else:
+            if near is not None:
+                x = transferred(near, grid.case, self.equations.shape)
+            else:
+                free_x = shapes.guess(begin, grid.case.transcribed.points)
+                x = np.concatenate([free_x, np.zeros(self.functions.tip_unknowns)])
+            begun = grid.stepper.solve(path(0.0), x)
+        passed = len(trace)
+
+        def along(v: float) -> float:
+            """Return the fraction of the whole way."""
+            return 1.0 if v >= 1.0 else first + v * (1 - first)
 
         def same_branch(u: float, solution: Solution) -> bool:
             determinants = grid.determinants(solution, plane)
             if trace and not grid.is_minimum and determinants[0] * trace[0][1][0] <= 0:
                 return False
             trace.append((u, determinants))
+            points.append(solution)
             if abs(determinants[0]) >= _SOUND * max(abs(size) for _, (size, _) in trace):
                 sound.append(solution)
             return True
 
-        begun = grid.stepper.solve(path(0.0), x)
         if begun.holds(10 * grid.stepper.tolerance):
-            same_branch(0.0, begun)
+            same_branch(first, begun)
+        first_step = 0.5 if near is not None else 0.25
         followed = follow(
             grid.stepper,  # type: ignore[arg-type]
-            path,
+            lambda v: path(along(v)),
             begun.x,
             distance=grid.distance,
-            first_step=0.5 if near is not None else 0.25,
-            smallest_step=1 / 2048,
+            first_step=first_step if before is None or not first else min(before.step / (1 - first), first_step),
+            smallest_step=1 / 2048 / (1 - first),
             largest_jump=_LARGEST_JUMP,
-            same_branch=same_branch,
+            same_branch=lambda v, solution: same_branch(along(v), solution),
             predict=grid.predicted if grid.has_tangent else None,
             most_iterations=most,
             most_steps=_MOST_STEPS_MINIMUM if grid.is_minimum else _MOST_STEPS,
@@ -356,12 +393,36 @@ class BlockedSolver:
             found = self._arrived(grid, rough, begin, end, pressed, free, trace, near)
             if found is not None:
                 return found
-        reached = begin.towards(end, followed.fraction)
+        fraction = along(followed.fraction)
+        reached = begin.towards(end, fraction)
         sizes = [abs(size) for _, (size, _) in trace]
         stopped = followed.iterations >= most
         folded = not stopped and len(sizes) > 1 and (grid.is_minimum or sizes[-1] < _NEAR_FOLD * max(sizes))
-        error = max(grid.refinement(sound[-1])) if folded and followed.fraction < _NEAR_END else 1.0
-        return _Ended(reached, folded, spent, error, stopped)
+        error = max(grid.refinement(sound[-1])) if folded and sound and fraction < _NEAR_END else 1.0
+        back = [k for k, (u, _) in enumerate(trace) if passed < k < len(trace) and u <= _BACK * fraction]
+        if back and not grid.is_minimum:
+            k, (u, determinants) = back[-1], trace[back[-1]]
+            solution, here = points[k - passed], begin.towards(end, u)
+            constants = np.asarray(grid.problem.case_constants(solution.x, solution.p)).ravel()
+            unknown = np.inf
+            point = Blocked(here, pressed, grid, solution, constants, unknown, unknown, None, determinants, free)
+            before = _Reached(u, point, trace[: k + 1], u - trace[k - 1][0])
+        return _Ended(reached, folded, spent, error, stopped, before)
+
+    def _resumed(
+        self, grid: BlockedGrid, path: Callable[[float], Array], plane: Array | None, before: _Reached | None
+    ) -> Solution | None:
+        """Return the point of a branch that another grid came to; None where this grid has it not, or elsewhere."""
+        if before is None or grid.is_minimum:
+            return None
+        for u, _ in before.trace:  # each free shape is found from the last
+            path(u)
+        x = transferred(before.solution, grid.case, self.equations.shape)
+        begun = grid.stepper.solve(path(before.fraction), x, _MOST_STEPS)
+        if not begun.holds(10 * grid.stepper.tolerance) or not grid.distance(begun.x - x) <= _LARGEST_JUMP:
+            return None
+        same = grid.determinants(begun, plane)[0] * before.solution.determinants[0] > 0
+        return begun if same else None
 
     def _refined(self, found: Blocked, grid: BlockedGrid) -> Blocked | None:
         """Return a solution solved again on a finer grid, or None where that leads elsewhere."""

@@ -76,7 +76,7 @@ class FreeConstants:
         values = self.values(x)
         own = {fields[name]: value for name, value in values.items() if name in fields}
         constants = {n.removeprefix("material."): v for n, v in values.items() if n.startswith("material.")}
-        made = replace(material, constants={**material.constants, **constants}) if constants else material
+        made = replace(material, constants={**material.constants, **constants}, set="") if constants else material
         return made, replace(coefficients, **own)
 
 

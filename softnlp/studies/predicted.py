@@ -27,7 +27,7 @@ from softnlp.statics.blocked_grid import Blocked
 from softnlp.statics.body import Fit
 from softnlp.statics.branch import stretch_on_branch
 from softnlp.statics.loadcase import stretch_imbalance, stretch_near
-from softnlp.statics.pose_grid import Solved, pose_distance
+from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
 from softnlp.statics.wall import Wall, standing_wall
@@ -200,7 +200,7 @@ class LoadedPoses:
             grid, x = found.grid, found.solution.x
             p = grid.problem.pack(solver.values(self._pressure[row], self._loads))
             solution = grid.engine.solve(p, x)
-            if not solution.holds(solver.numerics.tolerance) or pose_distance(solution.x - x) > _LARGEST_JUMP:
+            if not solution.holds(solver.numerics.tolerance) or grid.distance(solution.x - x) > _LARGEST_JUMP:
                 return False
             moved[row] = replace(found, solution=solution)
         self._known = moved
