@@ -79,6 +79,21 @@ def test_a_mirrored_order_is_named_where_the_frame_is_fitted() -> None:
     assert any("mirror image" in words for words in said(simulated(order=(0, 2, 1), placed=placed), Loads(), WORLD))
 
 
+def test_one_plane_of_bending_leaves_the_place_across_it_open_and_says_what_to_measure() -> None:
+    P = BAR * np.column_stack([np.linspace(0, 1.2, 9), np.zeros((9, 2))])
+    run = forward(robot("D25L60"), SILICONE, P, coefficients=TRUE, numerics=NEWTON)
+    tips = np.array([step.pose.tip_position for step in run.steps if step.pose is not None])
+    rows = Measurements(
+        robot("D25L60"), P, tip_position=tips + np.random.default_rng(0).normal(scale=1e-4, size=(9, 3))
+    )
+    asked = Registration(fit=("frame", "tip_offset"))
+    fit = identify(rows, SILICONE, ["k_b"], registration=asked, numerics=NEWTON)
+    errors = dict(zip(fit.free.names, fit.uncertainty.standard_errors, strict=True))
+    assert np.isinf(errors["tip_offset_y"])
+    assert abs(fit.constants[fit.free.names.index("tip_offset_y")]) < 1e-3  # where it began
+    assert any("bends in another plane" in words for words in fit.warnings)
+
+
 def test_loads_keep_their_direction_where_the_sets_are_turned() -> None:
     placed = Registration(clock=np.deg2rad(40))
     rows = simulated(ACROSS, placed=placed)

@@ -268,6 +268,7 @@ _EVERY = (
           ("elongation", MM, ()), ("stretch", ONE, ()), ("chamber_length", MM, _N), ("blocked_force", N, ()))),
     # --- of comparisons and designs
     Output("elongation", MM),
+    *(Output(f"orientation_{x}", DEG) for x in "xyz"),
     Output("orientation", DEG, words="turn of the tip from the one measured", short=("turn",)),
     *(Output(f"tip_{x}", MM, column=x, others=(f"tip_{x}", f"tip_position_{x}")) for x in "xyz"),
     Output("tip_deflection", MM),

@@ -37,6 +37,7 @@ from softnlp.studies.identified import (
     constants_text,
     file_name,
     free_constants,
+    further_measurements,
     grown_errors,
     unexplained,
     weighted_residuals,
@@ -64,6 +65,7 @@ _TIGHT = 1e-13
 _NEARLY = 1e-2  # of a constant or its scale: a rough search that ends nearer to a bound is about to reach it
 _AT_BOUND = 1e-6  # of a constant or its scale
 _NOTHING = Uncertainty(np.zeros(0), np.zeros((0, 0)), np.nan, ())
+_LOOSE = 1e-4  # residuals of a registration that is a typical size away from where it began
 _SMALL = 1e-6  # root mean square of residuals with nothing left in them [sigma]
 
 
@@ -279,6 +281,9 @@ class _Fit:
         from scipy.optimize import least_squares
 
         scale = self.free.scale
+        # What no row tells of a registration stays where it began; what the rows tell is moved by less than 1e-10.
+        loose = _LOOSE * np.array([name in REGISTRATION_NAMES for name in self.free.names], float)
+        kept = start / scale
 
         def at(z: Array) -> list[Prediction]:
             x = start.copy()
@@ -286,9 +291,9 @@ class _Fit:
             return self.predictions(x)
 
         done = least_squares(
-            lambda z: self.residuals(at(z)),
+            lambda z: np.concatenate([self.residuals(at(z)), loose[moving] * (z - kept[moving])]),
             start[moving] / scale[moving],
-            jac=lambda z: (self.jacobian(at(z)) * scale)[:, moving],
+            jac=lambda z: np.vstack([(self.jacobian(at(z)) * scale)[:, moving], np.diag(loose[moving])]),
             bounds=(self.free.lower[moving] / scale[moving], self.free.upper[moving] / scale[moving]),
             x_scale="jac",
             ftol=tolerance,
@@ -322,7 +327,7 @@ class _Fit:
         held = [bool(h) for h in low | high]
         x = np.where(low, self.free.lower, np.where(high, self.free.upper, x))  # not a rounding beside a bound
         J, r = self.jacobian(last), self.residuals(last)
-        known = uncertainty(self.free.names, J, r, held, repeated_numbers(self.data))
+        known = uncertainty(self.free.names, J, r, held, repeated_numbers(self.data), further=further_measurements)
         units = np.array([unit for _, unit in self.keys])
         own = sum(name not in REGISTRATION_NAMES for name in self.free.names)  # a place of 0 is as good as any
         warnings = [
