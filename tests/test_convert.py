@@ -23,7 +23,9 @@ OF_STUDY = {
 
 
 @pytest.mark.parametrize("to", SCHEMAS)
-@pytest.mark.parametrize("study", OF_STUDY)
+@pytest.mark.parametrize(
+    "study", [s if s == "blocked-force" else pytest.param(s, marks=pytest.mark.thorough) for s in OF_STUDY]
+)
 def test_every_study_becomes_every_other(
     study: str, to: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -15,7 +15,7 @@ from softnlp.base.errors import InputError, reworded
 from softnlp.base.processes import processors
 from softnlp.base.units import MILLIMETRE
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, interrupt_asked, say
-from softnlp.cli.study import AllErrors, beside, scenario_at
+from softnlp.cli.study import AllErrors, Legend, beside, say_legend, scenario_at
 from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
@@ -38,6 +38,7 @@ def sweep(
     resume: bool = False,
     csv: bool = False,
     all_errors: AllErrors = False,
+    legend: Legend = False,
 ) -> int:
     """Solve every pose of a workspace.
 
@@ -68,6 +69,8 @@ def sweep(
     asked = scenario_at(scenario, all_errors)
     if asked.study != "workspace":
         raise InputError(f"expected a scenario of study 'workspace'; {asked.path} is of study {asked.study!r}")
+    if legend:
+        return say_legend(asked.study)
     folder = out or Path("results") / scenario.stem
     summary = _run(asked, folder, workers=workers or processors(), cluster=cluster, resume=resume, csv=csv)
     return _told(asked, folder, summary)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.files import toml_key, toml_text
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.model.robot import DIMENSIONS, Robot, robot
@@ -119,7 +120,7 @@ def _identify(made: Robot, data: str) -> dict[str, Any]:
     return {
         "stiffening": {"set": "calibrated"},
         "measurements": {"file": data, "free": ["k_e", "k_b", "phi"]},
-        "sigma": {"bending_angle_deg": 10.0},
+        "sigma": {OUTPUTS["bending_angle"].key: 10.0},
     }
 
 
@@ -129,7 +130,7 @@ def _design(made: Robot, data: str) -> dict[str, Any]:
         "choices": {"robot": {"length_mm": [0.8 * length, length]}, "material": {"name": [SILICONE, "Ecoflex 00-30"]}},
         "actuation": {"pressure_bar": 0.5, "sets": [1]},
         "requirements": {"stretch": {"at_most": 1.5}},
-        "objective": {"maximise": "bending_angle_deg"},
+        "objective": {"maximise": OUTPUTS["bending_angle"].key},
     }
 
 
