@@ -267,15 +267,21 @@ _EVERY = (
           ("tip_position", MM, _X), ("bending_angle", DEG, ()), ("tilt", DEG, ()), ("backbone_length", MM, ()),
           ("elongation", MM, ()), ("stretch", ONE, ()), ("chamber_length", MM, _N), ("blocked_force", N, ()))),
     # --- of comparisons and designs
-    Output("elongation", MM),
-    *(Output(f"orientation_{x}", DEG) for x in "xyz"),
-    Output("orientation", DEG, words="turn of the tip from the one measured", short=("turn",)),
-    *(Output(f"tip_{x}", MM, column=x, others=(f"tip_{x}", f"tip_position_{x}")) for x in "xyz"),
-    Output("tip_deflection", MM),
-    Output("chamber_gap", MM),
-    *(Output(name, MM, group="robot") for name in (
-        "outer_diameter", "lumen_diameter", "chamber_circle_diameter", "chamber_diameter", "chamber_wall",
-        "outer_wall", "inner_wall", "wall", "length")),
+    Output("elongation", MM, "length of the deformed axis less that of the robot"),
+    *(Output(f"tip_{x}", MM, f"{x} of the tip position", column=x, others=(f"tip_{x}", f"tip_position_{x}"))
+      for x in "xyz"),
+    *(Output(f"orientation_{x}", DEG, f"{x} of the tip's turn from the one measured, as a rotation vector")
+      for x in "xyz"),
+    Output("orientation", DEG, "turn of the tip from the one measured", words="turn of the tip from the one measured",
+           short=("turn",)),
+    Output("tip_deflection", MM, "distance of the tip from the z axis"),
+    Output("chamber_gap", MM, "smallest gap between neighbouring reinforced chambers under pressure"),
+    *(Output(name, MM, meaning, group="robot") for name, meaning in (
+        ("outer_diameter", "outer diameter of the robot"), ("lumen_diameter", "diameter of its central hole"),
+        ("chamber_circle_diameter", "diameter of the circle of the chambers' centres"),
+        ("chamber_diameter", "diameter of a chamber's bore"), ("chamber_wall", "silicone between bore and thread"),
+        ("outer_wall", "silicone between threads and surface"), ("inner_wall", "silicone between threads and lumen"),
+        ("wall", "what Eq. (1) leaves of wall"), ("length", "length without pressure"))),
 )  # fmt: skip
 
 OUTPUTS: dict[str, Output] = {output.name: output for output in _EVERY}
@@ -293,6 +299,91 @@ TABLES: dict[str, tuple[str, ...]] = {
     "page, chambers": ("chamber_length", "chamber_reaction"),
 }
 """The outputs that each table shows of a step, on the terminal by study and on the page."""
+
+
+SYMBOLS: dict[str, str] = {
+    **{"pressure": "P", "t": "t", "stretch": "lambda", "tip_position": "p(L)", "tip_rotation": "R(L)"},
+    **{
+        "chamber_length": "L_i",
+        "blocked_force": "F_b",
+        "chamber_reaction": "T_i",
+        "tip_cap": "L_t",
+        "length_error": "e_L",
+    },
+    **{"outer_radius": "r_r", "lumen_radius": "r_i", "chamber_circle_radius": "r_cp", "chamber_radius": "r_co"},
+    **{"bore_radius": "r_ci", "arc": "s/L", "position": "p", "rotation": "R", "force": "n", "moment": "m"},
+    **{"shear_extension": "v", "curvature": "u", "outer_diameter": "D_r", "lumen_diameter": "D_i", "length": "L_0"},
+    **{"chamber_circle_diameter": "D_cp", "chamber_diameter": "D_c", "chamber_wall": "delta_c"},
+    **{"wall": "delta_c + delta_r", "outer_wall": "delta_r"},
+}
+"""The paper's letter of an output, by name."""
+
+WORDS: dict[str, tuple[str, str]] = {
+    "step": ("", "number of the step, from 1"),
+    "status": ("", "how the step ended; solved is a solution"),
+    "candidate": ("", "the choices of a candidate"),
+    "variant": ("", "law, coefficients, conventions and closure that were compared"),
+    "count": ("", "rows that were compared"),
+    "rmse": ("of the number", "root mean square of the errors"),
+    "mape_%": ("%", "mean size of the errors, of the number measured; of a tip, of the robot's length"),
+    "mean": ("of the number", "mean size of the errors"),
+    "median": ("of the number", "median size of the errors"),
+    "max": ("of the number", "largest size of the errors"),
+    "bias": ("of the number", "mean of the errors with their sign"),
+    "law": ("", "stress-stretch law that was fitted"),
+    "R^2": ("", "share of the stress's variance that the law explains"),
+    "rmse_kPa": ("kPa", "root mean square of law less data"),
+    "mape_percent": ("%", "mean size of law less data, of the data"),
+    "constants": ("of the key", "constants +- one standard error"),
+    "constant": ("of the key", "what was identified"),
+    "value": ("of the key", "its value"),
+    "standard_error": ("of the key", "its standard error; more than the value is not determined"),
+    "start": ("of the key", "where the search began"),
+    "note": ("", "at its bound, or not determined"),
+    "observable": ("", "what was measured"),
+    "unit": ("", "of the next columns"),
+    "numbers": ("", "how many were measured"),
+    "rmse_before": ("of the number", "root mean square of the errors at the start"),
+    "rmse_after": ("of the number", "and with the constants found"),
+    "mape_before_percent": ("%", "mean size of the errors at the start, of the number measured"),
+    "mape_after_percent": ("%", "and with the constants found"),
+    "sigma": ("of the number", "standard deviation that errors were divided by"),
+}
+"""Columns of tables that are no number of a step: unit and meaning."""
+
+LEGENDS: dict[str, tuple[str, ...]] = {
+    **{study: ("step", "t", "pressure", "status", *TABLES[study]) for study in ("forward", "blocked-force", "inverse")},
+    "workspace": (
+        *("pressure", "t", "tip_position", "tip_rotation", "bending_angle", "tilt", "stretch", "backbone_length"),
+        *("chamber_length", "status", "stable", "self_intersecting", "residual", "discretisation_error", "intervals"),
+        *("iterations", "blocked_force", "gap"),
+    ),
+    "identify": (
+        *("law", "status", "R^2", "rmse_kPa", "mape_percent", "constants", "constant", "value", "standard_error"),
+        *("start", "note", "observable", "unit", "numbers", "rmse_before", "rmse_after", "mape_before_percent"),
+        *("mape_after_percent", "sigma"),
+    ),
+    "compare": ("variant", "count", "rmse", "mape_%", "mean", "median", "max", "bias"),
+    "design": (
+        *("candidate", "status", "bending_angle", "blocked_force", "stretch", "elongation", "tip_x", "tip_y", "tip_z"),
+        *("tip_deflection", "chamber_gap", "pressure", *(output.name for output in _EVERY if output.group == "robot")),
+    ),
+}
+"""What the tables of a study may show: outputs by name, and `WORDS`."""
+
+
+def legend(names: Sequence[str]) -> list[list[str]]:
+    """Return a row for each column of a table: its name there, its key in files, unit, symbol and meaning."""
+    rows = []
+    for name in names:
+        if name in WORDS:
+            rows.append([name, name, WORDS[name][0] or "-", "", WORDS[name][1]])
+            continue
+        output = OUTPUTS[name]
+        heading = ", ".join(output.short) if output.short else output.label
+        unit = "-" if output.unit is ONE else str(output.unit)
+        rows.append([heading, output.key, unit, SYMBOLS.get(name, ""), output.meaning])
+    return rows
 
 
 def outputs(*groups: str) -> tuple[Output, ...]:

@@ -71,7 +71,7 @@ def _app() -> App:
         suppress_keyboard_interrupt=False,
         default_parameter=Parameter(negative=()),
     )
-    add(app, "run check workspace sweep inverse sensitivity identify compare design gui mesh example new")
+    add(app, "run check workspace sweep inverse sensitivity identify compare design gui mesh example new convert")
     add(app, "robots materials", "library")
     app.command(import_module("softnlp.cli.importing").import_, name="import")
     plot = App(name="plot", help="Draw a cross-section, silicones, or the results of a run.")

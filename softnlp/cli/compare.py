@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
 from softnlp.cli.report import Report, write_report
-from softnlp.cli.study import AllErrors, Json, require_file, results_folder, scenario_at, show, write_results
+from softnlp.cli.study import (
+    AllErrors,
+    Json,
+    Legend,
+    require_file,
+    results_folder,
+    say_legend,
+    scenario_at,
+    show,
+    write_results,
+)
 from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
@@ -29,6 +39,7 @@ def compare(
     json: Json = False,
     report: Report = None,
     all_errors: AllErrors = False,
+    legend: Legend = False,
 ) -> int:
     """Compare a model with measured tips, bending angles, elongations, tilts or blocked forces.
 
@@ -61,6 +72,8 @@ def compare(
     from softnlp.scenario.compare import Asked, compare_task
 
     asked = scenario_at(scenario, all_errors)
+    if legend:
+        return say_legend("compare")
     task = compare_task(asked, measured, Asked(law, coefficients, conventions, closure, shape))
     folder = results_folder(out, json, f"{scenario.stem}_compare")
     if folder is not None:

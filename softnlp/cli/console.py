@@ -93,13 +93,13 @@ def progress(total: int, title: str) -> Iterator[tuple[Advance, Callable[[], boo
     steps: in the middle of a solve CasADi loses the interrupt or makes another error of it. A second Ctrl-C ends the
     process at once.
     """
-    with _bar(total, title) as (advance, describe), interrupt_asked(describe) as asked:
+    with progress_bar(total, title) as (advance, describe), interrupt_asked(describe) as asked:
         yield advance, asked
 
 
 @contextmanager
-def _bar(total: int, title: str) -> Iterator[tuple[Advance, Callable[[str], None]]]:
-    """Yield what advances the bar and what changes its text."""
+def progress_bar(total: int, title: str) -> Iterator[tuple[Advance, Callable[[str], None]]]:
+    """Show a bar with a fraction and the time left on a terminal; yields what advances it and what changes its text."""
     if not sys.stderr.isatty():
         yield lambda done: None, lambda text: None
         return

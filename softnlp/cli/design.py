@@ -13,9 +13,11 @@ from softnlp.cli.report import Report, write_report
 from softnlp.cli.study import (
     AllErrors,
     Json,
+    Legend,
     Out,
     require_file,
     results_folder,
+    say_legend,
     scenario_for,
     show,
     stepwise,
@@ -40,6 +42,7 @@ def design(
     workers: int | None = None,
     report: Report = None,
     all_errors: AllErrors = False,
+    legend: Legend = False,
 ) -> int:
     """Find the best design of a scenario of study "design".
 
@@ -57,7 +60,7 @@ def design(
     asked = scenario_for(scenario, "design", "expected 'design', got {}; use softnlp run", all_errors)
     if workers is not None and workers < 1:
         raise InputError(f"expected a number of at least 1, got {workers}", key="--workers")
-    return run_study(asked, out, json, report, workers)
+    return say_legend(asked.study) if legend else run_study(asked, out, json, report, workers)
 
 
 def run_study(

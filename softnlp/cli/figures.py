@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softnlp.base.errors import SoftnlpError
-from softnlp.cli.console import complain
+from softnlp.cli.console import complain, progress_bar
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,7 +24,7 @@ def draw(figures: Mapping[Path, Callable[[], Figure]], results: Path | None = No
     written: list[Path] = []
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("default")
-        for path, figure in figures.items():
+        for path, figure in _told(figures):
             try:
                 written.append(_saved(figure, path))
             except SoftnlpError:
@@ -36,6 +36,14 @@ def draw(figures: Mapping[Path, Callable[[], Figure]], results: Path | None = No
                 complain(f"the figure could not be drawn: {path.name}: {type(error).__name__}: {error}{kept}")
     _say_warnings([w.message for w in heard])
     return written
+
+
+def _told(figures: Mapping[Path, Callable[[], Figure]]) -> Iterator[tuple[Path, Callable[[], Figure]]]:
+    """Yield figures with a progress bar."""
+    with progress_bar(len(figures), "figures") as (advance, _):
+        for k, item in enumerate(figures.items()):
+            advance(k)
+            yield item
 
 
 def _saved(figure: Callable[[], Figure], path: Path) -> Path:

@@ -11,10 +11,12 @@ from softnlp.cli.report import Report, library_section, write_report
 from softnlp.cli.study import (
     AllErrors,
     Json,
+    Legend,
     Out,
     Stopped,
     require_file,
     results_folder,
+    say_legend,
     scenario_for,
     show,
     write_results,
@@ -32,7 +34,14 @@ _GUESS = 40  # evaluations; nobody knows how many there will be
 
 
 def identify(
-    scenario: Path, /, *, out: Out = None, json: Json = False, report: Report = None, all_errors: AllErrors = False
+    scenario: Path,
+    /,
+    *,
+    out: Out = None,
+    json: Json = False,
+    report: Report = None,
+    all_errors: AllErrors = False,
+    legend: Legend = False,
 ) -> int:
     """Find constants from a tensile test or from measurements of robots, as a scenario of study "identify" asks.
 
@@ -47,7 +56,7 @@ def identify(
         TOML file; docs/identify.md lists what it may hold.
     """
     asked = scenario_for(scenario, "identify", "expected 'identify', got {}; softnlp run runs it", all_errors)
-    return run_study(asked, out, json, report)
+    return say_legend(asked.study) if legend else run_study(asked, out, json, report)
 
 
 def run_study(asked: Scenario, out: Path | None, json: bool, report: Path | None = None) -> int:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from softnlp.cli.run import run_steps
-from softnlp.cli.study import AllErrors, Json, Out, scenario_for
+from softnlp.cli.study import AllErrors, Json, Legend, Out, say_legend, scenario_for
 
 
-def inverse(scenario: Path, /, *, out: Out = None, json: Json = False, all_errors: AllErrors = False) -> int:
+def inverse(
+    scenario: Path, /, *, out: Out = None, json: Json = False, all_errors: AllErrors = False, legend: Legend = False
+) -> int:
     """Find the pressures that bring the tip to the targets of a scenario file of study "inverse", in order.
 
     What `softnlp run` does with it, refusing other studies. A target that no pressure within the bounds reaches has
@@ -20,4 +22,5 @@ def inverse(scenario: Path, /, *, out: Out = None, json: Json = False, all_error
     scenario
         TOML file; docs/inverse.md lists what it may hold.
     """
-    return run_steps(scenario_for(scenario, "inverse", "expected study 'inverse', got {}", all_errors), out, json)
+    asked = scenario_for(scenario, "inverse", "expected study 'inverse', got {}", all_errors)
+    return say_legend(asked.study) if legend else run_steps(asked, out, json)

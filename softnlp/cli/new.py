@@ -27,32 +27,39 @@ def new(study: str, /, *, robot: str = "D25L60", out: Path | None = None, force:
     force
         Replace files that are there.
     """
-    from softnlp.scenario.check import SCHEMAS
     from softnlp.scenario.template import MEASURED, template
 
-    if study not in SCHEMAS:
-        raise InputError(f"expected {choices(SCHEMAS)}, got {study!r}{did_you_mean(study, SCHEMAS)}", key="STUDY")
+    require_study(study, "STUDY")
     target = out or Path(f"{study}.toml")
     require_file(target)
-    data = target.with_name(f"{target.stem}_{MEASURED}")
-    text = template(study, robot, data.name)
+    data = f"{target.stem}_{MEASURED}"
+    write_begun(target, template(study, robot, data), data, study, force)
+
+
+def require_study(study: str, key: str) -> None:
+    """Refuse a word that is no study."""
+    from softnlp.scenario.check import SCHEMAS
+
+    if study not in SCHEMAS:
+        raise InputError(f"expected {choices(SCHEMAS)}, got {study!r}{did_you_mean(study, SCHEMAS)}", key=key)
+
+
+def write_begun(target: Path, text: str, data: str, study: str, force: bool) -> None:
+    """Write a scenario, with the shipped measurements beside it where it names them as `data`, and say so.
+
+    Nothing is written where one of the files is there already and `force` is not given.
+    """
+    from softnlp.base.files import make_folder, write_whole
+    from softnlp.scenario.template import MEASURED
+
     contents = {target: text.encode()}
-    if data.name in text:
-        contents[data] = (shipped_folder() / "files" / MEASURED).read_bytes()
-    write_new(contents, force)
-    for path in contents:
-        say(f"wrote {path}")
-    say(f"softnlp {'sweep' if study == 'workspace' else 'run'} {target}")
-
-
-def write_new(contents: dict[Path, bytes], force: bool) -> None:
-    """Write files; refuses all of them where one is there already and `force` is not given."""
-    from softnlp.base.files import write_whole
-
+    if f'"{data}"' in text:
+        contents[target.with_name(data)] = (shipped_folder() / "files" / MEASURED).read_bytes()
     for path in contents:
         require_file(path)
         if path.exists() and not force:
             raise InputError("there is such a file already; --force replaces it", source=str(path))
+    make_folder(target.parent)
     for path, content in contents.items():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, content)
+        say(f"wrote {write_whole(path, content)}")
+    say(f"softnlp {'sweep' if study == 'workspace' else 'run'} {target}")

@@ -15,9 +15,11 @@ from softnlp.cli.report import Report, write_report
 from softnlp.cli.study import (
     AllErrors,
     Json,
+    Legend,
     Out,
     require_file,
     results_folder,
+    say_legend,
     scenario_at,
     show,
     stepwise,
@@ -51,6 +53,7 @@ def run(
     ipopt_log: bool = False,
     report: Report = None,
     all_errors: AllErrors = False,
+    legend: Legend = False,
 ) -> int:
     """Solve every step of a scenario file in order, each started from the last.
 
@@ -68,6 +71,8 @@ def run(
         Print the log of IPOPT on standard error.
     """
     asked = scenario_at(scenario, all_errors)
+    if legend:
+        return say_legend(asked.study)
     if ipopt_log:
         asked = _with_log(asked)
     _require_branches(asked, branches)

@@ -61,7 +61,7 @@ def sensitivity(
     pressure = asked.pressures[chosen - 1]
     model = (asked.robot, asked.material, asked.coefficients)
     tolerances = named_tolerances(tolerance, *model, pressure)
-    with progress(samples if tolerances else 0, asked.title) as (advance, _):
+    with progress(max(samples, 1) if tolerances else 1, asked.title) as (advance, _):
         report = sensitivity_report(
             asked.robot,
             asked.material,

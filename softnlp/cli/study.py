@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from cyclopts import Parameter
 
 from softnlp.base.errors import InputError, SoftnlpError
-from softnlp.cli.console import STOPPED, complain, progress, say
+from softnlp.cli.console import SOLVED, STOPPED, complain, progress, say, say_rows
 from softnlp.cli.figures import draw
 
 if TYPE_CHECKING:
@@ -26,7 +26,18 @@ _OUT = "Folder for the results; by default results/NAME, where NAME is that of t
 _JSON = "Print one JSON document and nothing else; no files are written unless --out is given."
 Out = Annotated[Path | None, Parameter(help=_OUT)]
 Json = Annotated[bool, Parameter(help=_JSON)]
+Legend = Annotated[
+    bool, Parameter(help="Print what each column of the tables is, with unit and symbol; solve nothing.")
+]
 AllErrors = Annotated[bool, Parameter(help="Print every mistake of the scenario on a line of its own.")]
+
+
+def say_legend(study: str) -> int:
+    """Print what each column of a study's tables is; return the exit status."""
+    from softnlp.base.columns import LEGENDS, legend
+
+    say_rows(["column", "key", "unit", "symbol", "meaning"], legend(LEGENDS[study]))
+    return SOLVED
 
 
 class AllMistakes(SoftnlpError):

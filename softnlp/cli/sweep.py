@@ -15,14 +15,19 @@ from softnlp.base.errors import InputError, reworded
 from softnlp.base.processes import processors
 from softnlp.base.units import MILLIMETRE
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, interrupt_asked, say
-from softnlp.cli.study import AllErrors, beside, scenario_at
+from softnlp.cli.study import AllErrors, Legend, beside, say_legend, scenario_at
 from softnlp.model.gravity import gravity_lines
+from softnlp.native.jit import can_compile, why_interpreted
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from softnlp.scenario.read import Scenario
     from softnlp.sweep.run import SweepProgress, SweepSummary
+
+SLOWER = "10 to 20"
+"""What poses that are solved together take without compiled code, of the time with it."""
+COMPILING = f"building compiled code, under a second in each process; poses are then {SLOWER} times as fast"
 
 _OPTIONS = {"resume=True": "--resume", "another folder leaves": "another --out leaves", "executor=": "--cluster"}
 """What `softnlp.run_sweep` advises, as options."""
@@ -38,6 +43,7 @@ def sweep(
     resume: bool = False,
     csv: bool = False,
     all_errors: AllErrors = False,
+    legend: Legend = False,
 ) -> int:
     """Solve every pose of a workspace.
 
@@ -68,6 +74,8 @@ def sweep(
     asked = scenario_at(scenario, all_errors)
     if asked.study != "workspace":
         raise InputError(f"expected a scenario of study 'workspace'; {asked.path} is of study {asked.study!r}")
+    if legend:
+        return say_legend(asked.study)
     folder = out or Path("results") / scenario.stem
     summary = _run(asked, folder, workers=workers or processors(), cluster=cluster, resume=resume, csv=csv)
     return _told(asked, folder, summary)
@@ -99,9 +107,14 @@ def _run(
     from softnlp.scenario.workspace import run_sweep
     from softnlp.sweep.pool import cluster_executor
 
+    together = asked.numerics.engine != "ipopt" and asked.numerics.transcription == "multiple-shooting"
+    if together and cluster is None and (why := why_interpreted()):
+        complain(f"warning: no compiled code ({why}): the same numbers, some {SLOWER} times slower")
     with ExitStack() as stack:
         executor: Executor | None = None if cluster is None else stack.enter_context(cluster_executor(cluster))
-        bar = stack.enter_context(_Bar(asked.title))
+        bar = stack.enter_context(
+            _Bar(asked.title, COMPILING if together and cluster is None and can_compile() else "")
+        )
         stop = stack.enter_context(interrupt_asked(bar.stopping))
         stack.enter_context(reworded(_OPTIONS))
         summary = run_sweep(
@@ -185,8 +198,10 @@ def _document(asked: Scenario, folder: Path, summary: SweepSummary, *, kept: boo
 class _Bar(ExitStack):
     """A progress bar on a terminal, which begins with the first news: no thread may run when processes are forked."""
 
-    def __init__(self, title: str) -> None:
+    def __init__(self, title: str, first: str = "") -> None:
+        """Take the title, and what is said until the first poses are there."""
         super().__init__()
+        self._first = first
         self._title = title
         self._shown: Any = None
         self._task: Any = None
@@ -205,7 +220,7 @@ class _Bar(ExitStack):
             completed=news.done,
             failed=f"{news.failed} failed" if news.failed else "",
             rate=f"{rate:.0f} poses/s",
-            description=self._note or None,
+            description=self._note or (self._first if news.done == news.already < news.poses else ""),
         )
 
     def stopping(self, _: str) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, MILLIMETRE
-from softnlp.cli.console import SOLVED, SOME_UNSOLVED, aligned, progress, say
+from softnlp.cli.console import SOLVED, SOME_UNSOLVED, aligned, progress, progress_bar, say
 from softnlp.cli.figures import draw
 from softnlp.model.gravity import gravity_lines
 
@@ -78,11 +78,12 @@ def workspace(
     found = load_workspace(results)
     read_column(found, colour)  # refused before anything is written
     compared = None if against is None else _compared(found, against, within_bar)
-    summary = summarise(
-        found,
-        radius=None if radius_mm is None else radius_mm * MILLIMETRE,
-        voxel=None if voxel_mm is None else voxel_mm * MILLIMETRE,
-    )
+    with progress_bar(1, f"{found.title}: reach, volume, dexterity"):
+        summary = summarise(
+            found,
+            radius=None if radius_mm is None else radius_mm * MILLIMETRE,
+            voxel=None if voxel_mm is None else voxel_mm * MILLIMETRE,
+        )
     cloud, others = _places(found, out)
     rows = list(_summary_rows(found, summary))
     width = max(len(name) for name, _ in rows)

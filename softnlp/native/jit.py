@@ -31,13 +31,20 @@ class Machine:
 
 def can_compile() -> bool:
     """Whether there is something to compile with, and SOFTNLP_COMPILE is not 0."""
+    return not why_interpreted()
+
+
+def why_interpreted() -> str:
+    """Return why nothing is compiled, "" where it is."""
     if os.environ.get("SOFTNLP_COMPILE") == "0":
-        return False
+        return "SOFTNLP_COMPILE is 0"
     try:
         import llvmlite.binding  # noqa: F401
-    except (ImportError, OSError):  # no wheel for this machine, or one that does not load
-        return False
-    return True
+    except ImportError:
+        return "llvmlite is not installed"
+    except OSError as error:  # a wheel that does not load
+        return f"llvmlite cannot be loaded: {error}"
+    return ""
 
 
 @lru_cache(maxsize=MOST_KEPT)

@@ -142,7 +142,7 @@ class RequirementsTable(optional_keys(dict.fromkeys(_BY_FILE_KEY, LimitsTable)))
 class ObjectiveTable(Table):
     """[objective]: exactly one of maximise, minimise.
 
-    maximise : an output of the list of [requirements]; as in "bending_angle_deg"
+    maximise : an output of the list of [requirements]; as in "stretch"
     minimise : or this; as in "pressure_bar"
     starts : first guesses of each optimisation; by default 4, or 2 for one free number; as in 4
     trials : of the search, where there are more than 5000 combinations

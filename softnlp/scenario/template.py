@@ -31,7 +31,7 @@ def template(study: str, name: str = "D25L60", data: str = MEASURED) -> str:
         When there is no such robot.
     """
     made = robot(name)
-    begun = _begun(study, made, data)
+    values = begun(study, made, data)
     lines = [
         f"# A scenario of study {study!r}: what stands here without # in front runs as it is.",
         "# Take the # away from what you need; a table needs its [name] too. docs/scenario.md says more.",
@@ -42,15 +42,14 @@ def template(study: str, name: str = "D25L60", data: str = MEASURED) -> str:
         if key.table is None:
             lines.append(_line(f"{key.name} = {toml_text(head[key.name])}", key.comment))
         else:
-            lines += ["", *table_lines(key, begun.get(key.name), examples(made))]
+            lines += ["", *table_lines(key, values.get(key.name), examples(made))]
     return "\n".join(lines) + "\n"
 
 
-def example_table(study: str, table: str, made: Robot) -> str | None:
-    """Return one table of `template`, None where that leaves it out."""
-    values = _begun(study, made, MEASURED)
+def example_table(study: str, table: str, made: Robot, data: str) -> str:
+    """Return one table of `template`."""
     key = next(key for key in keys_of(SCHEMAS[study]) if key.name == table)
-    return "\n".join(table_lines(key, values[table], examples(made))) if table in values else None
+    return "\n".join(table_lines(key, begun(study, made, data)[table], examples(made)))
 
 
 def examples(made: Robot) -> dict[str, str]:
@@ -96,8 +95,8 @@ def _line(text: str, comment: str) -> str:
     return f"{text.ljust(_WIDTH)}  # {comment}" if comment else text
 
 
-def _begun(study: str, made: Robot, data: str) -> dict[str, Any]:
-    """Return the values of the tables that a scenario begins with."""
+def begun(study: str, made: Robot, data: str) -> dict[str, Any]:
+    """Return the values of the tables that a scenario of a study begins with."""
     return {"robot": {"name": made.name}, "material": {"name": SILICONE, "model": LAW}, **_BEGUN[study](made, data)}
 
 
