@@ -86,6 +86,8 @@ def test_free_holes_leave_uniaxial_stress() -> None:
     assert balance.force == pytest.approx(area * material("Ecoflex 00-50").engineering_stress(1.5), rel=1e-9)
     with pytest.raises(RingError, match="no ring"):
         ring_response(free)
+    with pytest.raises(RingError, match=r"around 1, got 1\.1 to 2"):
+        ring_response(section, (1.1, 2.0))
 
 
 def test_refinement_changes_little(sector: Equilibrium) -> None:
@@ -137,6 +139,8 @@ def test_half_a_section_bends_as_the_whole() -> None:
         assert at.moment[0] > 0
         energies.append((1 + mirrors) * np.array([at.energy - straight, straight]))
     assert energies[0] == pytest.approx(energies[1], rel=2e-3)
+    half = response_on(section, equilibrium.mesh, (0.95, 1.1), count=4)
+    assert [half.arms[ring](1.1) for ring, _ in half.chambers] == pytest.approx([half.arms[0](1.1)] * 3, abs=2e-3)
 
 
 def test_a_force_on_a_ring_does_the_work_that_the_energy_gains() -> None:

@@ -19,7 +19,7 @@ from softnlp.rings.elements import elements
 from softnlp.rings.energy import PlaneEnergy
 from softnlp.rings.freedom import Freedom
 from softnlp.rings.mesher import Mesh
-from softnlp.rings.outline import Array, PlaneSection
+from softnlp.rings.outline import Array, PlaneSection, RingError
 
 TOLERANCE = 1e-10  # of the largest residual, against modulus times size
 _STEPS = 10  # of Newton's method
@@ -71,6 +71,8 @@ class Equilibrium:
     def __init__(self, section: PlaneSection, mesh: Mesh, energy: PlaneEnergy) -> None:
         self.mesh, self.law = mesh, energy
         self.elements = elements(mesh)
+        if not self.elements.weight.min() > 0:
+            raise RingError("the mesh of the section is too coarse for its curved outlines: take more layers")
         self.freedom = Freedom(section, mesh)
         self._size = section.outer.area**0.5
         _, w_T, _, w_TT, _, w_ll = (float(d[0]) for d in energy.derivatives(np.array([2.0]), np.array([1.0])))
