@@ -86,6 +86,8 @@ def test_free_holes_leave_uniaxial_stress() -> None:
     assert balance.force == pytest.approx(area * material("Ecoflex 00-50").engineering_stress(1.5), rel=1e-9)
     with pytest.raises(RingError, match="no ring"):
         ring_response(free)
+    with pytest.raises(RingError, match=r"around 1, got 1\.1 to 2"):
+        ring_response(section, (1.1, 2.0))
 
 
 def test_refinement_changes_little(sector: Equilibrium) -> None:
@@ -117,13 +119,40 @@ def test_force_and_moment_are_derivatives_of_the_energy(sector: Equilibrium) -> 
 def test_the_sector_stands_for_the_whole_section() -> None:
     """Rings that turn and, of three chambers a set, one on a mirror line; the whole in the order of the robot."""
     made = replace(robot("laparoscope-9"), chamber_sets=2)
-    sections = of_robot(made), of_robot(made, whole=True)
+    sections = of_robot(made), of_robot(made, mirrors=0)
     part, whole = (response_on(s, mesh(s, 1.5), (0.9, 1.25), count=4) for s in sections)
     assert len(whole.arms) == made.chambers == len(part.chambers)
     assert whole.shear(1.25) == pytest.approx(part.shear(1.25), rel=2e-3)
     cast = [(float(x), float(y)) for x, y in made.chamber_centres()]
     assert np.array(whole.centres(cast, 1.25)) == pytest.approx(np.array(part.centres(cast, 1.25)), abs=2e-6)
     assert whole.circle_ratio(1.25) == pytest.approx(part.circle_ratio(1.25), rel=2e-4)
+
+
+def test_half_a_section_bends_as_the_whole() -> None:
+    """Both keep the ring on the x axis in its place, so that their curvatures are about the same line."""
+    energies = []
+    for mirrors in (0, 1):
+        section = of_robot(robot("laparoscope-3"), mirrors)
+        equilibrium = Equilibrium(section, mesh(section, 1.5), ECOFLEX)
+        at = equilibrium.solve(follow(equilibrium, equilibrium.rest(), 1.1), 1.1, (30.0, 0.0))
+        straight = equilibrium.solve(at, 1.1).energy
+        assert at.moment[0] > 0
+        energies.append((1 + mirrors) * np.array([at.energy - straight, straight]))
+    assert energies[0] == pytest.approx(energies[1], rel=2e-3)
+    half = response_on(section, equilibrium.mesh, (0.95, 1.1), count=4)
+    assert [half.arms[ring](1.1) for ring, _ in half.chambers] == pytest.approx([half.arms[0](1.1)] * 3, abs=2e-3)
+
+
+def test_a_force_on_a_ring_does_the_work_that_the_energy_gains() -> None:
+    section = PlaneSection(Circle(0, 0, 5e-3), (Circle(-2.5e-3, 0, 1.2e-3), Circle(2e-3, 0.5e-3, 1.5e-3)))
+    equilibrium = Equilibrium(section, mesh(section, 1.5), ECOFLEX)
+    at = equilibrium.solve(equilibrium.rest(), 1.05)
+    force, h = np.array([[0.0, 0.0], [8.0, -4.0]]), 0.05
+    low, high = (equilibrium.solve(at, 1.05, forces=force * (1 + side)) for side in (-h, h))
+    moved = high.rings[1, :2] - low.rings[1, :2]
+    assert moved @ force[1] > 0
+    assert high.energy - low.energy == pytest.approx(force[1] @ moved, rel=1e-3)
+    assert (high.rings[0] == low.rings[0]).all()
 
 
 @pytest.mark.parametrize("model", ["mooney-rivlin", "yeoh", "ogden", "linear"])

@@ -19,7 +19,7 @@ from softnlp.rings.elements import elements
 from softnlp.rings.energy import PlaneEnergy
 from softnlp.rings.freedom import Freedom
 from softnlp.rings.mesher import Mesh
-from softnlp.rings.outline import Array, PlaneSection
+from softnlp.rings.outline import Array, PlaneSection, RingError
 
 TOLERANCE = 1e-10  # of the largest residual, against modulus times size
 _STEPS = 10  # of Newton's method
@@ -71,6 +71,8 @@ class Equilibrium:
     def __init__(self, section: PlaneSection, mesh: Mesh, energy: PlaneEnergy) -> None:
         self.mesh, self.law = mesh, energy
         self.elements = elements(mesh)
+        if not self.elements.weight.min() > 0:
+            raise RingError("the mesh of the section is too coarse for its curved outlines: take more layers")
         self.freedom = Freedom(section, mesh)
         self._size = section.outer.area**0.5
         _, w_T, _, w_TT, _, w_ll = (float(d[0]) for d in energy.derivatives(np.array([2.0]), np.array([1.0])))
@@ -88,8 +90,12 @@ class Equilibrium:
         free, lu = self._factored(residual, matrix, rings)
         return self._balance(1.0, np.zeros(2), self.mesh.nodes, pressures, rings, free, lu, by_stretch)
 
-    def solve(self, guess: Balance, stretch: float, curvature: Sequence[float] = (0.0, 0.0)) -> Balance:
+    def solve(
+        self, guess: Balance, stretch: float, curvature: Sequence[float] = (0.0, 0.0), forces: Array | None = None
+    ) -> Balance:
         """Return the equilibrium at a stretch and curvature, near a guess, which is led on along its slope.
+
+        forces : (k, 2) in the plane, on each ring, per length as cast [N/m].
 
         Raises
         ------
@@ -99,11 +105,12 @@ class Equilibrium:
         kappa = np.array(curvature, float)
         step = guess.slope * (stretch - guess.stretch)
         state = self.freedom.moved(guess.places, guess.pressures, guess.rings, step)
+        pushed = self.freedom.pushed(np.zeros((len(guess.rings), 2)) if forces is None else forces)
         free = lu = None
         for _ in range(_STEPS):
             residual, matrix, by_stretch = self._assembled(stretch, kappa, *state[:2])
             columns = self._units[:, None] * self.freedom.columns(state[2])
-            right = columns.T @ residual
+            right = columns.T @ residual - pushed
             error = float(np.abs(right).max()) / (self._modulus * self._size)
             if error < TOLERANCE and lu is not None:
                 return self._balance(stretch, kappa, *state, free, lu, by_stretch)
@@ -112,6 +119,12 @@ class Equilibrium:
             free, lu = self._factored(residual, matrix, state[2])
             state = self.freedom.moved(*state, -self._scaled(lu.solve(right)))
         raise Failed
+
+    def densities(self, balance: Balance) -> Array:
+        """Return the (m,) mean energy density of each triangle [Pa]."""
+        *_, (w, *_) = self._fields(balance.stretch, balance.curvature, balance.places, balance.pressures)
+        weight = self.elements.weight
+        return np.asarray((weight * w).sum(axis=1) / weight.sum(axis=1))
 
     def _scaled(self, step: Array) -> Array:
         """Return a step of the free unknowns in their units [m, rad, Pa]."""

@@ -34,13 +34,17 @@ class Freedom:
         for loop in (loop for loop in loops if loop in mesh.sides):
             nodes, centre = mesh.sides[loop], np.array(section.loops[loop].centre)
             on = [line for side, line in lines.items() if np.intersect1d(nodes, mesh.sides[side]).size]
-            if section.mirrors:
-                along = np.array(on) if len(on) == 1 else np.zeros((0, 2)) if on else _PLANE
-                self.rings.append((nodes, centre, along, not on))
+            if section.mirrors == 1 and not self.rings:  # the first ring stays where it is along the only line
+                self.rings.append((nodes, centre, _PLANE[:0] if on else _PLANE[1:], not on))
+            elif section.mirrors:
+                along = np.array(on[:1]) if len(on) == 1 or section.mirrors == 1 else _PLANE[:0]
+                self.rings.append((nodes, centre, along if on else _PLANE, not on))
             else:  # the first ring of a whole section rests, so that the section does
                 first = not self.rings
                 self.rings.append((nodes, centre, _PLANE[:0] if first else _PLANE, not first))
         ways: dict[int, Array] = {int(node): line[None] for side, line in lines.items() for node in mesh.sides[side]}
+        if section.mirrors == 1 and not self.rings:
+            ways[int(mesh.sides[-1][0])] = _PLANE[:0]
         if not section.mirrors and not self.rings:  # one node rests and a far one moves on the line to it
             far = int(((mesh.nodes[: mesh.corners] - mesh.nodes[0]) ** 2).sum(axis=1).argmax())
             ways |= {0: _PLANE[:0], far: (mesh.nodes[far] - mesh.nodes[0])[None]}
@@ -78,6 +82,13 @@ class Freedom:
             found += [0.0] * len(directions)
             if turns:
                 found.append(-float((arm * force[nodes]).sum()))
+        return np.concatenate([np.zeros(self._nodal.shape[1]), found, np.zeros(self._mesh.corners)])
+
+    def pushed(self, forces: Array) -> Array:
+        """Return what forces in the plane on each ring (k, 2) do along the free unknowns."""
+        found: list[float] = []
+        for force, (_, _, directions, turns) in zip(forces, self.rings, strict=True):
+            found += [*(directions @ force), *([0.0] if turns else [])]
         return np.concatenate([np.zeros(self._nodal.shape[1]), found, np.zeros(self._mesh.corners)])
 
     def moved(self, places: Array, pressures: Array, rings: Array, step: Array) -> tuple[Array, Array, Array]:

@@ -173,20 +173,21 @@ def _bars(triangles: Indices) -> Indices:
 def _open_corners(triangles: Indices, border: set[frozenset[int]], points: Array) -> Indices:
     """Return the triangles with those that have two edges on the border split: both held, they would lock."""
     rows = [tuple(int(k) for k in row) for row in triangles]
-    owner = {frozenset(pair): [] for row in rows for pair in zip(row, (*row[1:], row[0]), strict=True)}  # type: ignore[var-annotated]
-    for index, row in enumerate(rows):
-        for pair in zip(row, (*row[1:], row[0]), strict=True):
-            owner[frozenset(pair)].append(index)
+    owners: dict[frozenset[int], list[int]] = {}
     for index, row in enumerate(rows):
         for turn in range(3):
-            b, c, a = row[turn], row[(turn + 1) % 3], row[(turn + 2) % 3]
-            if frozenset((a, b)) in border and frozenset((b, c)) in border and len(owner[frozenset((c, a))]) == 2:
-                other = next(k for k in owner[frozenset((c, a))] if k != index)
+            owners.setdefault(frozenset((row[turn], row[turn - 1])), []).append(index)
+    changed: set[int] = set()  # their edges are others now
+    for index, row in enumerate(rows):
+        for a, b, c in (row, (*row[1:], row[0]), (row[2], *row[:2])):
+            sides = frozenset((a, b)), frozenset((b, c))
+            pair = owners[frozenset((c, a))] if index not in changed else []
+            if border.issuperset(sides) and len(pair) == 2 and not changed.intersection(pair):
+                other = next(k for k in pair if k != index)
                 d = next(k for k in rows[other] if k not in (a, c))
-                new = np.array([(a, b, d), (b, c, d)])
-                if (_twice_area(points, new) > 0).all():
+                if (_twice_area(points, np.array([(a, b, d), (b, c, d)])) > 0).all():
                     rows[index], rows[other] = (a, b, d), (b, c, d)
-                break
+                    changed.update(pair)
     return np.array(rows, np.int64)
 
 

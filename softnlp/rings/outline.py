@@ -214,8 +214,11 @@ class PlaneSection:
             if not isinstance(loop, Circle):
                 raise RingError("a sector needs circles: set mirrors = 0")
             distance, angle = hypot(loop.x, loop.y), atan2(loop.y, loop.x)
-            on = [distance < 1e-9 * loop.radius or abs(sin(angle - side)) * distance < 1e-9 for side in (0.0, high)]
-            if distance < 1e-9 * loop.radius:
+            middle = distance < 1e-9 * loop.radius
+            near = 1e-9 * self.outer.radius if isinstance(self.outer, Circle) else 0.0
+            turns = (angle, angle - high)
+            on = [middle or (cos(turn) > 0 and abs(sin(turn)) * distance < near) for turn in turns]
+            if middle:
                 yield k, [Arc(0.0, 0.0, loop.radius, 0.0, high)]
             elif -1e-9 < angle < high + 1e-9:
                 if not any(on):
@@ -246,16 +249,16 @@ class PlaneSection:
                 x, y = loop.centre
                 distance, angle = hypot(x, y), atan2(y, x)
                 assert isinstance(loop, Circle)
-                for turned in (-angle, 2 * high - angle):
+                for turned in (-angle, 2 * high - angle)[: 1 if self.mirrors == 1 else 2]:
                     if abs(sin(turned - angle)) * distance > 1e-9:
                         near.append(Circle(distance * cos(turned), distance * sin(turned), loop.radius))
         return near
 
 
-def of_robot(robot: Robot, whole: bool = False) -> PlaneSection:
+def of_robot(robot: Robot, mirrors: int | None = None) -> PlaneSection:
     """Return the section of a robot of numbers: rings of r_co around its chambers, a free lumen and surface.
 
-    whole : all of it, where otherwise the sector between two mirror lines of the layout is taken.
+    mirrors : as of `PlaneSection`; those of the layout, one for each set, where it is not given.
 
     Raises
     ------
@@ -264,9 +267,9 @@ def of_robot(robot: Robot, whole: bool = False) -> PlaneSection:
     """
     r_r, r_i, r_co = float(robot.outer_radius), float(robot.lumen_radius), float(robot.chamber_radius)
     centres = [(float(x), float(y)) for x, y in robot.chamber_centres()]
-    mirrors = 0 if whole else robot.chamber_sets
-    if mirrors:  # those of set 1 above the x axis: the sector's other line lies between the sets
-        centres = [(x, abs(y) if abs(y) > 1e-9 else 0.0) for x, y in centres if y > -1e-9 and x > 0]
+    mirrors = robot.chamber_sets if mirrors is None else mirrors
+    if mirrors:  # set 1 is centred on the x axis, and the sector's other line lies between two sets
+        centres = [(x, abs(y) if abs(y) > 1e-9 else 0.0) for x, y in centres if y > -1e-9]
         centres = [(x, y) for x, y in centres if atan2(y, x) < pi / mirrors + 1e-9]
     section = PlaneSection(
         Circle(0.0, 0.0, r_r),

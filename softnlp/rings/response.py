@@ -47,7 +47,8 @@ class RingResponse:
     turns
         By what the direction of each ring's centre turns, over ln(lambda) [rad].
     chambers
-        For each ring of the whole section: which of these it is, and 1 or, as a mirror image, -1.
+        For each ring of the whole section: which of these it is, and 1 or, as a mirror image, -1. Rings of a sector
+        and of its images are counted counter-clockwise from the first image: as a robot's chambers are.
     """
 
     low: float
@@ -150,6 +151,8 @@ def response_on(
     """Return the response of a section on a mesh of it, from `count` stretches."""
     if not (section.rings or section.outer_ring):
         raise RingError("the section has no ring: its stress is uniaxial")
+    if not 0 < stretches[0] < 1 < stretches[1]:
+        raise RingError(f"expected a range of stretch around 1, got {stretches[0]:g} to {stretches[1]:g}")
     # At one stretch everywhere the plane deformation of neo-Hookean is that of Mooney-Rivlin, and nearly that of all.
     equilibrium = Equilibrium(section, on, mooney_rivlin(1.0, 0.0))
     wanted = nodes(*stretches, count)
@@ -218,13 +221,15 @@ def _branch(equilibrium: Equilibrium, rest: Balance, wanted: Array) -> tuple[lis
 def _centres(equilibrium: Equilibrium, balance: Balance, section: PlaneSection) -> Array:
     """Return (rings, 2) centres; of a whole section with its middle and its mean direction where they were."""
     centres = balance.rings[:, :2]
-    if section.mirrors:
+    if section.mirrors > 1:
         return centres
     el, triangles = equilibrium.elements, equilibrium.mesh.triangles
     both = (equilibrium.mesh.nodes, balance.places)
     X, x = (np.einsum("qn,mni->mqi", el.shape, places[triangles]).reshape(-1, 2) for places in both)
     weight = el.weight.ravel() / el.weight.sum()
     cast, now = weight @ X, weight @ x
+    if section.mirrors:  # half a section moves along its only line
+        return np.asarray(centres + (cast * balance.stretch**-0.5 - now) * [1, 0])
     X, x = X - cast, x - now
     turn = -atan2(float(weight @ (X[:, 0] * x[:, 1] - X[:, 1] * x[:, 0])), float(weight @ (X * x).sum(axis=1)))
     rotation = np.array([[cos(turn), -sin(turn)], [sin(turn), cos(turn)]])
