@@ -12,9 +12,12 @@ from softnlp.batch.plan import Plan
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model, with_symbols
 from softnlp.model.rod import Loads
+from softnlp.model.segments import SegmentedRobot, body_of
 from softnlp.model.tip import TipContact
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.chain_grid import chain_equations
+from softnlp.statics.chain_solver import ChainSolver
 from softnlp.statics.compiled import rod_equations
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
@@ -50,6 +53,10 @@ class Alone:
 
     def _solver(self, **settings: float) -> PoseSolver:
         """Return a solver whose numbers do not depend on what it has solved before."""
+        if isinstance(self.plan.model.robot, SegmentedRobot):
+            body = body_of(self.plan.model)
+            rods = tuple(rod_equations(model, by_machine=False) for model in body.models)
+            return ChainSolver(self.plan.model, self._numerics, equations=chain_equations(body, rods), **settings)
         equations = rod_equations(self.plan.model, by_machine=False)
         return PoseSolver(self.plan.model, self._numerics, equations=equations, **settings)
 
@@ -61,5 +68,6 @@ class Alone:
             part = column[start : start + nominal.size]
             values[name] = float(part[0]) if nominal.size == 1 and name != "pressure" else part
             start += nominal.size
-        named = with_symbols(self.plan.model, values)
+        model = self.plan.model
+        named = model if isinstance(model.robot, SegmentedRobot) else with_symbols(model, values)
         return named, values["pressure"], Loads(values["tip_force"], values["tip_moment"], values["gravity"])

@@ -72,7 +72,7 @@ def segment_tables(robot: SegmentedRobot) -> list[dict[str, Any]]:
     return found
 
 
-def robot_of_segments(tables: Sequence[Mapping[str, Any]], name: str) -> SegmentedRobot:
+def robot_of_segments(tables: Sequence[Mapping[str, Any]]) -> SegmentedRobot:
     """Return the robot of `segment_tables`, for its sizes: without silicones; KeyError where one is missing."""
     segments = []
     for table in tables:
@@ -86,7 +86,22 @@ def robot_of_segments(tables: Sequence[Mapping[str, Any]], name: str) -> Segment
         segments.append(
             Segment(robot_of_table(sizes), nothing, along=along, connector=connector, lines=table["lines"], turn=turn)
         )
-    return whole_robot(segments, name)
+    return whole_robot(segments)
+
+
+def robot_of_attributes(attributes: Mapping[str, Any]) -> Robot:
+    """Return the robot of a file's attributes, parsed; KeyError where one is missing."""
+    if "segment" in attributes:
+        return robot_of_segments(attributes["segment"])
+    return robot_of_table(attributes["robot"])
+
+
+def silicone_of_attributes(attributes: Mapping[str, Any]) -> tuple[str, str]:
+    """Return the names of a file's silicones and of their laws, each once."""
+    segments = attributes.get("segment")
+    tables = [attributes["material"]] if segments is None else [table["material"] for table in segments]
+    name, law = (" + ".join(dict.fromkeys(str(table[key]) for table in tables)) for key in ("name", "model"))
+    return name, law
 
 
 def material_table(material: Material) -> dict[str, Any]:
@@ -163,7 +178,7 @@ def asked_tables(model: Model, loads: Loads) -> dict[str, Any]:
     """Return what was asked of any study as tables by name."""
     robot: dict[str, Any] = {"robot": robot_table(model.robot), "material": material_table(model.material)}
     if isinstance(model.robot, SegmentedRobot):
-        robot = {"name": model.robot.name, "segment": segment_tables(model.robot)}
+        robot = {"segment": segment_tables(model.robot)}
     return {
         **robot,
         **({"material_set": model.material.set} if model.material.set else {}),

@@ -15,10 +15,12 @@ from typing import Any
 import numpy as np
 
 from softnlp.base.errors import InputError
+from softnlp.base.quantity import Quantity
 from softnlp.model.body import Body, Segment
 from softnlp.model.lined_chambers import LinedChambers
 from softnlp.model.materials import Material
 from softnlp.model.model import Model
+from softnlp.model.quantities import quantities
 from softnlp.model.robot import Robot
 
 
@@ -103,15 +105,13 @@ def sections_of(segment: Segment) -> Iterator[tuple[float, Robot]]:
         yield s, replace(segment.robot, **there)
 
 
-def segmented_robot(segments: Sequence[Segment], name: str = "") -> SegmentedRobot:
+def segmented_robot(segments: Sequence[Segment]) -> SegmentedRobot:
     """Return segments, base first, as a robot that studies take; its silicone is its `material`.
 
     Parameters
     ----------
     segments
         At least one, each of a `Robot` with the paper's section.
-    name
-        Shown in every result; by default the names of the segments.
 
     Returns
     -------
@@ -124,14 +124,14 @@ def segmented_robot(segments: Sequence[Segment], name: str = "") -> SegmentedRob
         Without a segment, and for what cannot vary along one.
     """
     Body(tuple(segments))  # for its errors
-    return whole_robot(segments, name)
+    return whole_robot(segments)
 
 
-def whole_robot(segments: Sequence[Segment], name: str = "") -> SegmentedRobot:
+def whole_robot(segments: Sequence[Segment]) -> SegmentedRobot:
     """Return the same of segments that are known to fit."""
     sizes = [robot for segment in segments for _, robot in sections_of(segment)]
     return SegmentedRobot(
-        name=name or " + ".join(segment.robot.name for segment in segments),
+        name=" + ".join(segment.robot.name for segment in segments),
         outer_diameter=max(float(robot.outer_diameter) for robot in sizes),
         lumen_diameter=nan,
         chamber_circle_diameter=nan,
@@ -159,6 +159,11 @@ def body_of(model: Model) -> Body:
     if model.material is not robot.material:
         raise InputError("a robot of several segments has the silicones of these; none can be given beside it")
     return Body(robot.segments, model.coefficients, model.conventions)
+
+
+def declared(model: Model) -> dict[str, Quantity]:
+    """Return every quantity of a model by name: those of its body where it has several segments."""
+    return body_of(model).quantities if isinstance(model.robot, SegmentedRobot) else quantities(model)
 
 
 def require_one_segment(robot: Robot, what: str) -> None:

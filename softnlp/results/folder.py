@@ -18,7 +18,7 @@ from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.files import make_folder, write_whole
 from softnlp.base.status import Status
-from softnlp.model.inputs import loads_of_table, robot_of_segments, robot_of_table, versions
+from softnlp.model.inputs import loads_of_table, robot_of_attributes, silicone_of_attributes, versions
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.results.dataset import netcdf_bytes
@@ -179,6 +179,7 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
         When a variable or an attribute is missing or not what `to_dataset` writes.
     """
     attributes = dataset.attrs
+    asked = {name: json.loads(attributes[name]) for name in ("segment", "robot", "material") if name in attributes}
     values = {str(name): variable.values for name, variable in dataset.variables.items()}
 
     def number(name: str) -> Any:
@@ -204,9 +205,9 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
         values.get("closure", ()),
         title=str(attributes["title"]),
         study=str(attributes["study"]),
-        material=_material(attributes),
+        material=_material_label(*silicone_of_attributes(asked)),
         conventions=str(attributes["conventions"]),
-        robot=_robot(attributes),
+        robot=robot_of_attributes(asked),
         loads=loads_of_table(json.loads(attributes["loads"])),
         status=tuple(Status(str(word)) for word in values["status"]),
         pressure=number("pressure"),
@@ -243,23 +244,6 @@ def _view(number: Callable[[str], Any], body: Callable[[int, str], Body | None],
         contact=contact,
         targets=targets,
     )
-
-
-def _robot(attributes: Mapping[str, Any]) -> Robot:
-    """Return the robot of a file."""
-    if "segment" in attributes:
-        return robot_of_segments(json.loads(attributes["segment"]), json.loads(attributes["name"]))
-    return robot_of_table(json.loads(attributes["robot"]))
-
-
-def _material(attributes: Mapping[str, Any]) -> str:
-    """Return the label of the silicones of a file."""
-    if "segment" not in attributes:
-        tables = [json.loads(attributes["material"])]
-    else:
-        tables = [table["material"] for table in json.loads(attributes["segment"])]
-    words = (" + ".join(dict.fromkeys(str(table[key]) for table in tables)) for key in ("name", "model"))
-    return _material_label(*words)
 
 
 def _material_label(name: str, law: str) -> str:

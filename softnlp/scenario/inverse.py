@@ -22,6 +22,7 @@ from softnlp.scenario.schema import (
     UncertaintyTable,
     Vector,
 )
+from softnlp.scenario.segments import allowed
 from softnlp.statics.step import Run, Step
 from softnlp.studies.forward import followed
 from softnlp.studies.inverse_solver import InverseKinematics
@@ -103,7 +104,7 @@ def inverse_task(given: Read) -> InverseTask:
     weight = float(given.robot.length)
     if target.length_per_radian_mm is not None:
         weight = target.length_per_radian_mm * MILLIMETRE
-    return InverseTask(targets, lower, upper, weight, allow=tuple(given.file.robot.allow))
+    return InverseTask(targets, lower, upper, weight, allow=allowed(given.file))
 
 
 def _pressures(table: BoundsTable, sets: int) -> tuple[Array, Array]:

@@ -198,7 +198,7 @@ def _robot(
             key = next(iter(along)).removeprefix("robot.")
             text = f"study {file.study!r} takes one number here so far, not one that varies along s"
             errors.append(InputError(text, table="robot", key=next(d.file_key for d in DIMENSIONS if d.field == key)))
-        varying = segmented_robot([Segment(made[0], chosen, along=along)], made[0].name)
+        varying = segmented_robot([Segment(made[0], chosen, along=along)])
         return (varying, made[1]), varying.material, notes(chosen)
     return made, chosen, notes(chosen)
 

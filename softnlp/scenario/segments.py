@@ -17,7 +17,7 @@ from softnlp.model.robot import Robot
 from softnlp.model.segments import SegmentedRobot, segmented_robot
 from softnlp.scenario.schema import MaterialTable, NotNegative, RobotTable, ScenarioFile, Table, wrong
 
-OF_SEGMENTS = ("forward",)
+OF_SEGMENTS = ("forward", "inverse", "workspace")
 """The studies that take segments, and dimensions that vary along s."""
 MOST_SEGMENTS = 20
 
@@ -44,6 +44,12 @@ def of_segments(schema: type[ScenarioFile]) -> type[ScenarioFile]:
     segments = Annotated[list[SegmentTable], Field(min_length=1, max_length=MOST_SEGMENTS)]
     fields: dict[str, Any] = {"robot": (refused, None), "material": (refused, None), "segment": (segments, ...)}
     return create_model(schema.__name__, __base__=schema, **fields)
+
+
+def allowed(file: Any) -> tuple[str, ...]:
+    """Return the rules that a file's robot, or any of its segments, may break."""
+    tables = getattr(file, "segment", None) or [file]
+    return tuple(dict.fromkeys(rule for table in tables for rule in table.robot.allow))
 
 
 def of_segment(number: int, error: InputError) -> InputError:

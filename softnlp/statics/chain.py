@@ -53,7 +53,7 @@ class Chain:
     "segment.k.tip_position", "segment.k.tip_rotation", without the connector behind it, "segment.k.tip_stretch",
     "segment.k.mean_stretch" and "segment.k.bending_angle". given : its quantities by key. column : all of them. blocks
     : of each part the rows before its intervals and `Transcribed.slopes`; the rows of the tip. length_unit, force_unit
-    : of the last states [m, N].
+    : of the last states [m, N]. whole_length : of segments and connectors, unpressurised [m].
     """
 
     name: str
@@ -72,6 +72,7 @@ class Chain:
     outputs: Mapping[str, ca.MX]
     length_unit: ca.MX
     force_unit: ca.MX
+    whole_length: ca.MX
 
     @property
     def transcribed(self) -> tuple[Transcribed, ...]:
@@ -165,7 +166,7 @@ def chain_case(
     equations_of : what is compiled for each segment, under the same loads. given : every key of `body.quantities` and
     of the loads. method : of each segment, with as many intervals; each part of one that varies has its share of them.
     """
-    made = _Rows([], [], [], 0)
+    made, whole_length = _Rows([], [], [], 0), ca.MX(0)
     parts, outputs = list[Part](), dict[str, ca.MX]()
     lengths, angles, backbone, stretches, slopes = [], [], [], [], []
     values = {key: q.symbol for key, q in given.items()}
@@ -219,6 +220,7 @@ def chain_case(
         end = last[STRETCH] if varies else stretch
         own_chambers = body.chambers[k]
         lengths.append(summed[:own_chambers] * L_0)
+        whole_length += L_0
         angles.append(summed[-2])
         backbone.append(summed[-1] * L_0)
         outputs |= {
@@ -232,6 +234,7 @@ def chain_case(
         following_turn = body.segments[k + 1].turn if k + 1 < len(body.segments) else 0.0
         if body.connected[k] or following_turn:
             backbone.append(connector)
+            whole_length += connector
             before = rod.carried(last, connector / L_0, following_turn), L_0, F_0
     assert before is not None
     reached = tip_state = before[0]
@@ -268,6 +271,7 @@ def chain_case(
         outputs=whole | outputs,
         length_unit=L_0,
         force_unit=F_0,
+        whole_length=whole_length,
     )
 
 

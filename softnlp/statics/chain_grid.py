@@ -105,8 +105,8 @@ class ChainGrid(Grid):
 
     @property
     def tip(self) -> slice:
-        """Where x holds the end of the last segment."""
-        last = self._places[-1].stop - self.case.parts[-1].transcribed.state_size
+        """Where x holds the end of the last segment, from its end."""
+        last = -self.case.parts[-1].transcribed.state_size
         return slice(last, last + 3)
 
     def last_state(self, x: Array) -> Array:
@@ -118,19 +118,22 @@ class ChainGrid(Grid):
         for part, place in zip(self.case.parts, self._places, strict=True):
             yield part, x[place].reshape(-1, part.transcribed.state_size).T
 
+    @cached_property
+    def stretch_places(self) -> list[int]:
+        """Where x holds the stretch at the beginning of each part."""
+        return [place.start - 1 for place in self._places]
+
     def stretches(self, x: Array) -> list[float]:
         """Return the stretch at the beginning of each part."""
-        return [float(x[place.start - 1]) for place in self._places]
+        return [float(x[place]) for place in self.stretch_places]
 
     @cached_property
     def _units(self) -> ca.Function:
         """(x, p) -> L_0, F_0 of each part (2, parts), and the length of the whole body, SI."""
         case = self.case
         units = ca.horzcat(*(ca.vertcat(part.length_unit, part.force_unit) for part in case.parts))
-        lengths = {part.segment: part.length_unit for part in case.parts}
-        connectors = [case.given[case.body.connector_key(k)].symbol for k in lengths if case.body.connected[k]]
-        last = connectors[-1] if case.body.connected[-1] else ca.MX(0)
-        return self.problem.function("part_units", [units, sum(lengths.values()) + sum(connectors), last])
+        last = case.given[case.body.connector_key(len(case.body.segments) - 1)].symbol if case.body.connected[-1] else 0
+        return self.problem.function("part_units", [units, case.whole_length, ca.MX(last)])
 
     def tip_error(self, change: Array, solution: Solution) -> tuple[float, float]:
         """Return how far a change (18,) of the last state moves the tip, of the whole length, and turns it [rad]."""

@@ -50,13 +50,15 @@ class ChainSolver(PoseSolver):
     def _compiled(self, numerics: Numerics, intervals: int) -> Grid:
         return compiled_chain(self.equations, numerics, intervals)
 
-    def branch_at(self, values: Mapping[str, Any]) -> BranchPoint:
-        """Return where the branch of the first segment that has none stands, else that of the first."""
+    def branch_at(self, values: Mapping[str, Any], only: int | None = None) -> BranchPoint:
+        """Return where the branch of the first segment that ends before stands, else that of the first. only : of."""
         given = {
             name: np.atleast_1d(np.asarray(values.get(name, q.nominal), float)) for name, q in self.quantities.items()
         }
         found = []
         for k, rod in enumerate(self.equations.rods):
+            if only not in (None, k):
+                continue
             own = self.body.of_segment(k, given)
             for s in self.body.knots(k) if k in self.body.varying else [0.0]:
                 there = self.body.of_segment(k, given, s)
@@ -87,6 +89,27 @@ class ChainSolver(PoseSolver):
         """Return x of the shape without loads at this pressure."""
         assert isinstance(grid, ChainGrid)
         return grid.unloaded(p)[0]
+
+    def ends_below(self, upper: Array) -> BranchPoint | None:
+        """Return where the branch of a segment ends below pressures (sets,) or their sum in one set; None for none."""
+        for k in range(len(self.body.segments)):
+            own = self.body.of_segment(k, {**self._by_key(self.column({})), "pressure": np.arange(upper.size)})
+            places = np.asarray(own["pressure"], int)
+            for corner in [upper[places], *(upper[places].sum() * np.eye(places.size))]:
+                pressure = np.zeros(upper.size)
+                pressure[places] = corner
+                point = self.branch_at({"pressure": pressure}, only=k)
+                if not point.status.has_solution:
+                    return point
+        return None
+
+    def unloaded(self, case: Any, column: Array) -> Array | None:
+        """Return x of a case without loads at every quantity in its order, None where a branch ends before."""
+        values = self._by_key(column)
+        if not self.branch_at(values).status.has_solution:
+            return None
+        found: Array = case.first_guess(values)[0]
+        return found
 
     def _by_key(self, column: Array) -> dict[str, Array]:
         """Return every quantity by key of all in their order."""

@@ -239,6 +239,11 @@ class LoadCase:
     force_unit: ca.MX
 
     @property
+    def whole_length(self) -> ca.MX:
+        """L_0 [m]."""
+        return self.length_unit
+
+    @property
     def labels(self) -> list[str]:
         """What the unknowns are called, one name each of `symbols`."""
         return [symbol.name() for symbol in self.symbols]

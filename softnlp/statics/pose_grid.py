@@ -67,6 +67,11 @@ class Grid:
         """Where x holds the tip's position."""
         return TIP
 
+    @property
+    def stretch_places(self) -> list[int]:
+        """Where x holds a stretch."""
+        return [0]
+
     def last_state(self, x: Array) -> Array:
         """Return the last state in x (18,)."""
         return x[-STATE_SIZE:]

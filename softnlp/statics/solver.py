@@ -103,6 +103,11 @@ class PoseSolver:
         key = (numerics.transcription, intervals, by_ipopt, numerics.ipopt)
         return self.equations.kept(key, lambda: self._compiled(numerics, intervals))
 
+    def unloaded(self, case: Any, column: Array) -> Array | None:
+        """Return x of a case without loads at every quantity in its order, None where its branch ends before."""
+        found = stretch_on_branch(self.branch, column, column[: self.model.sets])
+        return case.arc(column, found.stretch) if found.status.has_solution else None
+
     def _compiled(self, numerics: Numerics, intervals: int) -> Grid:
         return compiled_grid(self.equations, numerics, intervals)
 

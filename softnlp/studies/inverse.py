@@ -15,7 +15,6 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
-from softnlp.model.segments import require_one_segment
 from softnlp.statics.step import Run, Step
 from softnlp.studies.forward import checked_loads, followed
 from softnlp.studies.inverse_solver import InverseKinematics
@@ -79,7 +78,6 @@ def inverse(
     InputError
         For targets, bounds or loads of the wrong shape or out of range, or no target.
     """
-    require_one_segment(robot, "inverse kinematics")
     warnings = check(robot, allow={*LOWERABLE_RULES, *allow})
     loads = checked_loads(loads)
     lower, upper = checked_bounds(bounds, robot.chamber_sets)
