@@ -123,8 +123,8 @@ def _scenario(text: str, path: Path) -> Scenario:
     if "solver" not in bad:
         numerics = _attempt(errors, "solver", lambda: _numerics(file))
     scatter = None
-    table = getattr(file, "uncertainty", None)
-    said = None if table is None else table.model_dump(exclude_unset=True, warnings=False)
+    asked = getattr(file, "uncertainty", None)
+    said = None if asked is None else asked.model_dump(exclude_unset=True, warnings=False)
     if said is not None and made is not None and isinstance(made[0], SegmentedRobot):
         errors.append(
             InputError(

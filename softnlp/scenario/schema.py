@@ -8,13 +8,12 @@ is checked where it is read.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any, Literal
 
 from numpy import interp
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, create_model
+from pydantic import ConfigDict, Field, PlainValidator, create_model
 
 from softnlp.base.errors import InputError, nearest
 from softnlp.base.reading import shown
@@ -31,30 +30,11 @@ from softnlp.scenario.values import Label as Label
 from softnlp.scenario.values import Normal as Normal
 from softnlp.scenario.values import NotNegative as NotNegative
 from softnlp.scenario.values import Positive as Positive
+from softnlp.scenario.values import Table as Table
 from softnlp.scenario.values import Vector as Vector
+from softnlp.scenario.values import optional_keys as optional_keys
 from softnlp.scenario.values import wrong as wrong
 from softnlp.scenario.varying import Along, Varying
-
-
-class Table(BaseModel):
-    """A table of the file: no unknown key, no conversion of types (but a whole number is a number), no nan or inf."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
-
-    def written(self, keys: Iterable[str]) -> list[str]:
-        """Return which of some keys the file has, in their order."""
-        return [key for key in keys if key in self.model_fields_set]
-
-    def refuse(self, keys: Iterable[str], message: str, table: str | None = None) -> None:
-        """Raise `InputError` for the first of some keys that the file has."""
-        for key in self.written(keys):
-            raise InputError(message, table=table, key=key)
-
-
-def optional_keys(kinds: Mapping[str, Any]) -> Any:
-    """Return a table whose keys may each be left out; kinds : of each."""
-    fields: dict[str, Any] = {key: (kind | None, None) for key, kind in kinds.items()}
-    return create_model("OptionalKeys", __base__=Table, **fields)
 
 
 class RobotTable(Table):
