@@ -160,6 +160,19 @@ class Blocked:
     free: Free
 
 
+def unjudged(
+    grid: BlockedGrid,
+    solution: Solution,
+    situation: Situation,
+    pressed: Array,
+    aside: tuple[float | None, tuple[float, float]],
+    free: Free,
+) -> Blocked:
+    """Return a solution whose errors are not known. aside : slips and determinants, see `Blocked`."""
+    constants = np.asarray(grid.problem.case_constants(solution.x, solution.p)).ravel()
+    return Blocked(situation, pressed, grid, solution, constants, np.inf, np.inf, *aside, free)
+
+
 def transferred(found: Blocked, case: LoadCase, shape: Mapped) -> Array:
     """Return the unknowns of a solution as those of the same rod's case on another grid, see `between_nodes`."""
     x = found.solution.x
