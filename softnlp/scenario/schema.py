@@ -64,7 +64,7 @@ class RobotTable(Table):
     chamber_sets: Count | None = None
     chambers_per_set: Count | None = None
     chamber_angle_deg: Along[NotNegative] = None
-    allow: list[str] = []
+    allow: list[str] = Field(default=[])
     minimum_wall_mm: Positive = MINIMUM_WALL / MILLIMETRE
 
     def made(self) -> tuple[Robot, tuple[str, ...]]:
@@ -194,8 +194,8 @@ class TipLoadTable(Table):
     moment_Nmm : x, y, z
     """
 
-    force_N: Vector = [0.0, 0.0, 0.0]
-    moment_Nmm: Vector = [0.0, 0.0, 0.0]
+    force_N: Vector = Field(default=[0.0, 0.0, 0.0])
+    moment_Nmm: Vector = Field(default=[0.0, 0.0, 0.0])
 
 
 class RampTable(Table):
@@ -346,18 +346,17 @@ class RegistrationTable(Table):
     """
 
     frame: Literal["given", "base sensor", "fit"] = "given"
-    tip_offset_mm: Annotated[list[float] | None, PlainValidator(partial(vector_or_fit, 3))] = [0.0, 0.0, 0.0]
+    tip_offset_mm: Annotated[list[float] | None, PlainValidator(partial(vector_or_fit, 3))] = Field(
+        default=[0.0, 0.0, 0.0]
+    )
     clock_deg: Annotated[float | None, PlainValidator(number_or_fit)] = 0.0
     set_order: Annotated[list[int], Field(min_length=1)] | None = None
     rotation_world_from_base_quat_xyzw: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
     translation_mm: Vector | None = None
     base_sensor_mm: Vector | None = None
-    tip_sensor_quat_xyzw: Annotated[list[float] | None, PlainValidator(partial(vector_or_fit, 4))] = [
-        0.0,
-        0.0,
-        0.0,
-        1.0,
-    ]
+    tip_sensor_quat_xyzw: Annotated[list[float] | None, PlainValidator(partial(vector_or_fit, 4))] = Field(
+        default=[0.0, 0.0, 0.0, 1.0]
+    )
 
 
 class UncertaintyTable(Table):
