@@ -130,7 +130,9 @@ def range_of(*keys: str) -> Range | None:
     What has no range of its own, as `from` in a choice of `length_mm`, has that of the key above it.
     """
     path = ".".join(keys).split(".")
-    if path[0] in ("sigma", "uncertainty") or path[0].startswith("sigma_"):
+    if path[0] == "uncertainty":  # read with what it is a deviation of
+        return None
+    if path[0] == "sigma" or path[0].startswith("sigma_"):
         return DEVIATION
     if "constants" in path:
         return STRESS if path[-1].endswith("_MPa") else CONSTANT

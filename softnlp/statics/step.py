@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -260,7 +261,7 @@ class Deviation:
     Attributes
     ----------
     values
-        By the name of the output, a number or one for each entry [SI]; NaN where there is none.
+        By the name of the output, a number or an array (entries,) [SI]; NaN where there is none.
     message
         Why there is none of some output, else "".
     """
@@ -345,7 +346,7 @@ class Run:
     contact
         Of a blocked force, else None.
     uncertainty
-        What scatters and how much, as a scenario says it; empty where nothing was said.
+        What scatters and how much, by the keys of a scenario and in their units; empty where nothing was said.
     """
 
     study: str
@@ -358,7 +359,7 @@ class Run:
     title: str = ""
     warnings: tuple[str, ...] = field(default=())
     contact: ContactSettings | None = None
-    uncertainty: Mapping[str, float | str] = field(default_factory=dict)
+    uncertainty: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def failed(self) -> tuple[Step, ...]:

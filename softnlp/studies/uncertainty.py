@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,16 +53,27 @@ class Uncertainty:
     wall
         Standard deviation of where the wall stands, along its normal [m].
     written
-        The same as a scenario says it, by its keys.
+        The same by the keys of a scenario and in their units.
     """
 
     sources: tuple[Scatter, ...] = ()
     pressure_share: float = 0.0
     wall: float = 0.0
-    written: Mapping[str, float | str] = field(default_factory=dict)
+    written: Mapping[str, Any] = field(default_factory=dict)
 
     def at(self, step: Step) -> tuple[Scatter, ...]:
-        """Return the sources at one step."""
+        """Return the sources at one step.
+
+        Parameters
+        ----------
+        step
+            With its pressures and, of a blocked force, its wall.
+
+        Returns
+        -------
+        tuple
+            `Scatter`, one a source.
+        """
         found = list(self.sources)
         if self.pressure_share:
             moves = {f"pressure.{k + 1}": self.pressure_share * float(P) for k, P in enumerate(step.pressure)}
