@@ -54,7 +54,14 @@ class Range:
         got = shown(value) if isinstance(value, int) else f"{value:g}"
         if not isinstance(value, int) and self.holds(float(got)):  # rounded, it would be a number that is expected
             got = repr(float(value))
-        return f"expected at least {self.low:g} and at most {self.high:g}{unit}, got {got}{unit}{noise}{self.hint}"
+        hints = f"{noise}{self.small(value)}{self.hint}"
+        return f"expected at least {self.low:g} and at most {self.high:g}{unit}, got {got}{unit}{hints}"
+
+    def small(self, value: float) -> str:
+        """Return what to say of a number that is below the range and in it a thousand times as large, "" of others."""
+        if self.unit != "mm" or not value < self.low <= 1000 * value:
+            return ""
+        return f"; {value:g} mm looks like metres: {1000 * value:g} mm"
 
     def require(self, values: Any, key: str) -> None:
         """Raise `InputError` with the key where a number, in SI, is outside."""

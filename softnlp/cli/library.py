@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from softnlp.base.errors import InputError, RobotError
 from softnlp.base.units import KILOPASCAL
 from softnlp.cli.console import say, say_rows
 from softnlp.cli.study import Json
@@ -14,8 +15,47 @@ if TYPE_CHECKING:
     from softnlp.model.materials import MaterialEntry
 
 
-def robots() -> None:
-    """List the robots of the library with their dimensions."""
+def robots(
+    *,
+    fit: bool = False,
+    outer_diameter_mm: float | None = None,
+    lumen_diameter_mm: float | None = None,
+    chamber_diameter_mm: float | None = None,
+    chamber_sets: int = 3,
+    chambers_per_set: int = 2,
+    chamber_wall_mm: float = 0.5,
+    length_mm: float = 60.0,
+) -> None:
+    """List the robots of the library, or with --fit say where the chambers of your own go.
+
+    --fit takes outer, lumen and chamber diameter and puts the chambers in the middle of the wall, evenly around. It
+    prints each dimension with the least and the most that can be made when it alone is changed, and a table [robot].
+
+    Parameters
+    ----------
+    fit
+        Find chamber circle and angle for the sizes below.
+    outer_diameter_mm
+        D_r.
+    lumen_diameter_mm
+        D_i, the central hole.
+    chamber_diameter_mm
+        D_c, of a chamber's bore.
+    chamber_sets
+        n1, one pressure each.
+    chambers_per_set
+        n2.
+    chamber_wall_mm
+        delta_c, silicone between bore and thread.
+    length_mm
+        L_0, without pressure.
+    """
+    sizes = (outer_diameter_mm, lumen_diameter_mm, chamber_diameter_mm)
+    if fit:
+        _fit(sizes, chamber_sets, chambers_per_set, chamber_wall_mm, length_mm)
+        return
+    if any(size is not None for size in sizes):
+        raise InputError("expected together with the sizes of a robot of your own", key="--fit")
     from softnlp.model.robot import DIMENSIONS, ROBOTS
 
     rows = []
@@ -23,6 +63,28 @@ def robots() -> None:
         values = [getattr(robot, d.field) / (d.scale or 1) for d in DIMENSIONS]
         rows.append([robot.name, *(f"{value:g}" for value in values)])
     say_rows(["name", *(d.file_key for d in DIMENSIONS)], rows)
+
+
+def _fit(sizes: tuple[float | None, ...], sets: int, each: int, wall: float, length: float) -> None:
+    """Print the robot of some sizes [mm]."""
+    from softnlp.base.units import MILLIMETRE
+    from softnlp.model.fit import fit_robot, fit_rows
+    from softnlp.model.robot import DIMENSIONS
+
+    keys = {d.field: f"--{d.file_key.replace('_', '-')}" for d in DIMENSIONS}
+    for size, field in zip(sizes, ("outer_diameter", "lumen_diameter", "chamber_diameter"), strict=True):
+        if size is None:
+            raise InputError("missing; --fit needs it", key=keys[field])
+    outer, lumen, bore = (MILLIMETRE * (size or 0.0) for size in sizes)
+    try:
+        found = fit_robot(*(outer, lumen, bore, sets, each), chamber_wall=wall * MILLIMETRE, length=length * MILLIMETRE)
+    except RobotError as error:
+        raise RobotError(error.message, key=keys.get(error.key or "", error.key)) from None
+    rows = fit_rows(found)
+    say_rows(["key", "value", "least", "most"], rows)
+    say("\n[robot]")
+    for key, value, *_ in rows:
+        say(f"{key} = {value}")
 
 
 def materials(*, file: Path | None = None, compare: bool = False, json: Json = False) -> None:

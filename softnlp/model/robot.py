@@ -242,7 +242,7 @@ def violations(
     RobotError
         When a dimension is a symbol, not finite, not positive or so far off that no robot is described.
     """
-    _require_dimensions(robot)
+    require_dimensions(robot)
     return broken(rules(robot, minimum_wall, walls))
 
 
@@ -276,7 +276,8 @@ def check(robot: Robot, *, allow: Collection[str] = (), minimum_wall: float = MI
     refused = [v for v in found if v.rule not in allow]
     if refused:
         hints = [f'; allow = ["{v.rule}"] lowers this to a warning' if v.lowerable else "" for v in refused]
-        raise first_of([RobotError(f"{v.rule}: {v.message}{hint}") for v, hint in zip(refused, hints, strict=True)])
+        told = [f"{v.rule}: {v.message}{hint}{metres_hint(robot)}" for v, hint in zip(refused, hints, strict=True)]
+        raise first_of([RobotError(words) for words in told])
     return (*(f"{v.rule}: {v.message}" for v in found), *size_notes(robot))
 
 
@@ -286,6 +287,15 @@ def _checked(part: str, robot: Robot, allow: Collection[str], minimum_wall: floa
         return check(robot, allow=allow, minimum_wall=minimum_wall)
     except RobotError as error:
         raise RobotError(f"{part}: {error.message}", key=error.key) from None
+
+
+def metres_hint(robot: Robot) -> str:
+    """Return what to say of a diameter of a robot that is a thousandth of a usual one, "" of others."""
+    low, high = USUAL_SIZES
+    size = float(robot.outer_diameter)
+    if size >= low or not low <= 1000 * size <= high:
+        return ""
+    return f"; an outer diameter of {in_mm(size)} looks like metres: {in_mm(1000 * size)}"
 
 
 def size_notes(robot: Robot) -> tuple[str, ...]:
@@ -304,7 +314,7 @@ def touching_stretch(robot: Robot) -> float:
     The chamber circle shrinks as lambda^-1/2 (S2) while r_co stays, so chord / sqrt(lambda) = 2 r_co. Below 1 the
     chambers overlap as they are.
     """
-    _require_dimensions(robot)
+    require_dimensions(robot)
     chords = [chord for chord, _, _ in neighbours(robot)]
     return float((min(chords) / (2 * robot.chamber_radius)) ** 2) if chords else inf
 
@@ -314,7 +324,7 @@ def is_number(value: Any) -> bool:
     return not isinstance(value, bool) and isinstance(value, Real)
 
 
-def _require_dimensions(robot: Robot) -> None:
+def require_dimensions(robot: Robot) -> None:
     """Raise RobotError for the first dimension that is not a possible number."""
     for dimension in DIMENSIONS:
         key = dimension.field
@@ -331,7 +341,9 @@ def _require_dimensions(robot: Robot) -> None:
         elif not LENGTH_LIMITS[0] <= value <= LENGTH_LIMITS[1]:
             low, high = (limit / MILLIMETRE for limit in LENGTH_LIMITS)
             raise RobotError(
-                f"expected a length between {low:g} mm and {high:g} mm, got {value / MILLIMETRE:g} mm", key=key
+                f"expected a length between {low:g} mm and {high:g} mm, got {value / MILLIMETRE:g} mm"
+                f"{SIZE.small(value / MILLIMETRE)}",
+                key=key,
             )
     if robot.chambers > MOST_CHAMBERS:
         raise RobotError(

@@ -99,7 +99,11 @@ def rules(robot: Any, minimum_wall: float, walls: Mapping[str, bool] = MappingPr
     def close(chord: Any, i: int, j: int) -> Rule:
         def words() -> str:
             apart = f"neighbouring chambers {i + 1} and {j + 1} are {in_mm(chord)} apart"
-            return f"the centres of {apart}, less than 2 r_co = {in_mm(2 * r_co)}"
+            ways = [f"chamber circle at least {in_mm(4 * r_cp * r_co / chord)}"] if chord > ROUND_OFF else []
+            bore = chord - 2 * robot.chamber_wall
+            ways += [f"bore at most {in_mm(bore)}"] if bore > ROUND_OFF else []
+            mend = f" ({' or '.join(ways)})" if ways else ""
+            return f"the centres of {apart}, less than 2 r_co = {in_mm(2 * r_co)}{mend}"
 
         return Rule("chamber_overlap", "chamber_overlap", chord - 2 * r_co, 0.0, words, (i, j))
 
@@ -108,7 +112,13 @@ def rules(robot: Any, minimum_wall: float, walls: Mapping[str, bool] = MappingPr
 
     def eq_1() -> str:
         sides = "Eq. (1) leaves delta_c + delta_r = (D_r - D_i - 2 D_c)/4"
-        return f"{sides} = {in_mm(mean)} of wall, less than the minimum {in_mm(minimum_wall)}"
+        D_r, D_i, D_c = robot.outer_diameter, robot.lumen_diameter, robot.chamber_diameter
+        short = 4 * (minimum_wall - mean)  # of a diameter
+        ways = [f"outer diameter at least {in_mm(D_r + short)}"]
+        ways += [f"bore at most {in_mm(D_c - short / 2)}"] if D_c > short / 2 else []
+        ways += [f"lumen at most {in_mm(D_i - short)}"] if D_i > short else []
+        mend = f"{in_mm(short)} too little: {' or '.join(ways)}"
+        return f"{sides} = {in_mm(mean)} of wall, less than the minimum {in_mm(minimum_wall)}; {mend}"
 
     return [
         Rule("wall_thickness", "wall_thickness", mean, minimum_wall, eq_1, every),
@@ -116,11 +126,19 @@ def rules(robot: Any, minimum_wall: float, walls: Mapping[str, bool] = MappingPr
         *(close(*pair) for pair in neighbours(robot)),
         leaves(
             outer,
-            lambda: f"reach r_cp + r_co = {in_mm(r_cp + r_co)}, beyond the outer radius {in_mm(robot.outer_radius)}",
+            lambda: (
+                f"reach r_cp + r_co = {in_mm(r_cp + r_co)}, beyond the outer radius {in_mm(robot.outer_radius)} "
+                f"(outer diameter at least {in_mm(2 * (r_cp + r_co))} or chamber circle at most "
+                f"{in_mm(2 * (robot.outer_radius - r_co))})"
+            ),
         ),
         leaves(
             inner,
-            lambda: f"begin at r_cp - r_co = {in_mm(r_cp - r_co)}, inside the lumen radius {in_mm(robot.lumen_radius)}",
+            lambda: (
+                f"begin at r_cp - r_co = {in_mm(r_cp - r_co)}, inside the lumen radius {in_mm(robot.lumen_radius)} "
+                f"(chamber circle at least {in_mm(2 * (robot.lumen_radius + r_co))} or lumen at most "
+                f"{in_mm(2 * max(r_cp - r_co, 0.0))})"
+            ),
         ),
     ]
 
