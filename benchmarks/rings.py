@@ -3,10 +3,10 @@
     python -m benchmarks.rings [--robots D25L60 ...]
 
 For each robot: the bending stiffness at given stretches, and elongation and angles without load. `points` is the sum
-over points with uniaxial stress and arms by (S2); `rings` the same with e and a of the rings; `plane` the finite
-elements of the section, bent, where the pull of a bent chamber also pushes its ring sideways; `slack` the same,
-where chambers without pressure are free bores, because their thread cannot push. One factor on the silicone's stress
-for each way, from the mean elongation. Prints Markdown.
+over points with uniaxial stress and arms by (S2); `rings` the same with e and a of the rings; `curved` the same, where
+the section curves too; `plane` the finite elements of the section, bent, where the pull of a bent chamber also pushes
+its ring sideways; `slack` the same, where chambers without pressure are free bores, because their thread cannot push.
+One factor on the silicone's stress for each way, from the mean elongation. Prints Markdown.
 """
 
 from __future__ import annotations
@@ -65,18 +65,22 @@ class Bent:
 
 
 class Points:
-    """The sum over the points of a section; with rings by e and a."""
+    """The sum over the points of a section; with rings by e and a.
 
-    def __init__(self, made: Robot, rings: bool) -> None:
+    curved : whether the section's own curvature counts, with rings: `RingResponse.fibre_stretch`.
+    """
+
+    def __init__(self, made: Robot, rings: bool, curved: bool = False) -> None:
         section = of_robot(made, mirrors=1)
         el = Equilibrium(section, on := mesh(section), LAW).elements
         self.made = made
-        self.x = np.einsum("qn,mn->mq", el.shape, on.nodes[:, 0][on.triangles]).ravel()
+        self.X = np.einsum("qn,mni->mqi", el.shape, on.nodes[on.triangles]).reshape(-1, 2)
         self.weight = 2 * el.weight.ravel()
-        self.centres = np.array([float(x) for x, _ in made.chamber_centres()])
-        response = robot_response(made)
-        self.e = response.energy_ratio(LAW) if rings else (lambda stretch: 1.0)
-        self.a: Callable[[Any], Any] = response.circle_ratio if rings else (lambda stretch: stretch**-0.5)
+        self.centres = np.array([[float(x), float(y)] for x, y in made.chamber_centres()])
+        self.response = robot_response(made)
+        self.e = self.response.energy_ratio(LAW) if rings else (lambda stretch: 1.0)
+        self.a: Callable[[Any], Any] = self.response.circle_ratio if rings else (lambda stretch: stretch**-0.5)
+        self.curved = curved
 
     def density_slope(self, stretch: Array) -> Array:
         """Return d(e W)/d(stretch)."""
@@ -84,15 +88,25 @@ class Points:
         up, down = (self.e(s) * LAW.uniaxial(s) for s in (stretch + h, stretch - h))
         return np.asarray((up - down) / (2 * h))
 
+    def stretches(self, stretch: float, curvature: float, at: Array) -> Array:
+        """Return the stretches of fibres at (n, 2) places as cast."""
+        if self.curved:
+            return np.asarray(self.response.fibre_stretch(stretch, (0.0, -curvature), (at[:, 0], at[:, 1])))
+        return np.asarray(stretch + curvature * self.a(stretch) * at[:, 0])
+
     def balance(self, stretch: float, curvature: float, pressures: Array) -> Array:
-        """Return the derivatives of the potential by stretch and curvature, with numbers of (N,) pressures [Pa]."""
-        h = 1e-5
-        a, slope = self.a(stretch), (self.a(stretch + h) - self.a(stretch - h)) / (2 * h)
-        stress = self.density_slope(stretch + a * curvature * self.x) * self.weight
-        pull = liner_force(self.made, stretch + a * curvature * self.centres)
+        """Return the derivatives of the potential by stretch and curvature, with (N,) pressures [Pa]."""
+        body = self.density_slope(self.stretches(stretch, curvature, self.X)) * self.weight
+        pull = liner_force(self.made, self.stretches(stretch, curvature, self.centres))
         pull -= pressures * np.pi * self.made.chamber_radius**2
-        arms = [(stress * self.x).sum() + (pull * self.centres).sum()]
-        return np.array([stress.sum() + pull.sum() + slope * curvature * arms[0], a * arms[0]])
+        found = []
+        for h in (np.array([1e-5, 0.0]), np.array([0.0, 1e-3 / self.made.outer_radius])):
+            total = 0.0
+            for force, at in ((body, self.X), (pull, self.centres)):
+                high, low = (self.stretches(*(np.array([stretch, curvature]) + side * h), at) for side in (1, -1))
+                total += float((force * (high - low)).sum()) / (2 * float(h.sum()))
+            found.append(total)
+        return np.array(found)
 
     def solve(self, pressures: Array, start: Bent) -> Bent:
         """Return the shape near a start."""
@@ -102,8 +116,7 @@ class Points:
 class Plane:
     """Half of a section with its rings, bent; chambers of `slack` are bores without a thread."""
 
-    def __init__(self, made: Robot, slack: Sequence[int] = (), push: bool = True) -> None:
-        self.push = push
+    def __init__(self, made: Robot, slack: Sequence[int] = ()) -> None:
         section = of_robot(made, mirrors=1)
         upper = [n for n, (_, y) in enumerate(made.chamber_centres()) if float(y) > -1e-12]
         loose = [k for k, n in enumerate(upper) if n in slack]
@@ -125,7 +138,7 @@ class Plane:
         """Return the total axial force and moment at a stretch and curvature."""
         state = replace(self.state, stretch=stretch, curvature=np.array([curvature, 0.0]), slope=0 * self.state.slope)
         for _ in range(2):  # the pull depends on where the rings are
-            sideways = np.outer(self.pull(state, pressures), [curvature * self.push, 0.0])
+            sideways = np.outer(self.pull(state, pressures), [curvature, 0.0])
             state = self.equilibrium.solve(state, stretch, (curvature, 0.0), sideways)
         self.state = state
         pull = self.pull(state, pressures)
@@ -209,12 +222,15 @@ def angles(robots: Sequence[Robot]) -> str:
         one = pressures[1] == 0
         at = on_sets(made, [pressures[0], 0, 0] if one else [0, pressures[0], pressures[1]])
         idle = [int(n) for n in np.flatnonzero(at == 0)]
-        ways = (Points(made, False), Points(made, True), Plane(made, push=False), Plane(made), Plane(made, slack=idle))
+        ways = (
+            *(Points(made, False), Points(made, True), Points(made, True, curved=True)),
+            *(Plane(made), Plane(made, slack=idle)),
+        )
         found = [path(way, at / factors[k > 0]).angle(made) for k, way in enumerate(ways)]
         errors.append([abs(angle - seen) for angle in found])
         rows.append([name, "one" if one else "two", f"{seen:.0f}", *(f"{angle:.0f}" for angle in found)])
     rows.append(["mean error", "", "", *(f"{error:.1f}" for error in np.mean(errors, axis=0))])
-    header = ["robot", "sets", "measured", "points", "rings", "plane, no push", "plane", "slack"]
+    header = ["robot", "sets", "measured", "points", "rings", "curved", "plane", "slack"]
     said = (
         f"Factors on the stress: {factors[False]:.3f} of points, {factors[True]:.3f} of the others. Angles in degrees."
     )

@@ -9,7 +9,17 @@ import numpy as np
 import pytest
 
 from softnlp import material, robot
-from softnlp.rings import Circle, PlaneSection, Polygon, RingError, energy_of, of_robot, ring_response, robot_response
+from softnlp.rings import (
+    Circle,
+    Curve,
+    PlaneSection,
+    Polygon,
+    RingError,
+    energy_of,
+    of_robot,
+    ring_response,
+    robot_response,
+)
 from softnlp.rings.energy import from_uniaxial, invariant_energy, mooney_rivlin, ogden
 from softnlp.rings.equilibrium import Equilibrium
 from softnlp.rings.mesher import mesh
@@ -68,6 +78,15 @@ def test_a_tube_with_a_ring_inside_or_outside(mirrors: int, outer_ring: bool) ->
     assert balance.square == pytest.approx(T, rel=1e-4)
     density = 2e3 * (T + stretch**2 - 3) + 8e3 * (stretch**2 * T + stretch**-2 - 3)
     assert balance.energy / equilibrium.elements.weight.sum() == pytest.approx(density, rel=1e-3)
+
+
+def test_thread_round_the_body_has_no_centres() -> None:
+    section = PlaneSection(Circle(0, 0, 8e-3), (), (Circle(0, 0, 3e-3),), outer_ring=True, mirrors=3)
+    found = ring_response(section, (0.95, 1.3))
+    p, q = found.plane_stretches(1.3)
+    assert p**2 + q**2 == pytest.approx(tube(3e-3, 8e-3, 8e-3, 1.3), rel=1e-3)
+    with pytest.raises(RingError, match="no ring inside its body"):
+        found.circle_ratio(1.3)
 
 
 @pytest.fixture(scope="module")
@@ -141,6 +160,39 @@ def test_half_a_section_bends_as_the_whole() -> None:
     assert energies[0] == pytest.approx(energies[1], rel=2e-3)
     half = response_on(section, equilibrium.mesh, (0.95, 1.1), count=4)
     assert [half.arms[ring](1.1) for ring, _ in half.chambers] == pytest.approx([half.arms[0](1.1)] * 3, abs=2e-3)
+
+
+def test_fibres_of_a_bent_section(response) -> None:
+    """Saint-Venant's solution for a body without rings, and between rings that carry a section's tension."""
+    section = PlaneSection(Circle(0, 0, 5e-3), (), (Circle(0, 0, 2e-3),), mirrors=1)
+    plain = Equilibrium(section, mesh(section), ECOFLEX)
+    half = Curve((0.5,), 0.9, 1.1)
+    free = replace(response, arms=(half,))
+    shift, _ = shifts(plain, 1.0, 0.1, np.zeros((0, 2)))
+    X = plain.mesh.nodes
+    exact = (free.fibre_stretch(1.0, (0.0, -0.1), X.T) + free.fibre_stretch(1.0, (0.0, 0.1), X.T) - 2) / (2 * 0.1**2)
+    assert shift - shift[0] == pytest.approx(exact - exact[0], abs=1e-3 * 25e-6)
+
+    made = robot("D25L60")
+    section = of_robot(made, 1)
+    ringed = Equilibrium(section, mesh(section, 1.5), ECOFLEX)
+    at = follow(ringed, ringed.rest(), 1.2)
+    pull = np.outer(np.full(3, at.force / 3), [1.0, 0.0])
+    _, shift = shifts(ringed, 1.2, 8.0, pull)
+    of = robot_response(made, RANGE)
+    centres = np.array([ring.centre for ring in section.rings])
+    told = [of.fibre_stretch(1.2, (0.0, -k), centres.T) - 1.2 for k in (8.0, -8.0)]
+    told = (told[0] + told[1]) / (2 * 8.0**2)
+    assert shift[1] - shift[0] == pytest.approx(told[1] - told[0], rel=0.15)
+
+
+def shifts(equilibrium, stretch, curvature, pull):
+    """Return what a curvature along x moves nodes and rings in x by, over the curvature."""
+    at = follow(equilibrium, equilibrium.rest(), stretch)
+    bent = [equilibrium.solve(at, stretch, (k, 0.0), pull * k) for k in (curvature, -curvature)]
+    return [
+        (of[0][:, 0] - of[1][:, 0]) / (2 * curvature) for of in zip(*((b.places, b.rings) for b in bent), strict=True)
+    ]
 
 
 def test_a_force_on_a_ring_does_the_work_that_the_energy_gains() -> None:

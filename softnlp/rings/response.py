@@ -68,9 +68,40 @@ class RingResponse:
         H = self.shear(stretch)
         return stretch ** (H - 0.5), stretch ** (-H - 0.5)
 
+    def arm(self, stretch: Any) -> Any:
+        """Return A, the mean of the rings' exponents; raise `RingError` where thread is round the whole body alone."""
+        if not self.chambers:
+            raise RingError("the section has no ring inside its body, so that no centres are known")
+        return sum(self.arms[ring](stretch) for ring, _ in self.chambers) / len(self.chambers)
+
     def circle_ratio(self, stretch: Any) -> Any:
-        """Return a = r_cp / r_cp0, by the mean of the rings' exponents."""
-        return stretch ** -(sum(self.arms[ring](stretch) for ring, _ in self.chambers) / len(self.chambers))
+        """Return a = r_cp / r_cp0 = stretch^-A."""
+        return stretch ** -self.arm(stretch)
+
+    def fibre_stretch(self, stretch: Any, bend: tuple[Any, Any], cast: tuple[Any, Any]) -> Any:
+        """Return the stretch of a fibre in bending, to second order in the bend.
+
+        Beside the arm a X, the section itself curves: it narrows where it is stretched and widens where it is not, as
+        a prism of Poisson's ratio A does, which moves a fibre along the bend too.
+
+        Parameters
+        ----------
+        stretch
+            v_3, of the axis.
+        bend
+            (2,) u_1 and u_2, per length as cast [1/m].
+        cast
+            (2,) place X of the fibre as cast [m].
+
+        Returns
+        -------
+        number, array or symbol
+            v_3 + a k . X - A a^2 / v_3 ((k . X)^2 - k^2 X^2 / 2) with k = (-u_2, u_1).
+        """
+        (u_1, u_2), (x, y), A = bend, cast, self.arm(stretch)
+        a, along = stretch**-A, u_1 * y - u_2 * x
+        curved = along**2 - (u_1**2 + u_2**2) * (x**2 + y**2) / 2
+        return stretch + a * along - A * a**2 / stretch * curved
 
     def centres(self, cast: Sequence[tuple[Any, Any]], stretch: Any) -> list[tuple[Any, Any]]:
         """Return where the rings' centres are.
