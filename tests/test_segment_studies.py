@@ -62,3 +62,36 @@ def test_a_sweep_has_the_poses_of_single_runs_and_is_audited(tmp_path: Path) -> 
         file.write_text(text + table)
         with pytest.raises(InputError, match="takes a robot of one uniform segment so far"):
             load_scenario(file)
+
+
+def test_the_blocked_force_of_two_halves_is_that_of_the_whole(tmp_path: Path) -> None:
+    wall = "[contact]\nclosure = \"free\"\ntip_cap_mm = 2.0\noffset_mm = {}\n[solver]\naccuracy = 1e-8\n"  # fmt: skip
+    half = segment()
+    for offset, load in ((0.0, ""), (-4.0, '[gravity]\ndirection = "-z"\n')):
+        more = load + wall.format(offset)
+        rows = "[0.1, 0, 0, 0.1, 0, 0], [0.5, 0, 0, 0.5, 0, 0]"
+        two = solved(tmp_path, scenario([half, half], rows, more, "blocked-force"))
+        whole = [segment('name = "D25L60"')]
+        one = solved(tmp_path, scenario(whole, "[0.1, 0, 0], [0.5, 0, 0]", more, "blocked-force"))
+        for a, b in zip(two, one, strict=True):
+            assert a["status"] == b["status"]
+            assert a["blocked_force_N"] == pytest.approx(b["blocked_force_N"], abs=1e-6)
+            np.testing.assert_allclose(a["tip_position_mm"], b["tip_position_mm"], atol=1e-5)
+            assert a["gap_mm"] == pytest.approx(b["gap_mm"], abs=1e-5)
+            assert a["length_error_mm"] == pytest.approx(b["length_error_mm"], abs=1e-5)
+        assert two[1]["blocked_force_N"] > 0.1
+        assert two[1]["stable"] is None
+
+
+def test_a_wall_takes_closure_free_with_segments(tmp_path: Path) -> None:
+    file = tmp_path / "scenario.toml"
+    file.write_text(scenario([BASE, TOP], "[0.1, 0, 0, 0, 0, 0]", "[contact]\n", study="blocked-force"))
+    with pytest.raises(InputError, match=r"\[contact\] closure: expected 'free' with several segments"):
+        load_scenario(file)
+    file.write_text(
+        scenario(
+            [BASE, TOP], "[0.1, 0, 0, 0, 0, 0]", '[contact]\nclosure = "free"\noffsets_mm = [0.0]\n', "blocked-force"
+        )
+    )
+    with pytest.raises(InputError, match="offsets_mm: expected only with one uniform segment so far"):
+        load_scenario(file)

@@ -207,6 +207,11 @@ def draw_cut_open(axes: Any, view: RunView, k: int, eye: Array, light: Array, *,
     return [*reach, np.array([tip + 1.4 * size * R[:, j] for j in range(3)])]
 
 
+def tip_radius(body: Body) -> float:
+    """Return the outer radius at the tip of a body [m]."""
+    return float(np.ravel(body.radii.outer)[-1])
+
+
 def segments_of(robot: Robot) -> list[tuple[Robot, int]]:
     """Return the robot of each segment at its base, with the number of sets before it; itself where it is one."""
     if not isinstance(robot, SegmentedRobot):
@@ -224,7 +229,7 @@ def _connectors(body: Body) -> list[Body]:
     ends = [piece.position[0] for piece in body.pieces[1:]] + [body.position[-1]]
     for piece, end in zip(body.pieces, ends, strict=True):
         if np.linalg.norm(end - piece.position[-1]) > 0 and body.parts:
-            radius = _SLIM * float(piece.radii.outer[-1])  # type: ignore[index]
+            radius = _SLIM * tip_radius(piece)
             radii = SectionRadii(radius, 0.0, 0.0, 0.0, 0.0)
             found.append(Body(np.array([piece.position[-1], end]), np.array([piece.rotation[-1]] * 2), radii))
     return found

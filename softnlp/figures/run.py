@@ -25,6 +25,7 @@ from softnlp.figures.body import (
     frame,
     shaded,
     side_camera,
+    tip_radius,
     tube,
 )
 from softnlp.figures.series import STEP, Abscissa, abscissa, finish_panels, new_panels, series
@@ -331,7 +332,7 @@ def _draw_free(axes: Any, free: Body, light: Array) -> list[Array]:
     """Draw the free shape as a pale body and its axis dashed."""
     quads, normals = tube(free, free.radii.outer, (0, 0), _FACETS, _STATIONS)
     faces = shaded(normals, np.full(3, 0.9), light, contrast=0.1)
-    end = free.position[-1] / MILLIMETRE + (disc(free.radii.outer / MILLIMETRE, _FACETS, 0.0) @ free.rotation[-1].T)
+    end = free.position[-1] / MILLIMETRE + (disc(tip_radius(free) / MILLIMETRE, _FACETS, 0.0) @ free.rotation[-1].T)
     draw_faces(axes, quads, faces, zorder=2, label="free shape")
     draw_faces(axes, end, "#EFEFEF", FREE, 0.8, zorder=2.1)
     line = free.position / MILLIMETRE
@@ -357,8 +358,8 @@ def _draw_cap(axes: Any, body: Body, cap: float, light: Array) -> Array:
     """Draw the rigid cap [mm] as a slim rod from tip to contact point; return the points it reaches."""
     R, p = body.rotation[-1], body.position[-1]
     rod = Body(np.array([p, p + cap * MILLIMETRE * R[:, 2]]), np.array([R, R]), body.radii)
-    quads, normals = tube(rod, _CAP_RADIUS * body.radii.outer, (0, 0), _FACETS, 2)
-    end = disc(_CAP_RADIUS * body.radii.outer / MILLIMETRE, _FACETS, cap) @ R.T + p / MILLIMETRE
+    quads, normals = tube(rod, _CAP_RADIUS * tip_radius(body), (0, 0), _FACETS, 2)
+    end = disc(_CAP_RADIUS * tip_radius(body) / MILLIMETRE, _FACETS, cap) @ R.T + p / MILLIMETRE
     faces = np.vstack([shaded(normals, np.full(3, 0.42), light), [[0.5, 0.5, 0.5]]])
     draw_faces(axes, [*quads, *end], faces, zorder=5.5, label="tip cap")
     return quads.reshape(-1, 3)

@@ -300,10 +300,15 @@ class Body:
         for key in found:
             if key.startswith(PREFIX):  # where the later segment begins
                 found[key] = found[key][:1]  # type: ignore[index]
-        first = sum(model.sets for model in self._own[:k])
         pressure: Any = given["pressure"]
-        found["pressure"] = pressure[first : first + self.models[k].sets]
+        found["pressure"] = pressure[self._pressures[k]]
         return found
+
+    @cached_property
+    def _pressures(self) -> list[slice]:
+        """Where the pressures of each segment are, those of bonded lines behind its own."""
+        firsts = np.cumsum([0, *(model.sets for model in self._own)])
+        return [slice(int(a), int(a) + model.sets) for a, model in zip(firsts, self.models, strict=False)]
 
     @cached_property
     def _names(self) -> list[dict[str, str]]:

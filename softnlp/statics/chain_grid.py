@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -17,7 +17,7 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.rod import STATE_SIZE
 from softnlp.model.segments import body_of
-from softnlp.nlp.linear import SparseSolver
+from softnlp.nlp.linear import LastFactors, LinearSolver, SparseSolver
 from softnlp.nlp.problem import compile_problem
 from softnlp.nlp.solver import Engine, Solution
 from softnlp.nlp.transcription import method_named
@@ -31,7 +31,7 @@ from softnlp.statics.varying import PLACE
 
 Array = NDArray[np.float64]
 
-_MOST_KEPT = 4  # shapes without loads
+_MOST_KEPT = 12  # of what depends on fixed values alone
 _ROWS = PLACE + 1  # of the states of a part that varies, as which all are held
 
 
@@ -94,6 +94,12 @@ class ChainGrid(Grid):
         return self.case.method.intervals
 
     @cached_property
+    def corrector(self) -> LinearSolver | None:
+        """What the estimate of the discretisation error is solved with: the last factors of Newton's method."""
+        linear = self.engine.linear
+        return LastFactors(linear) if isinstance(linear, SparseSolver) else linear
+
+    @cached_property
     def _places(self) -> list[slice]:
         """Where x holds the states of each part."""
         found, start = [], 0
@@ -106,7 +112,7 @@ class ChainGrid(Grid):
     @property
     def tip(self) -> slice:
         """Where x holds the end of the last segment, from its end."""
-        last = -self.case.parts[-1].transcribed.state_size
+        last = -self.case.parts[-1].transcribed.state_size - self.case.added.numel()
         return slice(last, last + 3)
 
     def last_state(self, x: Array) -> Array:
@@ -137,9 +143,9 @@ class ChainGrid(Grid):
 
     def tip_error(self, change: Array, solution: Solution) -> tuple[float, float]:
         """Return how far a change (18,) of the last state moves the tip, of the whole length, and turns it [rad]."""
-        units, whole, connector = self._units(solution.x, solution.p)
-        off = float(units[0, -1]) * change[:3] + float(connector) * change[9:12]
-        return float(np.linalg.norm(off)) / float(whole), float(np.linalg.norm(change[3:12]) / np.sqrt(2))
+        units, whole, connector = self.units(solution)
+        off = units[0, -1] * change[:3] + connector * change[9:12]
+        return float(np.linalg.norm(off)) / whole, float(np.linalg.norm(change[3:12]) / np.sqrt(2))
 
     def distance(self, change: Array) -> float:
         """Return the largest change of a scaled position or of a direction cosine between two x."""
@@ -163,7 +169,7 @@ class ChainGrid(Grid):
 
     def pieces(self, nodes: Array, constants: Array, solution: Solution) -> list[Piece]:
         """Return the parts of what `nodes` and `constants` return."""
-        units = np.asarray(self._units(solution.x, solution.p)[0])
+        units = self.units(solution)[0]
         found, column, row = [], 0, 0
         for k, part in enumerate(self.case.parts):
             count, size = part.transcribed.node_index.size, part.constants.numel()
@@ -175,21 +181,36 @@ class ChainGrid(Grid):
 
     def unloaded(self, p: Array) -> tuple[Array, Array]:
         """Return x and the last state of the shape without loads at fixed values, see `Chain.first_guess`."""
-        key = p.tobytes()
-        if key not in self._kept:
-            if len(self._kept) >= _MOST_KEPT:
-                del self._kept[next(iter(self._kept))]
-            self._kept[key] = self.case.first_guess(self.values(p))
-        return self._kept[key]
-
-    @cached_property
-    def _kept(self) -> dict[bytes, tuple[Array, Array]]:
-        return {}
+        found: tuple[Array, Array] = self._once("unloaded", p, lambda: self.case.first_guess(self.values(p)))
+        return found
 
     def values(self, p: Array) -> dict[str, Array]:
         """Return every quantity by key, SI."""
-        found: Mapping[str, Array] = self.problem.values(np.zeros(0), p)
-        return dict(found)
+        found: dict[str, Array] = self._once("values", p, lambda: self.problem.values(np.zeros(0), p))
+        return found
+
+    def units(self, solution: Solution) -> tuple[Array, float, float]:
+        """Return L_0, F_0 of each part (2, parts), the whole length, and that of the last connector, SI."""
+
+        def found() -> tuple[Array, float, float]:
+            units, whole, connector = self._units(solution.x, solution.p)
+            return np.asarray(units), float(whole), float(connector)
+
+        every: tuple[Array, float, float] = self._once("units", solution.p, found)
+        return every
+
+    def _once(self, what: str, p: Array, make: Callable[[], Any]) -> Any:
+        """Return what depends on fixed values alone, those asked for last being kept."""
+        key = what, p.tobytes()
+        if key not in self._kept:
+            while len(self._kept) >= _MOST_KEPT:
+                del self._kept[next(iter(self._kept))]
+            self._kept[key] = make()
+        return self._kept[key]
+
+    @cached_property
+    def _kept(self) -> dict[tuple[str, bytes], Any]:
+        return {}
 
     def conjugate_points(self, pieces: list[Piece], solution: Solution) -> int:
         """Count the directions in which the energy falls, from tip to base through the junctions."""

@@ -46,6 +46,7 @@ class ChainSolver(PoseSolver):
     def _set_model(self, model: Model) -> None:
         super()._set_model(model)
         self.body = body_of(model)
+        self._first: tuple[Any, int] | None = None  # what was asked last, and the grid
 
     def _compiled(self, numerics: Numerics, intervals: int) -> Grid:
         return compiled_chain(self.equations, numerics, intervals)
@@ -74,15 +75,23 @@ class ChainSolver(PoseSolver):
         self, column: Array, stretch: float, arc_target: float | None = None, transcription: str | None = None
     ) -> int:
         """Return a first grid that is fine enough for each segment."""
-        values = self._by_key(column)
-        found = []
-        for k, rod in enumerate(self.equations.rods):
-            own = {**values, **self.body.of_segment(k, values)}
-            taken = np.concatenate([own[key] for key in rod.functions.taken])
+        method = transcription or self.numerics.transcription
+        asked = column.tobytes(), arc_target, method
+        if self._first is None or self._first[0] != asked:
+            self._first = asked, self._intervals(column, arc_target, method)
+        return self._first[1]
+
+    def _intervals(self, column: Array, arc_target: float | None, method: str) -> int:
+        values, found = self._by_key(column), []
+        every = [self.body.of_segment(k, values) for k in range(len(self.body.segments))]
+        whole = sum(float(own["robot.length"][0]) for own in every)
+        for own, rod in zip(every, self.equations.rods, strict=True):
+            taken = np.concatenate([own[key] if key in own else values[key] for key in rod.functions.taken])
             at = rod.stretch(taken, own["pressure"]).stretch
             constants, _, units = (np.asarray(part).ravel() for part in rod.functions.section(taken, at))
             moment = values["tip_moment"] / np.prod(units)
-            found.append(first_intervals(transcription or self.numerics.transcription, constants, moment, arc_target))
+            share = float(own["robot.length"][0]) / whole
+            found.append(first_intervals(method, constants, moment, arc_target, share))
         return max(found)
 
     def arc_guess(self, grid: Grid, p: Array, stretch: float) -> Array:

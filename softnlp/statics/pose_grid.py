@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from softnlp.model.numerics import Numerics
 from softnlp.model.rod import STATE_SIZE
+from softnlp.nlp.linear import LinearSolver
 from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.solver import Engine, Solution
 from softnlp.nlp.transcription import Collocation, method_named
@@ -56,6 +57,11 @@ class Grid:
     def problem(self) -> CompiledProblem:
         """The compiled problem, with every quantity fixed."""
         return self.engine.problem
+
+    @property
+    def corrector(self) -> LinearSolver | None:
+        """What the estimate of the discretisation error is solved with."""
+        return self.engine.linear
 
     @property
     def intervals(self) -> int:

@@ -338,7 +338,7 @@ class PoseSolver:
         Raises `numpy.linalg.LinAlgError` where they are not numbers.
         """
         richardson = 2**grid.order / (2**grid.order - 1)
-        correction = richardson * discretisation_correction(grid.problem, solution, grid.engine.linear)
+        correction = richardson * discretisation_correction(grid.problem, solution, grid.corrector)
         tip = grid.last_state(correction)
         nodes = grid.nodes(solution.x)
         constants = grid.constants(solution)

@@ -90,12 +90,14 @@ def through_junction(beyond: Array, offset: Array, force: Array, units: Array) -
     offset : from end to end (3,). force : N there (3,), as the offset in units of the near side. units : lengths and
     forces of the near side over those of the far side (2,).
     """
-    a, N = (np.asarray(ca.DM(rod.hat(v))) for v in (offset, force))
-    one, none = np.eye(3), np.zeros((3, 3))
     length, newton = units
-    moved = np.block([[one * length, -a * length], [none, one]])
-    turned = np.block([[none, none], [none, -N @ a]])
-    pushed = np.block([[one, none], [-a, one]])
-    scale = np.diag([newton] * 3 + [newton * length] * 3)
-    answer: Array = np.linalg.solve(scale @ pushed, beyond @ moved - scale @ turned)
+    energy = np.array([newton] * 3 + [newton * length] * 3)
+    moved = np.diag([length] * 3 + [1.0] * 3)
+    if not offset.any():
+        return np.asarray(beyond @ moved / energy[:, None])
+    a, N = (np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) for x, y, z in (offset, force))
+    moved[:3, 3:] = -a * length
+    turned, pushed = np.zeros((6, 6)), np.eye(6)
+    turned[3:, 3:], pushed[3:, :3] = -N @ a, -a
+    answer: Array = np.asarray(np.linalg.solve(energy[:, None] * pushed, beyond @ moved - energy[:, None] * turned))
     return answer
