@@ -34,6 +34,9 @@ def test_one_constant_that_nothing_depends_on_is_named_alone() -> None:
     found = uncertainty(["a", "b", "c", "d"], J, RESIDUALS)
     assert found.warnings == ("the data do not determine c: fix it, or add measurements that depend on it",)
     assert np.isinf(found.standard_errors).tolist() == [False, False, True, False]
+    others = uncertainty(["a", "b", "d"], np.delete(J, 2, axis=1), RESIDUALS)  # are known as well as without it
+    assert np.delete(found.standard_errors, 2) == pytest.approx(others.standard_errors, rel=1e-9)
+    assert np.delete(np.delete(found.correlation, 2, 0), 2, 1) == pytest.approx(others.correlation, abs=1e-9)
 
 
 P = [[1e5, 0, 0], [5e4, 0, 0]]

@@ -606,7 +606,7 @@ GOOD = "p1_bar,p2_bar,p3_bar,bending_angle_deg\n1,0,0,80\n"
         ("robot," + GOOD.replace("\n1", "\nD25L6,1"), 'free = ["k_b"]', "", "did you mean 'D25L60'"),
         (GOOD, 'free = ["k_b"]', ONE + '[contact]\nclosure = "weighted"\n', "closure free, compliant or rigid"),
         (GOOD, 'free = ["k_b"]', ONE + "[contact]\ntarget_force_N = 1\n", "target_force_N"),
-        (GOOD, 'free = ["k_b"]', ONE + "[sigma]\nelongation_m = 1\n", "did you mean 'elongation_mm'"),
+        (GOOD, 'free = ["k_b"]', ONE + "[sigma]\nelongation_m = 1\n", "write elongation_mm = 1000"),
         (GOOD, 'free = ["k_b", "k_e"]', ONE, "[measurements] free: 1 numbers measured cannot determine 2 constants"),
         (GOOD, 'free = ["k_c"]', ONE, "[measurements] free: no measurement depends on 'k_c'"),
         (GOOD.replace("80", "0"), 'free = ["k_b"]', ONE, "bending_angle: expected a number that is not 0"),

@@ -90,6 +90,7 @@ def test_one_plane_of_bending_leaves_the_place_across_it_open_and_says_what_to_m
     fit = identify(rows, SILICONE, ["k_b"], registration=asked, numerics=NEWTON)
     errors = dict(zip(fit.free.names, fit.uncertainty.standard_errors, strict=True))
     assert np.isinf(errors["tip_offset_y"])
+    assert abs(fit.constants[0] - 2.2) < 3 * errors["k_b"] < 1.0  # which is known all the same
     assert abs(fit.constants[fit.free.names.index("tip_offset_y")]) < 1e-3  # where it began
     assert any("bends in another plane" in words for words in fit.warnings)
 

@@ -17,6 +17,7 @@ CLOSE = 0.99  # two constants whose estimates are correlated more than this are 
 POORLY_CONDITIONED = 1e4  # of the Jacobian with columns of length one
 _LEAST_UNUSED = 0.1
 _FEWEST, _MOST_ALIKE = 8, 0.98  # residuals that tell a correlation; the largest that is told
+_PART, _NO_PART = 1e-3, 1e-5  # of a constant in a direction that is open: it is open too; it is not
 SINGULAR = 1e10  # beyond it a combination of constants is open altogether
 
 
@@ -27,9 +28,8 @@ class Uncertainty:
     Attributes
     ----------
     standard_errors
-        (n,) in the units of the constants [SI]; inf where the data leave the constant open, nan where it was held or
-        there
-        are as many constants as data.
+        (n,) in the units of the constants [SI]; inf where the data leave the constant open, nan where it was held, or
+        has a small part in what they leave open, or there are as many constants as data.
     correlation
         (n, n) of the estimates [1], nan where it is not defined.
     condition
@@ -105,22 +105,29 @@ def uncertainty(
     U, s, Vt = np.linalg.svd(J[:, free] / np.where(lengths > 0, lengths, 1.0), full_matrices=False)
     condition = float(s[0] / s[-1]) if s[-1] > 0 and m >= free.size else np.inf
     freed = [names[int(k)] for k in free]
+    warnings, settled = [], np.ones(free.size, bool)
     if not condition < SINGULAR:
         weak = _weak_directions(Vt, s)
-        opened = np.flatnonzero(np.max(np.abs(weak), axis=0) > 1e-3)
-        errors[free[opened]] = np.inf
-        return Uncertainty(errors, correlation, condition, (_undetermined(freed, weak[-1], further),))
+        part = np.max(np.abs(weak), axis=0)
+        errors[free[part > _PART]] = np.inf
+        warnings.append(_undetermined(freed, weak[-1], further))
+        if m < free.size:
+            return Uncertainty(errors, correlation, condition, tuple(warnings))
+        settled = part < _NO_PART  # what has none in a direction that is open is known all the same
+        kept = len(s) - len(weak)
+        U, s, Vt = U[:, :kept], s[:kept], Vt[:kept]
     covariance = (Vt.T / s**2) @ Vt
-    sizes = np.sqrt(np.diag(covariance))
-    correlation[np.ix_(free, free)] = covariance / np.outer(sizes, sizes)
-    warnings = list(_close_pairs(freed, correlation[np.ix_(free, free)], further))
+    sizes, known = np.sqrt(np.diag(covariance))[settled], free[settled]
+    correlation[np.ix_(known, known)] = covariance[np.ix_(settled, settled)] / np.outer(sizes, sizes)
+    if not warnings:
+        warnings += _close_pairs(freed, correlation[np.ix_(free, free)], further)
     if condition > POORLY_CONDITIONED and not warnings:
         warnings.append(_undetermined(freed, Vt[-1], further, f"hardly determine (condition number {condition:.2g})"))
-    if m > free.size:
-        spread = np.sqrt(float(residuals @ residuals) / (m - free.size))
+    if m > len(s):
+        spread = np.sqrt(float(residuals @ residuals) / (m - len(s)))
         unused = np.maximum(1 - np.sum(U**2, axis=1), _LEAST_UNUSED)  # of a value, by the fit: 1 - leverage
-        each = np.sqrt(np.sum(((Vt.T / s) @ (U.T * residuals / unused)) ** 2, axis=1))
-        errors[free] = np.maximum(spread * sizes, each) / lengths * np.sqrt((1 + alike) / (1 - alike))
+        each = np.sqrt(np.sum(((Vt.T / s) @ (U.T * residuals / unused)) ** 2, axis=1))[settled]
+        errors[known] = np.maximum(spread * sizes, each) / lengths[settled] * np.sqrt((1 + alike) / (1 - alike))
     else:
         warnings.append(f"{m} values determine {free.size} constants without any to spare: no standard errors")
     return Uncertainty(errors, correlation, condition, tuple(warnings))
