@@ -47,6 +47,7 @@ from softnlp.studies import predicted
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.fit_statistics import uncertainty
 from softnlp.studies.identified import Identified
+from softnlp.studies.identify_fit import Fit
 from softnlp.studies.measurements import RobotTask, checked_measurements
 from softnlp.studies.predicted import ArcPoses, BlockedForces, FreePoses, LoadedPoses, Prediction
 
@@ -605,7 +606,7 @@ GOOD = "p1_bar,p2_bar,p3_bar,bending_angle_deg\n1,0,0,80\n"
         ("robot," + GOOD.replace("\n1", "\nD25L6,1"), 'free = ["k_b"]', "", "did you mean 'D25L60'"),
         (GOOD, 'free = ["k_b"]', ONE + '[contact]\nclosure = "weighted"\n', "closure free, compliant or rigid"),
         (GOOD, 'free = ["k_b"]', ONE + "[contact]\ntarget_force_N = 1\n", "target_force_N"),
-        (GOOD, 'free = ["k_b"]', ONE + "[sigma]\nelongation_m = 1\n", "did you mean 'elongation_mm'"),
+        (GOOD, 'free = ["k_b"]', ONE + "[sigma]\nelongation_m = 1\n", "write elongation_mm = 1000"),
         (GOOD, 'free = ["k_b", "k_e"]', ONE, "[measurements] free: 1 numbers measured cannot determine 2 constants"),
         (GOOD, 'free = ["k_c"]', ONE, "[measurements] free: no measurement depends on 'k_c'"),
         (GOOD.replace("80", "0"), 'free = ["k_b"]', ONE, "bending_angle: expected a number that is not 0"),
@@ -629,7 +630,7 @@ def test_columns_that_differ_by_case_unit_or_a_letter_are_told(tmp_path: Path) -
     assert pairs == [
         "'Tip_X_mm' is not read; did you mean 'x_mm'?",
         "'tip_y_mn' is not read; did you mean 'y_mm'?",
-        "'elongation_m' is not read; did you mean 'elongation_mm'?",
+        "'elongation_m' is not read; write elongation_mm = 1000?",
         "'Weight' is not read; did you mean 'weight'?",
     ]
     assert task.measurements[0].tip_position[0][2] == pytest.approx(0.055)  # as results spell it

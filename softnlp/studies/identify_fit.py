@@ -1,4 +1,4 @@
-"""The least squares of an identification: Gauss-Newton in a trust region on the constants, and what is said of its end."""
+"""The least squares of an identification: Gauss-Newton in a trust region, and what is said of its end."""
 
 from __future__ import annotations
 
