@@ -157,6 +157,17 @@ def test_a_right_frame_passes_every_check_and_a_wrong_origin_is_named() -> None:
     assert rest.verdict == "warned"
 
 
+def test_what_is_not_offered_together_is_one_line() -> None:
+    rows = simulated(ACROSS)
+    pushed = replace(rows, blocked_force=np.full(len(FEW), 0.1))
+    for given, asked, words in (
+        (pushed, Registration(fit=("clock",)), "a clock is not fitted to blocked forces"),
+        (rows, Registration(fit=("tip_sensor",)), "expected quaternions of the sensor"),
+    ):
+        with pytest.raises(InputError, match=words):
+            identify(given, SILICONE, ["k_e"], loads=ACROSS, registration=asked, numerics=NEWTON)
+
+
 def test_slopes_are_those_of_differences() -> None:
     registration = Registration(rotation=Rotation.random(random_state=1).as_matrix(), fit=("frame", "tip_offset"))
     function = registration.function()

@@ -41,8 +41,8 @@ from softnlp.studies.measurements import (
     checked_measurements,
 )
 from softnlp.studies.predicted import Predicted
-from softnlp.studies.registered import Registered, begun, with_registration
-from softnlp.studies.registration import Registration, across
+from softnlp.studies.registered import Registered, begun, checked_registration, with_registration
+from softnlp.studies.registration import Registration
 from softnlp.studies.tip_checks import tip_checks
 
 Array = NDArray[np.float64]
@@ -100,26 +100,16 @@ def identify(
     data = tuple(checked_measurements(m) for m in given)
     chosen = constants = free_constants(free, material, coefficients, bounds)
     count = sum(int(np.sum(d.fitted)) for d in data)
-    whole = np.concatenate([d.whole for d in data])
-    if registration is None or not registration.acts:  # orientations are those of a sensor
-        registration = Registration() if np.any(np.isfinite(whole)) else None
-    elif "tip_sensor" in registration.fit and not np.any(whole == 1):
-        raise InputError("expected quaternions of the sensor to fit its axes to", key="registration.tip_sensor")
+    in_base = checked_loads(loads)
+    registration, clocked = checked_registration(registration, data, in_base)
     total = len(free) + (0 if registration is None else len(registration.names))
     if count < total:
         raise InputError(f"{count} numbers measured cannot determine {total} constants", key="free")
-    loads = checked_loads(loads)
     contact = checked_contact(contact, [d.robot for d in data if np.any(d.measured[:, -1])])
     if contact.closure == "weighted" and any(np.any(d.measured[:, -1]) for d in data):
         raise InputError("expected a closure that has a definite force; 'weighted' depends on weights", key="closure")
     searching = numerics if numerics.engine == "ipopt" else numerics.without_ipopt()
-    clocked = registration is not None and "clock" in registration.fit and across(loads)
-    if clocked and any(np.any(d.measured[:, -1]) for d in data):
-        raise InputError(
-            "a clock is not fitted to blocked forces under loads across the axis; give it", key="registration"
-        )
-    in_base = loads
-    loads = loads if clocked or registration is None else registration.in_sets(loads)
+    loads = in_base if clocked or registration is None else registration.in_sets(in_base)
     models = []
     for d in data:
         # Where nothing loads free shapes they are known in closed form.

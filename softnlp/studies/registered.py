@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.errors import InputError
+from softnlp.model.rod import Loads
 from softnlp.statics.body import Fit
 from softnlp.studies.identified import FreeConstants
 from softnlp.studies.measurements import (
@@ -18,7 +20,7 @@ from softnlp.studies.measurements import (
     column_slice,
 )
 from softnlp.studies.predicted import Predicted, Prediction
-from softnlp.studies.registration import PREFIX, Registration
+from softnlp.studies.registration import PREFIX, Registration, across
 
 Array = NDArray[np.float64]
 
@@ -89,6 +91,25 @@ class Registered:
         if self._clocked:
             wide[:, :, own + self._registration.names.index("clock")] = slopes[:, :, own]
         return wide
+
+
+def checked_registration(
+    given: Registration | None, data: Sequence[Data], loads: Loads
+) -> tuple[Registration | None, bool]:
+    """Return the registration that a fit needs, None for none, and whether its clock turns the loads.
+
+    loads : in the frame of the base. Raises `InputError` for what is not offered together.
+    """
+    whole = np.concatenate([d.whole for d in data])
+    if given is None or not given.acts:  # orientations are those of a sensor
+        return Registration() if np.any(np.isfinite(whole)) else None, False
+    if "tip_sensor" in given.fit and not np.any(whole == 1):
+        raise InputError("expected quaternions of the sensor to fit its axes to", key="registration.tip_sensor")
+    clocked = "clock" in given.fit and across(loads)
+    if clocked and any(np.any(d.measured[:, -1]) for d in data):
+        text = "a clock is not fitted to blocked forces under loads across the axis; give it"
+        raise InputError(text, key="registration.clock")
+    return given, clocked
 
 
 def begun(registration: Registration, data: Sequence[Data], poses: Sequence[tuple[Array, Array]]) -> Registration:
