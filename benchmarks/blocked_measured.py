@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.measured import FORCES, PRESSURE
 from softnlp.base.units import BAR
 from softnlp.model.contact_settings import ClosureWeights, ContactSettings
 from softnlp.model.conventions import COEFFICIENT_SETS
@@ -27,11 +28,7 @@ from softnlp.studies.blocked_force import blocked_force
 
 Array = NDArray[np.float64]
 
-MEASURED_AT = 1.5  # [bar]
-MEASURED: Mapping[str, float] = {  # [N] at 1.5 bar
-    **{"D25L60": 1.18, "D25L40": 1.27, "D20L60": 0.71, "D20L40": 0.82},
-    **{"D15L60": 0.34, "D15L40": 0.39, "D10L60": 0.10, "D10L40": 0.12},
-}
+MEASURED_AT, MEASURED = PRESSURE, FORCES  # [bar], [N]
 PRESSURES = np.linspace(0.3, MEASURED_AT, 5)  # [bar]
 
 

@@ -18,15 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.blocked_measured import MEASURED as FORCES
+from benchmarks.measured import ANGLES, CURVE, FORCES, PRESSURE
 from softnlp.model.materials import material
 
-ANGLES = {  # [deg] at 1.5 bar, one set and two sets
-    **{"D25L60": (107.67, 147.05), "D20L60": (118.57, 161.03)},
-    **{"D15L60": (178.41, 249.01), "D10L60": (211.67, 413.33)},
-}
-HIGHEST = 1.5  # [bar]
-CURVE = (0.3, 0.6, 0.9, 1.2, 1.5)
+HIGHEST = PRESSURE
+
 NOISE_KPA = 0.2
 GAUGE_LENGTH, WIDTH, THICKNESS = 33.0, 6.0, 3.0  # [mm]
 

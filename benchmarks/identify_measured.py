@@ -11,13 +11,14 @@ pressure of each chamber, as printed. Minutes on one core, most of them for the 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.identify_data import ANGLES, CURVE, FORCES, HIGHEST
+from benchmarks.identify_data import HIGHEST
+from benchmarks.measured import ANGLES, CURVE, ELONGATIONS, FORCES
 from softnlp.base.units import BAR, DEGREE, MILLIMETRE, STANDARD_GRAVITY
 from softnlp.model.conventions import COEFFICIENT_SETS, REPRODUCTION, Coefficients, Conventions
 from softnlp.model.materials import material
@@ -37,7 +38,6 @@ SILICONE = material("Ecoflex 00-50")
 CALIBRATED = COEFFICIENT_SETS["calibrated"]
 OWN_PRESSURE = replace(REPRODUCTION, name="own pressure in Eq. (12)", mean_pressure=False)
 HANGING = Loads(gravity=(0.0, 0.0, STANDARD_GRAVITY))
-ELONGATION: Mapping[str, tuple[float, float]] = {"L60": (35.03, 42.31), "L40": (22.70, 25.11)}  # [mm] at 1.5 bar
 ANGLE_SIGMA, FORCE_SIGMA = 30 * DEGREE, 0.09  # what `calibrated` leaves of each
 
 
@@ -55,7 +55,7 @@ def measurements(name: str, *, forces: bool, elongation: bool) -> Measurements:
         rows.append(([HIGHEST, 0, 0], one, np.nan, np.nan))
     if name in ANGLES:
         rows.append(([HIGHEST, HIGHEST, 0], two, np.nan, np.nan))
-    low, high = ELONGATION[name[-3:]]
+    low, high = ELONGATIONS[name[-3:]]
     if elongation:
         rows.append(([HIGHEST] * 3, np.nan, np.nan, (low + high) / 2))
     P, angle, force, length = (np.array(column, dtype=float) for column in zip(*rows, strict=True))

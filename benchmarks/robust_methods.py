@@ -31,7 +31,7 @@ from softnlp.nlp.linear import SparseSolver
 from softnlp.nlp.solver import Engine, Solution, violation
 from softnlp.nlp.transcription import RK4, rk_step
 from softnlp.statics.branch import stretch_on_branch
-from softnlp.statics.pose_grid import Grid, pose_distance
+from softnlp.statics.pose_grid import Grid
 from softnlp.statics.solver import PoseSolver
 
 INTERVALS, COLLOCATION_INTERVALS = 40, 10
@@ -141,7 +141,7 @@ class Methods:
         values = self.values(pose)
         path, x = self.load_path(values)
         engine = self.grid.engine
-        followed = follow(self.grid.stepper, path, x, distance=pose_distance)
+        followed = follow(self.grid.stepper, path, x, distance=self.grid.distance)
         if not followed.arrived:
             return Found(self.grid, followed.solution.x, followed.iterations, "the path turned back or was lost")
         final = engine.solve(path(1.0), followed.solution.x)
@@ -163,7 +163,13 @@ class Methods:
         """Return the load path's equilibrium, followed in small steps; None at a fold."""
         path, x = self.load_path(self.values(pose))
         followed = follow(
-            self.grid.stepper, path, x, distance=pose_distance, first_step=1 / 16, largest_jump=0.1, most_solves=1000
+            self.grid.stepper,
+            path,
+            x,
+            distance=self.grid.distance,
+            first_step=1 / 16,
+            largest_jump=0.1,
+            most_solves=1000,
         )
         return self.grid.engine.solve(path(1.0), followed.solution.x).x if followed.arrived else None
 

@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from softnlp.model.section import Section as Section
     from softnlp.model.section import SectionRadii as SectionRadii
     from softnlp.model.section import SectionState as SectionState
+    from softnlp.model.segments import segmented_robot as segmented_robot
     from softnlp.nlp.constraint import Constraint as Constraint
     from softnlp.nlp.transcription import Collocation as Collocation
     from softnlp.nlp.transcription import MultipleShooting as MultipleShooting
@@ -111,6 +112,7 @@ _HOMES = {
     "model.materials": ("Material", "load_materials", "material"),
     "model.numerics": ("Numerics",),
     "model.robot": ("ROBOTS", "Robot", "robot"),
+    "model.segments": ("segmented_robot",),
     "model.rod": ("Loads",),
     "model.section": ("Section", "SectionRadii", "SectionState"),
     "nlp.constraint": ("Constraint",),

@@ -24,8 +24,13 @@ def made_up(
 ) -> Comparison:
     """Return a comparison of rows (M, 7) dealt out to robots; simulated : (variants, M, 7). pressure : (M, 3) [Pa]."""
     P = np.zeros((len(values), 3)) if pressure is None else pressure
+    values, simulated = (np.concatenate([v, np.full((*v.shape[:-1], 1), np.nan)], axis=-1) for v in (values, simulated))
+    unseen = np.zeros((len(values), 9)), np.full(len(values), np.nan)
     parts = [np.arange(k, len(values), robots) for k in range(robots)]
-    observed = tuple(Observed(robot("D25L60"), f"robot {k + 1}", P[r], values[r]) for k, r in enumerate(parts))
+    observed = tuple(
+        Observed(robot("D25L60"), f"robot {k + 1}", P[r], values[r], *(u[r] for u in unseen))
+        for k, r in enumerate(parts)
+    )
     solved = []
     for each in simulated:
         each = np.where(np.isfinite(values), each, np.nan)

@@ -37,7 +37,7 @@ LONGEST = (
     *("varying", "inverse_solver", "app_workspace", "pages", "view", "tensile", "paper", "problem", "app_session"),
     *("app_material", "app_robot", "app_blocked", "compare", "scenario", "blocked_paths", "blocked_problem"),
     *("user_text", "netcdf", "stability", "workspace_document", "app_inverse", "processes", "random_poses"),
-    *("fuzz", "app_sequence", "app_identify", "paper_method", "witness", "figures", "branch", "loads"),
+    *("fuzz", "app_sequence", "app_identify", "paper_method", "witness", "figures", "branch", "loads", "rings"),
 )
 
 

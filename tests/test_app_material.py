@@ -25,7 +25,6 @@ from softnlp.app.silicone import (
     formula_form,
     inline,
     known_silicones,
-    law_or_default,
     library_form,
     material_figure,
     material_state,
@@ -71,9 +70,20 @@ def test_an_own_formula_starts_as_neo_hookean() -> None:
 
 def test_going_back_to_the_library_leaves_what_only_own_forms_have() -> None:
     own = formula_form({"name": ECOFLEX, "density_kg_m3": 1100.0}, LIBRARY[ECOFLEX]) | {"fitted_stretch": [1.0, 1.5]}
-    back = library_form(own, ECOFLEX, law_or_default(own["model"], LIBRARY[ECOFLEX].models))
+    back = library_form(own, LIBRARY[ECOFLEX])
     assert back == {"name": ECOFLEX, "model": "mooney-rivlin", "density_kg_m3": 1100.0}
     assert material_from_table(back).density == 1100.0
+
+
+def test_a_set_is_chosen_with_the_law_where_it_has_it() -> None:
+    second = library_form({"model": "yeoh", "set": "srmd"}, LIBRARY[ECOFLEX])
+    assert second == {"name": ECOFLEX, "model": "yeoh", "set": "srmd"}
+    assert library_form({"model": "ogden", "set": "srmd"}, LIBRARY[ECOFLEX])["model"] == "mooney-rivlin"
+    assert library_form(second, LIBRARY["Ecoflex 00-20"]) == {"name": "Ecoflex 00-20", "model": "yeoh"}
+    state = material_state(document(**second), LIBRARY, Path())
+    assert state.material is not None
+    assert state.material.set == "srmd"
+    assert all(other.set == "srmd" for other in state.others.values())
 
 
 def test_constants_stay_readable_in_a_file_with_a_table_of_them() -> None:
@@ -238,6 +248,22 @@ def test_forms_are_changed_on_the_page_and_nothing_typed_is_lost() -> None:
         put(user, "material.form", "constants")
         assert control(user, "material.constants.C10_MPa").value == 0.02
         assert session.problem is None
+
+    use(material_panel, person)
+
+
+def test_the_page_offers_the_sets_of_a_silicone() -> None:
+    async def person(user: User, session: Session) -> None:
+        assert list(control(user, "material.set").options) == ["shi-2025", "srmd"]
+        put(user, "material.model", "yeoh")
+        put(user, "material.set", "srmd")
+        assert session.document.table("material") == {"name": ECOFLEX, "model": "yeoh", "set": "srmd"}
+        assert (
+            session.scenario.material.constants["C10"] == LIBRARY[ECOFLEX].sets["srmd"].models["yeoh"].constants["C10"]
+        )
+        put(user, "material.name", "Ecoflex 00-20")
+        assert not control(user, "material.set").visible
+        assert session.document.table("material") == {"name": "Ecoflex 00-20", "model": "yeoh"}
 
     use(material_panel, person)
 

@@ -20,8 +20,9 @@ from softnlp.model.quantities import Model
 from softnlp.nlp.solver import Solution
 from softnlp.statics import blocked, weighted
 from softnlp.statics import joint as joint_problems
-from softnlp.statics.blocked import BlockedSolver, _Ended
+from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked, BlockedGrid
+from softnlp.statics.blocked_resume import Ended
 from softnlp.statics.blocked_step import solved_step
 from softnlp.statics.free_shape import FreeShapes
 from softnlp.statics.multistart import other_equilibria
@@ -131,10 +132,10 @@ def test_a_path_that_is_lost_is_followed_once_more_on_a_finer_grid(lost: int, mo
     assert exact is not None
     followed, sizes = BlockedSolver._followed, list[int]()
 
-    def watched(self: BlockedSolver, grid: BlockedGrid, route: Any, end: Situation, *rest: Any) -> Blocked | _Ended:
+    def watched(self: BlockedSolver, grid: BlockedGrid, route: Any, end: Situation, *rest: Any) -> Blocked | Ended:
         sizes.append(grid.intervals)
         if len(sizes) <= lost:
-            return _Ended(Situation(0.25 * end.pressure, Loads(), WALL), folded=False, iterations=7)
+            return Ended(Situation(0.25 * end.pressure, Loads(), WALL), folded=False, iterations=7)
         return followed(self, grid, route, end, *rest)
 
     monkeypatch.setattr(BlockedSolver, "_followed", watched)

@@ -21,7 +21,7 @@ from softnlp.cli import main
 from softnlp.figures import observable_figure, tips_figure
 from softnlp.figures.compare_parts import looks
 from softnlp.results.comparison import STATISTICS
-from softnlp.scenario.compare import ALIASES, MEASURED_COLUMNS
+from softnlp.scenario.measured_rows import ALIASES, MEASURED_COLUMNS
 from softnlp.studies.comparison import OBSERVABLES, Comparison
 
 ROOT = Path(__file__).parents[1]

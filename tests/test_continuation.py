@@ -102,3 +102,24 @@ def test_a_plane_that_the_curve_does_not_meet_has_no_point() -> None:
     assert met is not None
     assert met[0] == pytest.approx([0.5])
     assert still + met[1] == pytest.approx(curve.c(met[0]))
+
+
+@pytest.mark.parametrize(("first_step", "lost"), [(0.07, 0.25), (0.03, 0.5), (1 / 7, 0.5), (0.1, 0.3)])
+def test_a_step_that_cannot_be_made_smaller_ends_the_path(first_step: float, lost: float) -> None:
+    """Wherever it is lost: the smallest step, found again as a difference of fractions, may be longer by a rounding."""
+    asked: list[float] = []
+
+    class Lost:
+        tolerance = 1e-7
+
+        def solve(self, p: np.ndarray, x: np.ndarray) -> Solution:
+            asked.append(float(p[0]))
+            return Solution(p, p, 0.0 if p[0] <= lost else 1.0, 1, "")
+
+    engine: Any = Lost()
+    followed = follow(
+        engine, path, np.zeros(1), distance=lambda change: float(np.abs(change).max()), first_step=first_step
+    )
+    assert lost - 2 / 1024 <= followed.fraction <= lost
+    assert len(asked) <= 60
+    assert asked[-1] != asked[-2]

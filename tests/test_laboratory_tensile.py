@@ -284,3 +284,73 @@ def test_legs_and_breaks() -> None:
     assert [leg.rising for leg in legs(np.concatenate([rise, fall, rise, fall]))] == [True, False, True, False]
     assert break_row(np.concatenate([rise, [0.01, 0.0]])) == 29
     assert break_row(rise) == 30
+
+
+@pytest.mark.parametrize(
+    ("header", "factor", "settings"),
+    [
+        ("Elongation (%),Load (N)", (100, 1), {}),
+        ("Elongation,Load (N)", (100, 1), {"unit.Elongation": "%"}),
+        ("Travel [mm],Load [kgF]", (25, 1 / 9.80665), {"gauge_length_mm": 25}),
+        ("Extension,Load\n(mm),(gf)", (25, 1e3 / 9.80665), {"gauge_length_mm": 25}),
+        ("Strain (%),Stress (kgf/cm2)", (100, 1 / 8 / 0.0980665), {}),
+        ("Hencky strain (1),Stress (true) (MPa)", (None, None), {}),
+        ("Stretch (%),Stress (kPa)", (0, 1e3 / 8), {}),
+    ],
+)
+def test_units_of_machines(
+    header: str, factor: tuple[float, float], settings: dict[str, object], tmp_path: Path
+) -> None:
+    along, across = factor
+    columns = np.log(STRETCH), STRESS * STRETCH
+    if along is not None:
+        columns = (along * (STRETCH - 1) if along else 100 * STRETCH), across * 8 * STRESS
+    file = machine(tmp_path, header, np.column_stack(columns))
+    found = imported(file, **{key.replace(".", "__"): value for key, value in {"area_mm2": 8, **settings}.items()})
+    assert found.numbers["shear_modulus_MPa"] == pytest.approx(0.03, rel=1e-3)
+
+
+@pytest.mark.parametrize("unit", ["kgx", "Nn"])
+def test_a_unit_that_is_not_known_is_said_with_the_nearest(unit: str, tmp_path: Path) -> None:
+    file = machine(tmp_path, f"Extension (mm),Load ({unit})", np.column_stack([25 * (STRETCH - 1), 8 * STRESS]))
+    with pytest.raises(AskError, match=f"the unit '{unit}' is not known; did you mean '"):
+        imported(file, **SPECIMEN)
+    assert modulus(file=file, **SPECIMEN, unit__Load="N") == pytest.approx(0.03, rel=1e-3)
+    with pytest.raises(InputError, match="expected a unit of force, got 'kgff'; did you mean 'kgf'"):
+        imported(file, **SPECIMEN, unit__Load="kgff")
+
+
+@pytest.mark.parametrize(
+    ("label", "area"), [("Area (mm2)", 8.0), ("Specimen area (cm^2)", 0.08), ("Area (in2)", 8 / 645.16)]
+)
+def test_an_area_is_read_in_the_unit_of_its_label(label: str, area: float, tmp_path: Path) -> None:
+    rows = np.column_stack([25 * (STRETCH - 1), 8 * STRESS])
+    file = machine(tmp_path, f"{label},{area:.8g}\nGauge length (mm),25\nExtension (mm),Load (N)", rows)
+    assert modulus(file=file) == pytest.approx(0.03, rel=1e-3)
+
+
+def test_columns_that_are_not_used_are_named(tmp_path: Path) -> None:
+    rows = np.column_stack([25 * (STRETCH - 1), 8 * STRESS, 0 * STRETCH])
+    found = imported(machine(tmp_path, "Extension (mm),Load (N),Temperature", rows), **SPECIMEN)
+    assert found.choices.notes == ["columns that are not used: Temperature"]
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ("eps,sig (MPa)", "do not tell what it is; say --as tensile, pressure, tips, force"),
+        ("Extension (mm),Load (N),p1 (bar)", "could be tensile or pressure; say --as"),
+        ("x_mm,y_mm,z_mm,Fx (N),Fy (N),Fz (N)", "could be tips or force; say --as"),
+    ],
+)
+def test_kinds_that_are_both_possible_are_asked_for(header: str, message: str, tmp_path: Path) -> None:
+    rows = np.column_stack([STRETCH] * len(header.split(",")))
+    with pytest.raises(AskError, match=message):
+        imported(machine(tmp_path, header, rows))
+
+
+def test_a_law_that_does_not_follow_the_data_is_warned_of(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    machine(tmp_path, "stretch,stress_MPa", np.column_stack([STRETCH, STRESS + 0.012 * np.sin(40 * STRETCH)]))
+    (tmp_path / "test.toml").write_text('study = "identify"\n[tensile]\nfile = "machine.csv"\nlaws = ["neo-hookean"]\n')
+    assert main(["identify", str(tmp_path / "test.toml"), "--out", str(tmp_path / "out")]) == 0
+    assert "neo-hookean: the R^2 is 0." in capsys.readouterr().out

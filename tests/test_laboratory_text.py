@@ -134,3 +134,53 @@ def test_settings_are_toml_or_plain_words() -> None:
     }
     with pytest.raises(InputError, match="key=value"):
         settings_from_words(["a"])
+
+
+@pytest.mark.parametrize(
+    ("header", "unit", "size"),
+    [
+        ("Stress (kgf/cm2)", "pressure", 98066.5),
+        ("Stress [kgf/cm^2]", "pressure", 98066.5),
+        ("Spannung [kp/cm²]", "pressure", 98066.5),
+        ("Stress (ksi)", "pressure", 6.894757e6),
+        ("Stress (N/mm2)", "pressure", 1e6),
+        ("p1 (inHg)", "pressure", 3386.389),
+        ("p1 (mmHg)", "pressure", 133.3224),
+        ("p1 (cmH2O)", "pressure", 98.0665),
+        ("p1 [bar(g)]", "pressure", 1e5),
+        ("Strain (in/in)", "ratio", 1.0),
+        ("Hencky strain (1)", "ratio", 1.0),
+        ("Area (mm2)", "area", 1e-6),
+        ("x (mm, filtered)", "length", 1e-3),
+    ],
+)
+def test_sizes_of_units(header: str, unit: str, size: float) -> None:
+    known = split_unit(header)[1]
+    assert known is not None
+    assert (known.kind, known.scale) == (unit, pytest.approx(size, rel=1e-6))
+
+
+def test_a_number_in_brackets_is_no_unit() -> None:
+    assert split_unit("Pressure (1)")[1] is None
+
+
+def test_a_summary_below_the_rows_is_left_out() -> None:
+    rows = "".join(f"{k / 10},{k / 4}\n" for k in range(40))
+    for summary, name in (
+        ("1.95,4.875\n", "turns back"),
+        ("40,9.75\n", "turns back"),
+        ("Mean,4.875\n", "rows of text"),
+    ):
+        choices = Choices({})
+        found = text_table("file", f"Time (s),Extension (mm)\n{rows}{summary}".encode(), choices)
+        assert found.rows == 40
+        assert [name in reason for reason in choices.dropped] == [True]
+    for whole in (rows, rows + "".join(f"{4 + k / 10},{9.75 - k / 4}\n" for k in range(3))):  # an unloading that begins
+        assert table(f"Time (s),Extension (mm)\n{whole}").rows == whole.count("\n")
+
+
+def test_a_unit_that_is_not_known_stays_with_its_name() -> None:
+    found = table("Time,Extension,Load\n(s),(mm),(kgx)\n" + "0,1,2\n1,2,3\n2,3,4\n")
+    assert found.names == ("Time", "Extension", "Load (kgx)")
+    assert table("% t(s) d(mm)\n0 1\n1 2\n2 3\n").names == ("t", "d")
+    assert [u and u.name for u in table("Dehnung;Spannung\n%;MPa\n1;2\n2;3\n3;4\n").units] == ["%", "MPa"]

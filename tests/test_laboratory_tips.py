@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -173,3 +174,93 @@ def test_plateaus_and_lags_of_a_known_signal() -> None:
 
 def test_files_of_the_folder_are_those_of_the_truth() -> None:
     assert all((FOLDER / name).is_file() for name in TRUTH)
+
+
+LOG = 640 + 1000 * np.repeat(np.array([[0, 0], [0.5, 0], [1, 0], [0, 0.7], [0, 0]]), 20, axis=0)
+
+
+def log_file(folder: Path, cells: list[str], name: str = "Time", values: np.ndarray = LOG) -> str:
+    """Write a log of two pressures [mbar] with these cells of its clock."""
+    rows = [f"{cell},{a:.1f},{b:.1f}" for cell, (a, b) in zip(cells, values, strict=True)]
+    (folder / "log.csv").write_text("\n".join([f"{name},p1 (mbar),p2 (mbar)", *rows]) + "\n")
+    return str(folder / "log.csv")
+
+
+def test_a_rest_at_neither_0_nor_the_air_is_asked_about(tmp_path: Path) -> None:
+    file = log_file(tmp_path, [f"{k / 10}" for k in range(100)], "Time (s)")
+    with pytest.raises(
+        AskError, match=r"level at which all sets rest is 0\.64 bar, expected at most 0\.1.*zero=absolute"
+    ):
+        imported(file)
+    for zero, rest in (("absolute", 0.0), ("tare", 0.0), (0.6, 0.04), ("gauge", 0.64)):
+        assert imported(file, zero=zero).columns["p1_bar"][0] == pytest.approx(rest, abs=1e-6)
+
+
+@pytest.mark.parametrize("form", ["%H:%M:%S.%f", "%I:%M:%S %p", "%m/%d/%Y %H:%M:%S", "ms"])
+def test_a_clock_goes_on_past_midnight(form: str, tmp_path: Path) -> None:
+    start = datetime(2025, 4, 3, 23, 58, 0)
+    moments = [start + timedelta(seconds=3 * k) for k in range(100)]
+    since = [(m - m.replace(hour=0, minute=0, second=0)).total_seconds() for m in moments]
+    cells = [f"{1000 * s:.0f}" if form == "ms" else m.strftime(form) for m, s in zip(moments, since, strict=True)]
+    name = "Timestamp (ms since midnight)" if form == "ms" else "Time"
+    found = imported(log_file(tmp_path, cells, name, LOG - 640))
+    np.testing.assert_allclose(np.diff(found.columns["t_s"]), 3.0)
+    assert any("begins again at midnight, in row 41" in note for note in found.choices.notes)
+
+
+BEND = np.column_stack([np.linspace(0.01, 1.2, 90)] * 3) * np.repeat([1, 0.7, 0.4], 30)[:, None]
+TURN = np.linspace(0, 12 * np.pi, 90)
+CAP = 60 * np.column_stack([(1 - np.cos(BEND[:, 0])) * np.cos(TURN), (1 - np.cos(BEND[:, 0])) * np.sin(TURN), 0 * TURN])
+CAP = CAP / BEND + 60 * np.sin(BEND) / BEND * [0, 0, 1]
+PLANE = 60 * np.column_stack(
+    [(1 - np.cos(BEND[:30, 0])) / BEND[:30, 0], 0 * BEND[:30, 0], np.sin(BEND[:30, 0]) / BEND[:30, 0]]
+)
+
+
+@pytest.mark.parametrize("tip", [CAP, PLANE], ids=["all around", "in a plane"])
+@pytest.mark.parametrize(("up", "turn"), [("z", 0.0), ("y", -np.pi / 2), ("-y", np.pi / 2)])
+def test_a_robot_that_is_not_along_z_is_named(tip: np.ndarray, up: str, turn: float, tmp_path: Path) -> None:
+    rows = Rotation.from_rotvec([turn, 0, 0]).apply(tip) + np.random.default_rng(0).normal(0, 0.03, tip.shape)
+    np.savetxt(tmp_path / "tips.csv", rows, delimiter=",", header="x_mm,y_mm,z_mm", comments="")
+    found = imported(str(tmp_path / "tips.csv"))
+    names = ("angle between the robot by its motion and z", "angle between the rest tip and z")
+    told = [check_of(found, name) for name in names]
+    assert [check.verdict for check in told] == ["passed" if up == "z" else "warned"] * 2
+    if up != "z":
+        assert f"--set up={up}" in told[1].message
+        again = imported(str(tmp_path / "tips.csv"), up=up)
+        assert [check_of(again, name).verdict for name in names] == ["passed"] * 2
+        np.testing.assert_allclose(tips(again), tip, atol=0.2)
+
+
+def test_a_robot_that_only_grows_longer_is_not_turned_round(tmp_path: Path) -> None:
+    p = np.random.default_rng(0).uniform(0, 1, (300, 3)) * (np.arange(300) > 0)[:, None]
+    rows = np.column_stack([20 * p[:, 0] - 10 * (p[:, 1] + p[:, 2]), 17 * (p[:, 1] - p[:, 2]), 60 + p.sum(axis=1)])
+    np.savetxt(tmp_path / "tips.csv", rows, delimiter=",", header="x_mm,y_mm,z_mm", comments="")
+    check = check_of(imported(str(tmp_path / "tips.csv")), "angle between the robot by its motion and z")
+    assert check.verdict == "passed"
+
+
+def test_a_sensor_that_was_never_seen_is_asked_about(tmp_path: Path) -> None:
+    header = "x (m),y (m),z (m)"
+    np.savetxt(tmp_path / "tips.csv", CAP, delimiter=",", header=header, comments="", fmt="%.4f")
+    with pytest.raises(AskError, match=r"seen in no row, or only beyond 10 m.*unit\.NAME=mm"):
+        imported(str(tmp_path / "tips.csv"))
+    found = imported(str(tmp_path / "tips.csv"), unit__x="mm", unit__y="mm", unit__z="mm")
+    np.testing.assert_allclose(tips(found), CAP, atol=1e-3)
+
+
+def test_one_unit_for_all_sensors_and_tools_by_number(tmp_path: Path) -> None:
+    rows = [
+        f"{s},{k / 10},{','.join(f'{v:.4f}' for v in (tip if s == 2 else 0 * tip + 0.1))}"
+        for k, tip in enumerate(CAP)
+        for s in (1, 2)
+    ]
+    (tmp_path / "tips.csv").write_text("\n".join(["Sensor,Time (s),X,Y,Z", *rows]))
+    found = imported(str(tmp_path / "tips.csv"), frame="given")
+    assert (found.choices.used["unit.position"], found.choices.used["base"]) == ("mm", "1")
+    np.testing.assert_allclose(tips(found), CAP, atol=1e-3)
+    (tmp_path / "cm.csv").write_text(
+        "Take 1,Length Units,Centimeters\n\nX,Y,Z\n" + "\n".join(f"{a:.5f},{b:.5f},{c:.5f}" for a, b, c in CAP / 10)
+    )
+    np.testing.assert_allclose(tips(imported(str(tmp_path / "cm.csv"))), CAP, atol=1e-3)

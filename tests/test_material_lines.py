@@ -41,7 +41,10 @@ FILES = [
     (b"#" * 1_000_001, "too large: expected at most 1 MB, got a file of 1.000001 MB"),
     ("a = 1", "a: expected a table of a silicone, got 1"),
     ("[S]", "[S]: expected the table of a law, such as [S.mooney-rivlin]"),
-    ("[S]\nlinear = 1", "[S] linear: unknown key; known: density_kg_m3, fitted_stretch, source"),
+    (
+        "[S]\nlinear = 1",
+        "[S] linear: unknown key; known: density_kg_m3, fitted_stretch, source, test, rate, date, set, sets",
+    ),
     ("[S.yeo]\nC10_MPa = 1", "[S.yeo]: unknown law 'yeo'; did you mean 'yeoh'? (a law of your own needs a formula)"),
     ("[S.linear]\nE_l = 1", "[S.linear] E_l: unknown constant of law 'linear'; did you mean 'E_l_MPa'?"),
     ("[S.linear]", "[S.linear] E_l_MPa: missing constant of law 'linear'; expected E_l_MPa"),

@@ -41,6 +41,16 @@ def test_a_page_escapes_what_people_wrote_and_loads_nothing() -> None:
     assert "a &lt; b &amp; c" in page
 
 
+def test_tables_within_tables_are_rows_and_none_is_left_as_code() -> None:
+    inner = {"x_mm": {"rmse": 1.23456789, "count": 3}, "y_mm": {"rmse": 2.0, "count": 4}}
+    row = {"law": "yeoh", "values": {"k_e": 0.5}, "statistics": inner, "by_robot": {"D25": inner}}
+    document = {"loads": {"gravity": {"z": -9.8}}, "variants": [row], "bounds": [None, 2.0]}
+    page = report_page("t", document, {}, {}, [])
+    assert "{" not in page.partition("</style>")[2]
+    for wanted in ("loads.gravity.z", "values.k_e", "Variants: statistics", "D25, y_mm", "1.23457", "-, 2"):
+        assert wanted in page
+
+
 def test_a_tensile_test_stands_beside_the_library(tmp_path: Path) -> None:
     text = f'study = "identify"\n[tensile]\nlaws = ["neo-hookean"]\nfile = "{FOLDER / "utm_preamble_kN_percent.csv"}"\n'
     (tmp_path / "test.toml").write_text(text)

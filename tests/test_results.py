@@ -74,7 +74,7 @@ STEP_KEYS = {
     ),
     *("tip_rotation", "bending_angle_deg", "tilt_deg", "backbone_length_mm", "chamber_length_mm", "residual"),
     *("discretisation_error", "intervals", "iterations", "solve_time_s", "warnings", "certificate"),
-    *("self_intersecting", "engine", "ipopt_status", "ipopt_iterations", "ipopt_multipliers"),
+    *("self_intersecting", "segments", "engine", "ipopt_status", "ipopt_iterations", "ipopt_multipliers"),
 }
 KEPT_UNSOLVED = {"pressure_bar", "t_s", "status", "message", "residual", "warnings", "certificate"}
 

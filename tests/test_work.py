@@ -10,7 +10,8 @@ import pytest
 
 from softnlp import BAR, Coefficients, ContactSettings, Loads, Numerics, Step, blocked_force, forward, material, robot
 from softnlp.base.status import Status
-from softnlp.statics import solver
+from softnlp.statics import kept, loadcase, solver
+from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.condensed import CondensedSolver
 
 D25, DRAGON = robot("D25L60"), material("Dragon Skin 10", "linear")
@@ -90,3 +91,49 @@ def test_the_jacobian_for_ipopt_is_that_of_one_interval(monkeypatch: pytest.Monk
     assert step.status is Status.SOLVED
     assert step.ipopt is not None
     assert max(sizes) < 226
+
+
+def test_a_branch_that_a_coarse_grid_lost_is_gone_on_with_from_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The next grid does not begin at contact again, and its end is that of the branch."""
+    ended: list[Any] = []
+    followed = BlockedSolver._followed
+
+    def kept(self: BlockedSolver, *given: Any) -> Any:
+        found = followed(self, *given)
+        ended.append(found)
+        return found
+
+    monkeypatch.setattr(BlockedSolver, "_followed", kept)
+    thin, soft = robot("laparoscope-6"), material("Ecoflex 00-30", "mooney-rivlin")
+    stiff = Coefficients(chamber_reaction=1000.0)
+    step = blocked_force(thin, soft, [0.0, 0.0, 2.02e5], coefficients=stiff, numerics=NEWTON).steps[0]
+    first, second = ended
+    assert step.status is Status.DIVERGED
+    assert second.iterations <= 0.8 * first.iterations
+    assert second.situation.pressure == pytest.approx(first.situation.pressure, rel=5e-3)
+
+
+@pytest.mark.parametrize("blocking", [False, True])
+def test_a_first_pose_builds_what_its_rods_share_once(blocking: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The section with the wall is that without; of a step of Runge-Kutta there is one for each field."""
+    made: list[str] = []
+    function, section = ca.Function, loadcase.section_function
+
+    def counted(*given: Any) -> Any:
+        made.append(given[0])
+        return function(*given)
+
+    def sections(*given: Any) -> Any:
+        made.append("section of a rod")
+        return section(*given)
+
+    kept._KEPT.equations.clear()
+    monkeypatch.setattr(ca, "Function", counted)
+    monkeypatch.setattr(loadcase, "section_function", sections)
+    pose = (
+        blocked([1.0, 0.0, 0.0], STANDING) if blocking else forward(D25, DRAGON, [1e5, 0, 0], loads=STANDING).steps[0]
+    )
+    assert pose.status is Status.SOLVED
+    assert made.count("section of a rod") == 1
+    assert made.count("step") <= 2 * (1 + blocking)  # with the integrals and without
+    assert made.count("transition") == 1

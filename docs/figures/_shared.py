@@ -14,6 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from benchmarks.measured import ELONGATIONS, published
 from docs.tools.pages import saved
 from softnlp import BAR, load_scenario, run_scenario
 from softnlp.cli import main
@@ -33,16 +34,11 @@ class Simulated:
     angle: float
 
 
-# Shi et al., IEEE Transactions on Robotics 2025, doi 10.1109/TRO.2025.3626601
-PUBLISHED = (
-    Simulated("Ecoflex 00-10", 0.6, 111.6),
-    Simulated("Ecoflex 00-20", 0.8, 111.7),
-    Simulated("Ecoflex 00-30", 1.2, 113.4),
-    Simulated("Ecoflex 00-50", 1.8, 108.5),
-    Simulated("Dragon Skin 10", 3.0, 62.5),
+PUBLISHED = tuple(
+    Simulated(row["material"], row["pressure_bar"], row["bending_angle_deg"]) for row in published()["laparoscope"]
 )
-# The same: least and largest elongation of the robots of one length, three sets at 1.5 bar, Ecoflex 00-50 [mm]
-MEASURED_ELONGATION = {"L60": (35.03, 42.31), "L40": (22.70, 25.11)}
+# Least and largest elongation of the robots of one length, three sets at 1.5 bar, Ecoflex 00-50 [mm]
+MEASURED_ELONGATION = ELONGATIONS
 
 
 def measured(file: str, column: str) -> list[tuple[str, list[float], float]]:

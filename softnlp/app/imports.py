@@ -73,7 +73,7 @@ SETTINGS: Mapping[str, tuple[Setting, ...]] = {
         Setting("base", "Sensor of the base"),
         Setting("tip_offset_mm", "Sensor on the tip at [x, y, z] [mm]"),
         Setting("quaternion", "Order of the quaternion", ("wxyz", "xyzw")),
-        Setting("up", "Up in the tracker's frame", ("z", "y", "x")),
+        Setting("up", "Up in the tracker's frame", ("z", "y", "x", "-z", "-y", "-x")),
         Setting("length_mm", "Length of the robot [mm]"),
         Setting("rows", "Rows", ("plateaus", "samples")),
         Setting("lag_s", "Lag of the pressures [s]"),
@@ -206,6 +206,7 @@ def check_rows(imported: Imported) -> tuple[list[str], Rows]:
 def told(imported: Imported) -> str:
     """Return what is unusual, what was left out and why, and what is reported of the files, a line each."""
     lines = [f"Warning: {warning}" for warning in imported.warnings]
+    lines += [f"Note: {note}" for note in imported.choices.notes]
     lines += [f"Left out: {count} {reason}" for reason, count in imported.choices.dropped.items()]
     return "\n".join((*lines, *(f"{name}: {value:.5g}" for name, value in imported.numbers.items())))
 

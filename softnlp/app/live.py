@@ -19,6 +19,7 @@ from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Pose, Run, Step
 from softnlp.statics.wall import standing_wall
+from softnlp.studies.uncertainty import Deviations
 
 Array = NDArray[np.float64]
 
@@ -35,6 +36,7 @@ class LivePoses:
         self._blocked: dict[Hashable, BlockedSolver] = {}
         self._near: Solved | None = None
         self._near_kind: Hashable = None
+        self._deviations: tuple[Scenario, bool, Deviations] | None = None
 
     def pose(self, scenario: Scenario, pressure: Array) -> tuple[Run, Pose | None]:
         """Return a run of one step at a pressure (sets,) [Pa], and the shape there without loads where loads act.
@@ -45,6 +47,7 @@ class LivePoses:
             solver = self._solver(scenario)
             step, solved = solver.solve(pressure, scenario.loads, self._start(scenario))
             self._near, self._near_kind = solved or self._near, _kind(scenario)
+            step = self._scattered(scenario, step)
             run = replace(run_of(scenario, [step]), study="forward", contact=None)  # a pose of whatever study it is
             return run, self._ghost(solver, scenario, step)
 
@@ -66,8 +69,20 @@ class LivePoses:
             if not constrained:
                 wall = standing_wall(solver.poses, scenario.contact, np.atleast_2d(pressure), scenario.loads)
             step, _ = solver.solve(pressure, scenario.loads, wall)
+            step = self._scattered(scenario, step)
         free = None if step.contact is None else step.contact.free
         return run_of(scenario, [step]), free
+
+    def _scattered(self, scenario: Scenario, step: Step) -> Step:
+        """Return the step with standard deviations, where the scenario says what scatters."""
+        if scenario.uncertainty is None:
+            return step
+        pressed, kept = step.contact is not None, self._deviations
+        if kept is None or kept[0] is not scenario or kept[1] is not pressed:
+            contact = scenario.contact if pressed else None
+            asked = scenario.model, scenario.numerics, scenario.loads, contact, scenario.uncertainty
+            self._deviations = kept = scenario, pressed, Deviations(*asked)
+        return kept[2].added(step)
 
     def _start(self, scenario: Scenario) -> Solved | None:
         """Return the last pose, where it is one of the same kind of problem."""

@@ -263,11 +263,19 @@ def marks(x: Numbers, y: Numbers, colour: str, name: str = "", **more: Any) -> d
     return {"type": "scatter", "mode": "markers", "name": name, **shown}
 
 
-def line(x: Numbers, y: Numbers, colour: str, name: str = "", **more: Any) -> dict[str, Any]:
-    """Return a trace of a line with marks; there is a gap where there is no number. A long one is thinned evenly."""
+def line(
+    x: Numbers, y: Numbers, colour: str, name: str = "", spread: Numbers | None = None, **more: Any
+) -> dict[str, Any]:
+    """Return a trace of a line with marks; there is a gap where there is no number. A long one is thinned evenly.
+
+    spread : one standard deviation of each number, drawn as a bar.
+    """
     every = -(-len(x) // MOST_MARKS) or 1
     kept = sorted({*range(0, len(x), every), *range(len(x))[-1:]})
     trace = marks([x[k] for k in kept], [y[k] for k in kept], colour, name, size=6)
+    if spread is not None:
+        bars = {"type": "data", "array": [_number(spread[k]) for k in kept], "thickness": 1.5, "width": 0}
+        trace["error_y"] = {**bars, "color": colour}
     return trace | {"mode": "lines+markers", "line": {"color": colour, "width": 2}} | more
 
 

@@ -20,7 +20,14 @@ from softnlp.app.theme import figure_config, figure_layout, figure_text
 from softnlp.base.errors import InputError
 from softnlp.figures.style import colour
 from softnlp.model.laws import LAWS
-from softnlp.model.materials import FITTED_STRETCH, Material, MaterialEntry, load_materials, material_from_table
+from softnlp.model.materials import (
+    FITTED_STRETCH,
+    Material,
+    MaterialEntry,
+    MaterialSet,
+    load_materials,
+    material_from_table,
+)
 
 Form = Literal["library", "constants", "formula"]
 
@@ -87,7 +94,8 @@ def material_state(
     """
     table = document.table("material")
     name = table.get("name")
-    others = entries[name].models if isinstance(name, str) and name in entries else {}
+    entry = entries.get(name) if isinstance(name, str) else None
+    others = {} if entry is None else set_of(table, entry).models
     own = problem if problem is not None and problem.table == "material" else None
     try:
         material = material_from_table(table, folder=folder)
@@ -106,9 +114,17 @@ def known_silicones(document: Document, folder: Path) -> Mapping[str, MaterialEn
     return load_materials()
 
 
-def library_form(table: Mapping[str, Any], name: str, model: str) -> dict[str, Any]:
-    """Return the table of a silicone of the library with one of its laws."""
-    return {"name": name, "model": model, **_kept(table, "density_kg_m3", "file")}
+def library_form(table: Mapping[str, Any], entry: MaterialEntry) -> dict[str, Any]:
+    """Return the table of a silicone of the library, with its law and set where it has them."""
+    chosen = set_of(table, entry)
+    named = {} if chosen is entry.default else {"set": chosen.name}
+    model = law_or_default(table.get("model"), chosen.models)
+    return {"name": entry.name, "model": model, **named, **_kept(table, "density_kg_m3", "file")}
+
+
+def set_of(table: Mapping[str, Any], entry: MaterialEntry) -> MaterialSet:
+    """Return the set of constants that a table names, the default one where it names none that there is."""
+    return entry.sets.get(str(table.get("set")), entry.default)
 
 
 def constants_form(table: Mapping[str, Any], law: str, entry: MaterialEntry | None) -> dict[str, Any]:

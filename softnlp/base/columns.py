@@ -8,8 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from typing import Any
+
+import numpy as np
 
 from softnlp.base.units import BAR, DEGREE, MILLIMETRE, NEWTON_MILLIMETRE
 
@@ -159,6 +162,10 @@ def written(value: float | None, form: str, nothing: str = "-") -> str:
     return text.removeprefix("-") if float(text) == 0 else text
 
 
+def _deviation(name: str, step: Any) -> Any:
+    return None if step.deviation is None else step.deviation.values.get(name)
+
+
 _X, _ROTATION, _N = ("axis",), ("row", "col"), ("chamber",)
 _TIP = ("tip x", "y", "z")
 _EVERY = (
@@ -182,6 +189,15 @@ _EVERY = (
     Output("tilt", DEG, "angle between the tip axis and +z", group="pose", words="tip tilt", others=("tip_tilt",)),
     Output("backbone_length", MM, "length of the deformed axis: integral of |v| over s", group="pose"),
     Output("chamber_length", MM, "length of each deformed chamber axis", _N, "pose", title="Chamber {}"),
+    # --- of each segment, where there are several or one varies
+    Output("segment_tip_position", MM, "end of each segment in the world frame, without the connector behind it",
+           ("segment", *_X), "segments", lambda step: np.array([part.tip_position for part in step.pose.parts])),
+    Output("segment_tip_rotation", ONE, "rotation there; columns are the body axes", ("segment", *_ROTATION),
+           "segments", lambda step: np.array([part.tip_rotation for part in step.pose.parts])),
+    Output("segment_stretch", ONE, "stretch of each segment, the mean where its section varies", ("segment",),
+           "segments", lambda step: np.array([part.stretch for part in step.pose.parts])),
+    Output("segment_bending_angle", DEG, "bending angle of each segment", ("segment",), "segments",
+           lambda step: np.array([part.bending_angle for part in step.pose.parts])),
     # --- of a blocked force
     Output("blocked_force", N, "force with which the wall pushes the tip, not negative", group="wall",
            of="contact.force", short=("force",), others=("force",), form=".4f", page=".4f"),
@@ -226,6 +242,11 @@ _EVERY = (
     Output("shear_extension", ONE, "shear and extension v in the body frame", ("s", *_X), "shape",
            title="Shear and extension v"),
     Output("curvature", PER_M, "curvature u in the body frame", ("s", *_X), "shape", title="Curvature u"),
+    *(Output(f"along_{name}_radius", MM, f"radius {letter} along the rod", ("s",), "outline", f"pose.outline.{name}")
+      for name, letter in (("outer", "r_r"), ("lumen", "r_i"), ("chamber_circle", "r_cp"), ("chamber", "r_co"),
+                           ("bore", "r_ci"))),
+    Output("along_segment", ONE, "segment of each point of the rod, from 1; 0 at the end of a last connector", ("s",),
+           "outline", "pose.segment"),
     Output("free_position", MM, "position of the free shape's axis in the world frame", ("s", *_X), "free",
            "contact.free.shape.position"),
     Output("free_rotation", ONE, "rotation of the free shape's section; columns are the body axes", ("s", *_ROTATION),
@@ -239,10 +260,20 @@ _EVERY = (
     Output("nearest", MM, "the reachable tip position found", _X, "target", "aimed.tip_position", short=_TIP),
     Output("nearest_direction", ONE, "the tip's axis there", _X, "target", "aimed.tip_direction"),
     Output("optimal", ONE, "whether nothing that was left to choose is better nearby", group="target"),
+    # --- standard deviations, where uncertainties were given
+    *(Output(f"std_{name}", unit, f"standard deviation of {name.replace('_', ' ')}, first order", dims, "std",
+             partial(_deviation, name))
+      for name, unit, dims in (
+          ("tip_position", MM, _X), ("bending_angle", DEG, ()), ("tilt", DEG, ()), ("backbone_length", MM, ()),
+          ("elongation", MM, ()), ("stretch", ONE, ()), ("chamber_length", MM, _N), ("blocked_force", N, ()))),
     # --- of comparisons and designs
     Output("elongation", MM, "length of the deformed axis less that of the robot"),
     *(Output(f"tip_{x}", MM, f"{x} of the tip position", column=x, others=(f"tip_{x}", f"tip_position_{x}"))
       for x in "xyz"),
+    *(Output(f"orientation_{x}", DEG, f"{x} of the tip's turn from the one measured, as a rotation vector")
+      for x in "xyz"),
+    Output("orientation", DEG, "turn of the tip from the one measured", words="turn of the tip from the one measured",
+           short=("turn",)),
     Output("tip_deflection", MM, "distance of the tip from the z axis"),
     Output("chamber_gap", MM, "smallest gap between neighbouring reinforced chambers under pressure"),
     *(Output(name, MM, meaning, group="robot") for name, meaning in (

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    import xarray as xr
+Variable = tuple[tuple[str, ...], Any, dict[str, Any]]
+"""Dimensions, values and attributes."""
 
 
 def said(unit: str, meaning: str, **more: Any) -> dict[str, Any]:
@@ -23,20 +23,25 @@ def flag_attributes(names: Mapping[str, int]) -> dict[str, Any]:
     return {"flag_values": np.array(list(names.values()), np.int8), "flag_meanings": " ".join(names)}
 
 
-def dataset_bytes(dataset: xr.Dataset) -> bytes:
-    """Return the netCDF file of a dataset, made in memory."""
+def file_bytes(
+    variables: Mapping[str, Variable], coordinates: Mapping[str, Variable], attributes: Mapping[str, Any]
+) -> bytes:
+    """Return a netCDF file, made in memory."""
     import h5netcdf
 
     content = io.BytesIO()
-    beside = {str(name): set(dataset[name].dims) for name in dataset.coords if name not in dataset.dims}
+    every = {
+        name: (dims, np.asarray(values), about) for name, (dims, values, about) in {**variables, **coordinates}.items()
+    }
+    sizes = {name: size for dims, values, _ in every.values() for name, size in zip(dims, values.shape, strict=True)}
+    beside = {name: set(dims) for name, (dims, _, _) in coordinates.items() if name not in sizes}
     with h5netcdf.File(content, "w") as file:
-        put_attributes(file, dataset.attrs)
-        file.dimensions = dict(dataset.sizes)
-        for name, variable in dataset.variables.items():
-            dims = set(variable.dims)
-            own = [] if name in dataset.coords else [c for c, of in beside.items() if of <= dims]
+        put_attributes(file, attributes)
+        file.dimensions = sizes
+        for name, (dims, values, about) in every.items():
+            own = [] if name in coordinates else [c for c, of in beside.items() if of <= set(dims)]
             more = {"coordinates": " ".join(own)} if own else {}
-            put(file, name, variable.dims, variable.values, variable.attrs | more)
+            put(file, name, dims, values, about | more)
     return content.getvalue()
 
 

@@ -137,12 +137,14 @@ def range_of(*keys: str) -> Range | None:
     What has no range of its own, as `from` in a choice of `length_mm`, has that of the key above it.
     """
     path = ".".join(keys).split(".")
+    if path[0] == "uncertainty":  # read with what it is a deviation of
+        return None
     if path[0] == "sigma" or path[0].startswith("sigma_"):
         return DEVIATION
     if "constants" in path:
         return STRESS if path[-1].endswith("_MPa") else CONSTANT
     for k in range(len(path) - 1, -1, -1):
-        if path[k] == "levels":
+        if path[k] in ("levels", "s"):
             break
         with_table = ".".join(path[max(k - 1, 0) : k + 1])
         units = (limits for unit, limits in _BY_UNIT.items() if path[k].endswith(unit))

@@ -12,9 +12,12 @@ from softnlp.batch.plan import Plan
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model, with_symbols
 from softnlp.model.rod import Loads
+from softnlp.model.segments import SegmentedRobot, body_of
 from softnlp.model.tip import TipContact
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
+from softnlp.statics.chain_grid import chain_equations
+from softnlp.statics.chain_solver import ChainSolver
 from softnlp.statics.compiled import rod_equations
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
@@ -41,14 +44,19 @@ class Alone:
             self._free = self._free or self._solver()
             return self._free.with_model(model).solve(pressure, loads, near)
         if self._blocked is None:
-            equations = rod_equations(plan.model, (TipContact(plan.contact.closure),), by_machine=False)
             poses = self._solver(unloaded_accuracy=self._numerics.accuracy)
+            wall = (TipContact(plan.contact.closure),)
+            equations = rod_equations(plan.model, wall, by_machine=False, like=poses.equations)
             self._blocked = BlockedSolver(plan.model, self._numerics, plan.contact, poses=poses, equations=equations)
         # from zero pressure: the neighbours in a chunk are not on the way to each other
         return self._blocked.with_model(model).solve(pressure, loads, self.wall)
 
     def _solver(self, **settings: float) -> PoseSolver:
         """Return a solver whose numbers do not depend on what it has solved before."""
+        if isinstance(self.plan.model.robot, SegmentedRobot):
+            body = body_of(self.plan.model)
+            rods = tuple(rod_equations(model, by_machine=False) for model in body.models)
+            return ChainSolver(self.plan.model, self._numerics, equations=chain_equations(body, rods), **settings)
         equations = rod_equations(self.plan.model, by_machine=False)
         return PoseSolver(self.plan.model, self._numerics, equations=equations, **settings)
 
@@ -60,5 +68,6 @@ class Alone:
             part = column[start : start + nominal.size]
             values[name] = float(part[0]) if nominal.size == 1 and name != "pressure" else part
             start += nominal.size
-        named = with_symbols(self.plan.model, values)
+        model = self.plan.model
+        named = model if isinstance(model.robot, SegmentedRobot) else with_symbols(model, values)
         return named, values["pressure"], Loads(values["tip_force"], values["tip_moment"], values["gravity"])

@@ -14,6 +14,7 @@ from softnlp.batch.blocked_lane import CLOSURES, BlockedLane, BlockedPoses
 from softnlp.batch.plan import Plan
 from softnlp.batch.pose_lane import PoseLane, Poses, entries
 from softnlp.batch.poses import STATUSES, Block, Lane, Rows, unsolved_rows
+from softnlp.model.segments import SegmentedRobot
 from softnlp.statics.reduced import POSITION, ROTATION, STATE
 from softnlp.statics.step import Step, stable_flag
 
@@ -28,7 +29,8 @@ class ChunkSolver:
         self.plan = plan
         # The batch proposes and some poses are audited; what is solved alone is not closed one by one.
         self._alone = Alone(plan, plan.numerics if self.by_ipopt else plan.numerics.without_ipopt())
-        together = plan.numerics.transcription == "multiple-shooting" and not self.by_ipopt
+        single = not isinstance(plan.model.robot, SegmentedRobot)
+        together = single and plan.numerics.transcription == "multiple-shooting" and not self.by_ipopt
         self._free = PoseLane(plan) if together else None
         self._wall = self._alone.wall
         self._blocked: BlockedLane | None = None

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 
 from softnlp.batch.poses import row_type
 from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.inputs import segment_tables
 from softnlp.model.numerics import Numerics
-from softnlp.model.quantities import LOADS, Model, contact_quantities, quantities
+from softnlp.model.quantities import LOADS, Model, contact_quantities
 from softnlp.model.rod import Loads
+from softnlp.model.segments import SegmentedRobot, declared
 
 Array = NDArray[np.float64]
 
@@ -67,7 +69,7 @@ class Plan:
     @cached_property
     def nominal(self) -> dict[str, Array]:
         """Every quantity of a pose by name, in the order of `softnlp.model.quantities`, with the plan's loads [SI]."""
-        values = {name: q.nominal for name, q in quantities(self.model).items()}
+        values = {name: q.nominal for name, q in declared(self.model).items()}
         return values | {name: np.asarray(getattr(self.loads, name), float) for name in LOADS}
 
     def columns_of(self, name: str) -> slice:
@@ -106,6 +108,8 @@ class Plan:
             "varied": list(self.varied),
             "chunk": self.chunk,
         }
+        if isinstance(self.model.robot, SegmentedRobot):
+            told = {**told, "segment": segment_tables(self.model.robot)}
         digest = hashlib.sha256(json.dumps(told, sort_keys=True).encode())
         for part in (self.values, self.order, *(() if self.times is None else (self.times,))):
             digest.update(np.ascontiguousarray(part).tobytes())

@@ -24,6 +24,7 @@ from softnlp.cli.study import (
 from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
+    from softnlp.results.report_page import Section
     from softnlp.scenario.read import Scenario
     from softnlp.studies.identified import Identified
     from softnlp.studies.measurements import TensileTask
@@ -161,10 +162,28 @@ def _robots(asked: Scenario, folder: Path | None, json: bool, report: Path | Non
         from softnlp.figures import identified_figure
 
         figures = {"Measured and model": partial(identified_figure, found, asked.title)} if solved else {}
-        write_report(report, asked, document, figures, [library_section(found.material)], quiet=json)
+        texts = {"Tables to paste into a scenario": results.identified_text(asked, found)} if solved else {}
+        sections = [_read_section(found), library_section(found.material)]
+        write_report(report, asked, document, figures, sections, quiet=json, texts=texts)
     for problem in found.problems:
         complain(f"{asked.path}: [measurements] {problem}")
     return SOLVED if solved and not found.problems else SOME_UNSOLVED
+
+
+def _read_section(found: Identified) -> Section:
+    """Return what was read of each robot."""
+    from softnlp.base.units import BAR
+    from softnlp.results.report_page import Section
+    from softnlp.studies.measurements import OBSERVABLES, column_slice
+
+    rows = []
+    for d in found.data:
+        counts = {
+            name.replace("_", " "): int(d.measured[:, column_slice(name)].any(axis=1).sum()) for name in OBSERVABLES
+        }
+        seen = ", ".join(f"{count} of {name}" for name, count in counts.items() if count)
+        rows.append([d.label, str(len(d.pressure)), seen, f"0 to {d.pressure.max() / BAR:.4g}"])
+    return Section("What was read", ("robot", "rows", "measured", "pressures [bar]"), rows)
 
 
 def _identified(asked: Scenario) -> Identified:

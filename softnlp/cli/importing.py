@@ -84,6 +84,8 @@ def _say(imported: Imported) -> None:
     say_rows(names, rows)
     for reason, count in imported.choices.dropped.items():
         say(f"left out: {count} {reason}")
+    for note in imported.choices.notes:
+        say(f"note: {note}")
     for guess in imported.choices.guesses:
         say(f"guessed: {guess.key} = {guess.value}: {guess.reason}")
     for name, value in imported.numbers.items():

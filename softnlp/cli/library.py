@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from softnlp.base.errors import InputError, RobotError
+from softnlp.base.units import KILOPASCAL
 from softnlp.cli.console import say, say_rows
+from softnlp.cli.study import Json
+
+if TYPE_CHECKING:
+    from softnlp.model.materials import MaterialEntry
 
 
 def robots(
@@ -80,20 +87,62 @@ def _fit(sizes: tuple[float | None, ...], sets: int, each: int, wall: float, len
         say(f"{key} = {value}")
 
 
-def materials(*, file: Path | None = None) -> None:
-    """List the silicones with their laws and constants.
+def materials(*, file: Path | None = None, compare: bool = False, json: Json = False) -> None:
+    """List the silicones: their sets of constants, where each comes from, and their laws.
 
     Parameters
     ----------
     file
         A materials file of your own; the shipped one by default.
+    compare
+        Show the stress of each law at some stretches by every set, and how far the sets lie apart, for the silicones
+        that have several.
+    json
+        Print one JSON document instead of tables; stresses and constants in the units of their keys.
     """
     from softnlp.model.materials import load_materials
 
-    rows = []
-    for entry in load_materials(file).values():
-        for law, material in entry.models.items():
+    entries = load_materials(file)
+    if json:
+        from softnlp.results.document import document_text
+        from softnlp.results.materials import comparison_document, library_document
+
+        say(document_text(comparison_document(entries) if compare else library_document(entries)).rstrip("\n"))
+    elif compare:
+        _show_comparison(entries)
+    else:
+        _show_library(entries)
+
+
+def _show_library(entries: Mapping[str, MaterialEntry]) -> None:
+    from softnlp.results.materials import provenance
+
+    rows, said = [], {}
+    for entry, chosen in [(one, chosen) for one in entries.values() for chosen in one.sets.values()]:
+        for law, material in chosen.models.items():
             constants = (f"{c.file_key} = {material.constants[c.name] / c.scale:.7g}" for c in material.law.constants)
-            note = f" (derived: {entry.derived[law]})" if law in entry.derived else ""
-            rows.append([entry.name, law, f"{material.density:g}", ", ".join(constants) + note])
-    say_rows(["silicone", "model", "density_kg_m3", "constants"], rows)
+            note = f" (derived: {chosen.derived[law]})" if law in chosen.derived else ""
+            rows.append([entry.name, chosen.name, law, f"{material.density:g}", ", ".join(constants) + note])
+        low, high = next(iter(chosen.models.values())).fitted_stretch
+        words = [f"{key}: {text}" for key, text in provenance(chosen).items() if text]
+        said[entry.name, chosen.name] = "; ".join([*words, f"stretch {low:g} to {high:g}"])
+    say_rows(["silicone", "set", "model", "density_kg_m3", "constants"], rows)
+    for text in dict.fromkeys(said.values()):
+        alike = [name for (name, _), other in said.items() if other == text]
+        names = {chosen for (_, chosen), other in said.items() if other == text}
+        say(f"\n{', '.join(sorted(names))} ({', '.join(alike)}): {text}")
+
+
+def _show_comparison(entries: Mapping[str, MaterialEntry]) -> None:
+    from softnlp.results.materials import STRETCHES, compared_sets
+
+    header = ["silicone", "model", "stretch", "stress [kPa] by set", "largest / least"]
+    rows = []
+    for one in compared_sets(entries):
+        for k, stretch in enumerate(STRETCHES):
+            stresses = ", ".join(f"{name} {stress[k] / KILOPASCAL:.4g}" for name, stress in one.stresses.items())
+            rows.append([one.silicone, one.law, f"{stretch:g}", stresses, f"{one.ratio[k]:.2f}"])
+    say_rows(header, rows)
+    alone = [name for name, entry in entries.items() if len(entry.sets) < 2]
+    if alone:
+        say(f"\nwith one set: {', '.join(alone)}")

@@ -50,6 +50,7 @@ def mesh(
     """
     from softnlp.figures.mesh import FACETS, HOLES, body_solid, format_of, mould_body, require
     from softnlp.figures.mesh import cores as core_solids
+    from softnlp.model.segments import require_one_segment
 
     target = out or Path(f"{_stem(scenario)}.stl")
     format_of(target)
@@ -67,6 +68,8 @@ def mesh(
         if holes is not None:
             raise InputError("expected only together with --undeformed", key="--holes")
         view, number = _view_of(scenario, step, all_errors)
+        if view is not None:
+            require_one_segment(view.robot, "softnlp mesh")
         if view is None:
             complain(f"stopped before step {number}; nothing was written")
             return STOPPED
@@ -112,9 +115,12 @@ def _is_run(path: Path) -> bool:
 
 
 def _robot(path: Path, all_errors: bool) -> Robot:
+    from softnlp.model.segments import require_one_segment
     from softnlp.results import load_run
 
-    return load_run(path).robot if _is_run(path) else scenario_at(path, all_errors).robot
+    found = load_run(path).robot if _is_run(path) else scenario_at(path, all_errors).robot
+    require_one_segment(found, "softnlp mesh")
+    return found
 
 
 def _view_of(path: Path, step: int | None, all_errors: bool) -> tuple[RunView | None, int]:

@@ -30,8 +30,9 @@ def write_report(
     figures: Mapping[str, Callable[[], Figure]],
     sections: Sequence[Section] = (),
     quiet: bool = False,
+    texts: Mapping[str, str] | None = None,
 ) -> None:
-    """Write a report, if one is asked for; document : JSON of the study, figures : by caption."""
+    """Write a report, if one is asked for; document : JSON of the study, figures and texts : by caption."""
     if file is None:
         return
     from softnlp.base.files import write_whole
@@ -41,8 +42,8 @@ def write_report(
         paths = {Path(folder) / f"{k}.png": name for k, name in enumerate(figures)}
         drawn = draw({path: figures[name] for path, name in paths.items()})
         images = {paths[path]: path.read_bytes() for path in drawn}
-    texts = {"Scenario": asked.text, **_imports(asked)}
-    page = report_page(asked.title, json.loads(document), images, texts, sections)
+    every = {**(texts or {}), "Scenario": asked.text, **_imports(asked)}
+    page = report_page(asked.title, json.loads(document), images, every, sections)
     write_whole(file, page.encode())
     if not quiet:
         say(f"report in {file}")

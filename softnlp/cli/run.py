@@ -40,6 +40,7 @@ _COMMANDS: Mapping[str, str] = {
 
 _TABLE_WIDTH = 100
 _SET_WIDTH = 12  # of what each chamber set beyond the third adds to the table
+_DEVIATION_WIDTH = 45  # of standard deviations beside the numbers
 
 
 def run(
@@ -146,5 +147,6 @@ def _table(done: Run) -> str:
     """Return the table of a run as text; never narrower than its numbers need."""
     from softnlp.results import table_lines
 
+    more = _DEVIATION_WIDTH if done.uncertainty else 0
     heading = f"{done.title}: {done.robot.name}, {done.material.name} ({done.material.law.name})"
-    return rich_text(heading, table_lines(done), _TABLE_WIDTH + _SET_WIDTH * max(0, done.robot.chamber_sets - 3))
+    return rich_text(heading, table_lines(done), _TABLE_WIDTH + _SET_WIDTH * max(0, done.robot.chamber_sets - 3) + more)

@@ -44,6 +44,7 @@ def sensitivity(
     samples
         Draws of the check; 0 leaves it out.
     """
+    from softnlp.model.segments import require_one_segment
     from softnlp.results.document import document_text
     from softnlp.results.sensitivity import sensitivity_document, table_rows
     from softnlp.studies.report import named_tolerances, sensitivity_report
@@ -55,6 +56,7 @@ def sensitivity(
         raise InputError(f"expected a step from 1 to {count}, got {chosen}", key="--step")
     if samples < 0 or samples == 1:
         raise InputError(f"expected 0, or at least 2 samples, got {samples}", key="--samples")
+    require_one_segment(asked.robot, "softnlp sensitivity")
     folder = results_folder(out, json, scenario.stem)
     pressure = asked.pressures[chosen - 1]
     model = (asked.robot, asked.material, asked.coefficients)

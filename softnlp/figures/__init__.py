@@ -4,6 +4,7 @@ from softnlp.figures.compare import compare_figures, observable_figure, tips_fig
 from softnlp.figures.comparison import comparison_figure
 from softnlp.figures.identify import identified_figure, tensile_figure
 from softnlp.figures.material import material_figure
+from softnlp.figures.rings import rings_figure
 from softnlp.figures.run import blocked_figure, run_figure
 from softnlp.figures.section import section_figure
 from softnlp.figures.sparsity import sparsity_figure
@@ -18,6 +19,7 @@ __all__ = [
     "identified_figure",
     "material_figure",
     "observable_figure",
+    "rings_figure",
     "run_figure",
     "save_figure",
     "section_figure",

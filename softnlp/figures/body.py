@@ -15,6 +15,9 @@ from softnlp.figures.mesh.rings import circle, placed
 from softnlp.figures.space import axes_3d, draw_faces, draw_lines, plain_3d
 from softnlp.figures.style import GREY, INK, SMALL, TEXT, colour, step_colours
 from softnlp.model.gravity import gravity_lines, is_hanging
+from softnlp.model.robot import Robot
+from softnlp.model.section import SectionRadii
+from softnlp.model.segments import SegmentedRobot
 from softnlp.results import Body, RunView
 
 if TYPE_CHECKING:
@@ -29,20 +32,22 @@ ELEVATION = 16.0  # of the viewer [deg]
 _ARROW = 0.32  # length of a load's arrow, of L_0
 _LOW, _ROOM = 5.0, 1.5  # how much less high than wide a text is; distance from others, of a moment's radius
 _ROUND, _CLEAR = 0.7, 0.65  # radius of a moment's arrow, of that length, and at least so much of the outer diameter
+_CONNECTOR, _SLIM = 0.42, 0.6  # grey of a connector, and its radius in drawings, of the segment before
 _CANVAS = 5.6  # side of the square that the panel may draw in [inch]
 _BOX = (4.4, 3.7)  # largest width and height of the box of the axes, labels not included [inch]
 
 
-def tube(body: Body, radius: float, offset: tuple[float, float], facets: int, stations: int) -> tuple[Array, Array]:
+def tube(body: Body, radius: float | Array, offset: tuple[Any, Any], facets: int, stations: int) -> tuple[Array, Array]:
     """Return (n, 4, 3) quads [mm] and (n, 3) outward normals of a tube along a body.
 
-    radius : [m]. offset : of the tube's axis from the body's, in the body frame [m].
+    radius : one or (M,) [m]. offset : of the tube's axis from the body's, in the body frame, numbers or (M,) [m].
     """
     M = len(body.position)
     chosen = np.unique(np.linspace(0, M - 1, min(stations, M)).round().astype(int))
     p, R = body.position[chosen], body.rotation[chosen]
-    local = radius * circle(facets) + np.array(offset)
-    rings = placed(p[:, None], R[:, None], np.concatenate([local, local[:1]])[None]) / MILLIMETRE
+    wide, x, y = (np.broadcast_to(value, M)[chosen] for value in (radius, *offset))
+    local = wide[:, None, None] * circle(facets) + np.stack([x, y], axis=1)[:, None]
+    rings = placed(p[:, None], R[:, None], np.concatenate([local, local[:, :1]], axis=1)) / MILLIMETRE
     quads = np.stack([rings[:-1, :-1], rings[1:, :-1], rings[1:, 1:], rings[:-1, 1:]], axis=2)
     middle = 2 * np.pi * (np.arange(facets) + 0.5) / facets
     outward = np.column_stack([np.cos(middle), np.sin(middle), 0 * middle])
@@ -113,10 +118,11 @@ def body_panel(figure: Figure, centre: tuple[float, float], view: RunView) -> An
     for k in _ghosts(solved):
         body = view.bodies[k]
         assert body is not None
-        quads, normals = tube(body, body.radii.outer, (0, 0), GHOST_FACETS, GHOST_STATIONS)
-        pale = shaded(normals, GHOST_TINT * shades[k][:3] + (1 - GHOST_TINT), light, contrast=0.06)
-        draw_faces(axes, quads, pale, zorder=2, label="earlier step")
-        reach.append(quads.reshape(-1, 3))
+        for piece in body.pieces:
+            quads, normals = tube(piece, piece.radii.outer, (0, 0), GHOST_FACETS, GHOST_STATIONS)
+            pale = shaded(normals, GHOST_TINT * shades[k][:3] + (1 - GHOST_TINT), light, contrast=0.06)
+            draw_faces(axes, quads, pale, zorder=2, label="earlier step")
+            reach.append(quads.reshape(-1, 3))
     if solved:
         lines = [b.position / MILLIMETRE for b in view.bodies if b is not None]
         draw_lines(axes, lines, 1.4, colors=shades[list(solved)], zorder=3, label="axes of the steps")
@@ -161,28 +167,36 @@ def draw_cut_open(axes: Any, view: RunView, k: int, eye: Array, light: Array, *,
 
     body, robot = view.bodies[k], view.robot
     assert body is not None
-    skin, normals = tube(body, body.radii.outer, (0, 0), BODY_FACETS, BODY_STATIONS)
-    behind = normals @ eye < 0
-    quads, colours = [skin[behind]], [shaded(-normals[behind], SILICONE, light, contrast=0.14)]
-    for theta, chamber_set in zip(robot.chamber_angles(), robot.set_of_chamber, strict=True):
-        r_cp = body.radii.chamber_circle
-        offset = (r_cp * float(np.cos(theta)), r_cp * float(np.sin(theta)))
-        chamber, outward = tube(body, body.radii.chamber, offset, CHAMBER_FACETS, BODY_STATIONS)
-        rgb = np.array(to_rgb(colour(chamber_set)))
-        if view.pressure[k, chamber_set] == 0:
-            rgb = IDLE_TINT * rgb + (1 - IDLE_TINT)
-        quads.append(chamber)
-        colours.append(shaded(outward, rgb, light))
-    edges = _outline(skin, behind)
-    quads.append(edges)
-    colours.append(np.tile(to_rgb(GREY), (len(edges), 1)))
+    quads, colours, reach = list[Array](), list[Array](), list[Array]()
+    for piece, (own, first) in zip(body.pieces, segments_of(robot), strict=True):
+        skin, normals = tube(piece, piece.radii.outer, (0, 0), BODY_FACETS, BODY_STATIONS)
+        behind = normals @ eye < 0
+        quads.append(skin[behind])
+        colours.append(shaded(-normals[behind], SILICONE, light, contrast=0.14))
+        for theta, chamber_set in zip(own.chamber_angles(), own.set_of_chamber, strict=True):
+            r_cp = piece.radii.chamber_circle
+            offset = (r_cp * float(np.cos(theta)), r_cp * float(np.sin(theta)))
+            chamber, outward = tube(piece, piece.radii.chamber, offset, CHAMBER_FACETS, BODY_STATIONS)
+            rgb = np.array(to_rgb(colour(first + chamber_set)))
+            if view.pressure[k, first + chamber_set] == 0:
+                rgb = IDLE_TINT * rgb + (1 - IDLE_TINT)
+            quads.append(chamber)
+            colours.append(shaded(outward, rgb, light))
+        edges = _outline(skin, behind)
+        quads.append(edges)
+        colours.append(np.tile(to_rgb(GREY), (len(edges), 1)))
+        reach.append(skin.reshape(-1, 3))
+    for link in _connectors(body):
+        rod, normals = tube(link, link.radii.outer, (0, 0), CHAMBER_FACETS, 2)
+        quads.append(rod)
+        colours.append(shaded(normals, np.full(3, _CONNECTOR), light))
     # One collection, so that all is sorted by depth together; edges of the face's colour close the seams.
     draw_faces(axes, np.concatenate(quads), np.concatenate(colours), width=0.6, zorder=4, label="last step")
-    rim = skin.reshape(-1, BODY_FACETS, 4, 3)[-1, :, 1]
+    rim = skin.reshape(-1, BODY_FACETS, 4, 3)[-1, :, 1]  # of the last segment
     axes.plot(*np.vstack([rim, rim[:1]]).T, color=GREY, linewidth=0.8, zorder=5, label="tip rim")
 
     if not tip_frame:
-        return [skin.reshape(-1, 3)]
+        return reach
     tip, R = body.position[-1] / MILLIMETRE, body.rotation[-1]
     size = 0.2 * robot.length / MILLIMETRE
     arms = [(tip, tip + size * R[:, j]) for j in range(3)]
@@ -190,7 +204,35 @@ def draw_cut_open(axes: Any, view: RunView, k: int, eye: Array, light: Array, *,
     for (_, end), name in zip(arms, "xyz", strict=True):
         look: dict[str, Any] = {"ha": "center", "va": "center", "zorder": 7, "path_effects": _halo()}
         axes.text(*(tip + 1.35 * (end - tip)), name, size=SMALL, color=INK, **look)
-    return [skin.reshape(-1, 3), np.array([tip + 1.4 * size * R[:, j] for j in range(3)])]
+    return [*reach, np.array([tip + 1.4 * size * R[:, j] for j in range(3)])]
+
+
+def tip_radius(body: Body) -> float:
+    """Return the outer radius at the tip of a body [m]."""
+    return float(np.ravel(body.radii.outer)[-1])
+
+
+def segments_of(robot: Robot) -> list[tuple[Robot, int]]:
+    """Return the robot of each segment at its base, with the number of sets before it; itself where it is one."""
+    if not isinstance(robot, SegmentedRobot):
+        return [(robot, 0)]
+    found, sets = [], 0
+    for segment in robot.segments:
+        found.append((segment.robot, sets))
+        sets += segment.robot.chamber_sets
+    return found
+
+
+def _connectors(body: Body) -> list[Body]:
+    """Return the rigid pieces between and behind segments, slim rods."""
+    found = []
+    ends = [piece.position[0] for piece in body.pieces[1:]] + [body.position[-1]]
+    for piece, end in zip(body.pieces, ends, strict=True):
+        if np.linalg.norm(end - piece.position[-1]) > 0 and body.parts:
+            radius = _SLIM * tip_radius(piece)
+            radii = SectionRadii(radius, 0.0, 0.0, 0.0, 0.0)
+            found.append(Body(np.array([piece.position[-1], end]), np.array([piece.rotation[-1]] * 2), radii))
+    return found
 
 
 def _outline(skin: Array, behind: NDArray[np.bool_]) -> Array:

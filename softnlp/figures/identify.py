@@ -81,7 +81,8 @@ def identified_figure(found: Identified, title: str) -> Figure:
     for k, key in enumerate(shown):
         axes = figure.add_axes((step * k + 0.16 * step, 0.12, 0.78 * step, 0.71))
         unit = OUTPUTS[key].scale
-        plain(axes, f"measured {OUTPUTS[key].axis}", f"model {OUTPUTS[key].axis}")
+        turns = key == "orientation"  # from the one measured, which has no number of its own
+        plain(axes, "row" if turns else f"measured {OUTPUTS[key].axis}", f"model {OUTPUTS[key].axis}")
         ends = []
         for j, data in enumerate(found.data):
             measured = data.of(key) / unit
@@ -90,12 +91,16 @@ def identified_figure(found: Identified, title: str) -> Figure:
             where = column_slice(key)
             look: dict[str, Any] = {"linestyle": "none", "marker": _MARKERS[j % len(_MARKERS)], "markersize": 5}
             old, new = found.before[j][:, where] / unit, found.after[j][:, where] / unit
+            if turns:
+                old, new = (np.linalg.norm(np.nan_to_num(part), axis=1) for part in (old, new))
+                measured = np.where(np.isfinite(measured).any(axis=1), np.arange(1.0, len(measured) + 1), np.nan)
             axes.plot(measured.ravel(), old.ravel(), color=GREY, markerfacecolor="none", **look)
             axes.plot(measured.ravel(), new.ravel(), color=colour(j), label=user_text(data.label), **look)
             ends += [measured, old, new]
         every = np.concatenate([e.ravel() for e in ends])
         low, high = float(np.nanmin(every)), float(np.nanmax(every))
-        axes.plot([low, high], [low, high], color=PALE, linewidth=1.5, zorder=0)
+        if not turns:
+            axes.plot([low, high], [low, high], color=PALE, linewidth=1.5, zorder=0)
         before, after = found.errors(False)[key], found.errors()[key]
         axes.set_title(
             f"rmse {before.rmse / unit:.3g} {OUTPUTS[key].unit} before (grey), {after.rmse / unit:.3g} "

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softnlp.base.arrays import Array
-from softnlp.base.columns import OUTPUTS
+from softnlp.base.columns import OUTPUTS, Output
 from softnlp.base.units import MILLIMETRE
 from softnlp.figures.body import (
     Camera,
@@ -25,6 +25,7 @@ from softnlp.figures.body import (
     frame,
     shaded,
     side_camera,
+    tip_radius,
     tube,
 )
 from softnlp.figures.series import STEP, Abscissa, abscissa, finish_panels, new_panels, series
@@ -80,17 +81,24 @@ def run_figure(view: RunView, measured: Sequence[tuple[float, float]] = ()) -> F
     body_panel(figure, _CENTRE, view)
     x = abscissa(view)
     panels = new_panels(figure, 3 if x.with_pressures else 2)
-    series(panels[0], view, x, BENDING.shown(view.bending_angle), BENDING.heading)
+    series(panels[0], view, x, BENDING.shown(view.bending_angle), BENDING.heading, std=_std(view, BENDING))
     longer = ELONGATION.shown(view.backbone_length - view.robot.length)
-    series(panels[1], view, x, longer, ELONGATION.axis)
+    series(panels[1], view, x, longer, ELONGATION.axis, std=_std(view, ELONGATION))
     finish_panels(figure, panels, view, x)
     _explain_steps(figure, view)
     return figure
 
 
+def _std(view: RunView, output: Output) -> Array | None:
+    """Return one standard deviation of an output, None where the run has none."""
+    found = view.std.get(output.name)
+    return None if found is None else np.asarray(output.shown(found))
+
+
 def _begun(view: RunView, solved: str, *more: str) -> Figure:
     """Return a figure that says what was run."""
-    parts = [view.robot.name, view.material, *more, view.conventions, solved]
+    band = ["bands of one standard deviation"] if view.std else []
+    parts = [view.robot.name, view.material, *more, view.conventions, solved, *band]
     return new_figure(10.0, 5.4, view.title or view.robot.name, "  ·  ".join(parts))
 
 
@@ -140,7 +148,7 @@ def inverse_figure(view: RunView, targets: TargetView) -> Figure:
     x = Abscissa(np.arange(1, len(view.status) + 1, dtype=float), STEP, True)
     panels = new_panels(figure, 3)
     _left(panels[0], x, targets)
-    series(panels[1], view, x, BENDING.shown(view.bending_angle), BENDING.heading)
+    series(panels[1], view, x, BENDING.shown(view.bending_angle), BENDING.heading, std=_std(view, BENDING))
     finish_panels(figure, panels, view, x)
     panels[-1].set_xlabel("target")
     _explain_targets(figure, view, targets)
@@ -224,7 +232,7 @@ def blocked_figure(view: RunView, contact: ContactView, measured: Sequence[tuple
     _wall_panel(figure, view, contact)
     x = _wall_abscissa(view, contact)
     panels = new_panels(figure, 3 if x.with_pressures else 2)
-    series(panels[0], view, x, contact.force, FORCE.axis, least_span=0.01)
+    series(panels[0], view, x, contact.force, FORCE.axis, least_span=0.01, std=_std(view, FORCE))
     _draw_measured(panels[0], x, measured)
     _bending(panels[1], view, contact, x)
     finish_panels(figure, panels, view, x)
@@ -271,7 +279,7 @@ def _draw_measured(axes: Axes, x: Abscissa, measured: Sequence[tuple[float, floa
 
 def _bending(axes: Axes, view: RunView, contact: ContactView, x: Abscissa) -> None:
     """Draw the bending angle of the free shape as a dashed line, that of the blocked one as the steps."""
-    series(axes, view, x, BENDING.shown(view.bending_angle), BENDING.heading)
+    series(axes, view, x, BENDING.shown(view.bending_angle), BENDING.heading, std=_std(view, BENDING))
     free = BENDING.shown(contact.free_bending_angle)
     axes.plot(x.values, free, color=FREE, linewidth=1.4, linestyle=DASHES, zorder=2, label="free shape")
     both = np.concatenate([free, BENDING.shown(view.bending_angle)])
@@ -324,7 +332,7 @@ def _draw_free(axes: Any, free: Body, light: Array) -> list[Array]:
     """Draw the free shape as a pale body and its axis dashed."""
     quads, normals = tube(free, free.radii.outer, (0, 0), _FACETS, _STATIONS)
     faces = shaded(normals, np.full(3, 0.9), light, contrast=0.1)
-    end = free.position[-1] / MILLIMETRE + (disc(free.radii.outer / MILLIMETRE, _FACETS, 0.0) @ free.rotation[-1].T)
+    end = free.position[-1] / MILLIMETRE + (disc(tip_radius(free) / MILLIMETRE, _FACETS, 0.0) @ free.rotation[-1].T)
     draw_faces(axes, quads, faces, zorder=2, label="free shape")
     draw_faces(axes, end, "#EFEFEF", FREE, 0.8, zorder=2.1)
     line = free.position / MILLIMETRE
@@ -350,8 +358,8 @@ def _draw_cap(axes: Any, body: Body, cap: float, light: Array) -> Array:
     """Draw the rigid cap [mm] as a slim rod from tip to contact point; return the points it reaches."""
     R, p = body.rotation[-1], body.position[-1]
     rod = Body(np.array([p, p + cap * MILLIMETRE * R[:, 2]]), np.array([R, R]), body.radii)
-    quads, normals = tube(rod, _CAP_RADIUS * body.radii.outer, (0, 0), _FACETS, 2)
-    end = disc(_CAP_RADIUS * body.radii.outer / MILLIMETRE, _FACETS, cap) @ R.T + p / MILLIMETRE
+    quads, normals = tube(rod, _CAP_RADIUS * tip_radius(body), (0, 0), _FACETS, 2)
+    end = disc(_CAP_RADIUS * tip_radius(body) / MILLIMETRE, _FACETS, cap) @ R.T + p / MILLIMETRE
     faces = np.vstack([shaded(normals, np.full(3, 0.42), light), [[0.5, 0.5, 0.5]]])
     draw_faces(axes, [*quads, *end], faces, zorder=5.5, label="tip cap")
     return quads.reshape(-1, 3)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 LEAST_SPAN = 1.0  # of a vertical axis [deg or mm]
 STEP = "step"
+BAND, BAND_LABEL = "#CBD9EA", "one standard deviation"
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +79,22 @@ def finish_panels(figure: Figure, panels: Sequence[Axes], view: RunView, x: Absc
     figure.align_ylabels(panels)
 
 
-def series(axes: Axes, view: RunView, x: Abscissa, y: Array, label: str, least_span: float = LEAST_SPAN) -> None:
-    """Draw one number of each step; steps without a solution are crosses at the foot, unstable ones hollow."""
+def series(
+    axes: Axes,
+    view: RunView,
+    x: Abscissa,
+    y: Array,
+    label: str,
+    least_span: float = LEAST_SPAN,
+    std: Array | None = None,
+) -> None:
+    """Draw one number of each step; steps without a solution are crosses at the foot, unstable ones hollow.
+
+    std : one standard deviation, drawn as a band, or as a bar where its neighbours have none.
+    """
     plain(axes, x.label, label)
+    if std is not None:
+        _band(axes, x.values, y, std)
     shades = step_colours(len(y))
     axes.plot(x.values, y, color=GREY, linewidth=1.0, zorder=2)
     faces = np.where((view.stable == STABLE_FLAGS["unstable"])[:, None], 1.0, shades)
@@ -94,12 +108,26 @@ def series(axes: Axes, view: RunView, x: Abscissa, y: Array, label: str, least_s
         axes.plot(x.values[failed], place, "x", color=WRONG, markersize=6, transform=foot, label="no solution")
     axes.ticklabel_format(useOffset=False)
     known = y[np.isfinite(y)]
+    if std is not None:
+        spread = np.nan_to_num(std)
+        known = np.concatenate([known, (y - spread)[np.isfinite(y)], (y + spread)[np.isfinite(y)]])
     if known.size == 0:
         axes.set_yticks([])
     elif np.ptp(known) < least_span:
         # Rounding errors about a constant are not worth a panel's height.
         middle = (known.min() + known.max()) / 2
         axes.set_ylim(middle - 0.55 * least_span, middle + 0.55 * least_span)
+
+
+def _band(axes: Axes, x: Array, y: Array, std: Array) -> None:
+    """Draw a band of one standard deviation about steps whose x rises, and bars about others."""
+    known = np.isfinite(y) & np.isfinite(std)
+    look: dict[str, Any] = {"color": BAND, "zorder": 1.5, "label": BAND_LABEL}
+    if np.all(np.diff(x) > 0):
+        axes.fill_between(x, y - std, y + std, where=known, linewidth=0.0, **look)
+        known &= ~(np.append(known[1:], False) | np.append(False, known[:-1]))
+    if known.any():
+        axes.errorbar(x[known], y[known], std[known], fmt="none", elinewidth=2.5, **look)
 
 
 def pressures(axes: Axes, view: RunView, x: Abscissa) -> None:

@@ -41,7 +41,8 @@ class Choices:
     given : by dotted key. used : every setting that decided something, given or guessed, in the order of use.
     guesses : those that were not given. dropped : rows left out, by reason. varying : keys that were guessed to be one
     thing of one file and another of the next. against : settings that a file itself contradicts, with what to say.
-    decisive : those that all the same decided something else.
+    decisive : those that all the same decided something else. notes : what else was done, in words.
+    read : the columns that were used, by file and name.
     """
 
     given: Mapping[str, Any]
@@ -51,6 +52,8 @@ class Choices:
     varying: set[str] = field(default_factory=set)
     against: dict[str, str] = field(default_factory=dict)
     decisive: set[str] = field(default_factory=set)
+    notes: list[str] = field(default_factory=list)
+    read: set[tuple[str, str]] = field(default_factory=set)
     _known: set[str] = field(default_factory=set)
 
     def get(self, key: str, default: Any = None) -> Any:
@@ -109,6 +112,11 @@ class Choices:
         """Count rows that are left out."""
         if count:
             self.dropped[reason] = self.dropped.get(reason, 0) + int(count)
+
+    def say(self, note: str) -> None:
+        """Keep what was done beside, once."""
+        if note not in self.notes:
+            self.notes.append(note)
 
     def require_used(self) -> None:
         """Raise `InputError` for a setting that nothing asked for, and one that only contradicts a file."""

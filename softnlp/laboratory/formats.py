@@ -39,6 +39,8 @@ def read_tables(folder: Path, file: str, choices: Choices) -> list[RawTable]:
     """
     label = one_line(file, LONGEST_NAME)
     with located(source=label):
+        if file.endswith(".toml"):
+            raise NamedError("this is no file of measurements; a recipe of an import names its own and stands alone")
         content = read_bytes(folder / file, LARGEST)
         return _tables(label, content, choices)
 

@@ -68,6 +68,7 @@ class Imported:
             "dropped": dict(self.choices.dropped),
             "numbers": dict(self.numbers),
             "settings": dict(self.choices.used),
+            "notes": list(self.choices.notes),
             "guesses": [vars(guess) for guess in self.choices.guesses],
             "checks": [check.document() for check in self.checks],
         }

@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from softnlp.base.errors import InputError
+from softnlp.base.errors import InputError, listed
 from softnlp.base.reading import choices as quoted
 from softnlp.base.reading import shown
 from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.formats import read_tables
 from softnlp.laboratory.imported import Imported
 from softnlp.laboratory.loads import import_force, is_force
-from softnlp.laboratory.pressure import import_pressure, is_pressure
+from softnlp.laboratory.pressure import has_sets, import_pressure
 from softnlp.laboratory.table import RawTable
 from softnlp.laboratory.tensile import import_tensile, is_tensile
 from softnlp.laboratory.tips import import_tips, is_tips
@@ -59,14 +59,28 @@ def import_files(
     made = {"tensile": import_tensile, "pressure": import_pressure, "tips": import_tips, "force": import_force}[chosen]
     imported = made(tables, choices)
     choices.require_used()
+    unused = [name for table in tables for name in table.names if (table.file, name) not in choices.read]
+    if unused:
+        choices.say(f"columns that are not used: {listed(dict.fromkeys(unused))}")
     return imported
 
 
 def kind_of(tables: Sequence[RawTable], choices: Choices) -> str:
-    """Return the kind that the columns of some files have; raises `AskError` where they tell none."""
-    for kind, fits in (("tips", is_tips), ("tensile", is_tensile), ("force", is_force), ("pressure", is_pressure)):
-        if any(fits(table) for table in tables):
+    """Return the kind that the columns of some files have; raises `AskError` where they tell none, or several.
+
+    Files of tips and forces may hold pressures too, or come with a log of them.
+    """
+    fits = {"tips": is_tips, "tensile": is_tensile, "force": is_force, "pressure": has_sets}
+    for table in tables:
+        possible = [kind for kind, fit in fits.items() if fit(table)]
+        if len(possible) > 1 and possible not in (["tips", "pressure"], ["force", "pressure"]):
+            raise AskError(f"{_columns_of(table)} could be {' or '.join(possible)}; say --as {', '.join(possible)}")
+    for kind, fit in fits.items():
+        if any(fit(table) for table in tables):
             choices.take("as", kind, "by the names of its columns")
             return kind
-    names = ", ".join(shown(name) for name in tables[0].names[:12])
-    raise AskError(f"{tables[0].file}: what is it? Its columns are {names}; say --as {', '.join(KINDS)}")
+    raise AskError(f"{_columns_of(tables[0])} do not tell what it is; say --as {', '.join(KINDS)}")
+
+
+def _columns_of(table: RawTable) -> str:
+    return f"{table.file}: the columns {', '.join(shown(name) for name in table.names[:12])}"

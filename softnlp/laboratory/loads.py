@@ -16,14 +16,15 @@ from softnlp.laboratory.imported import Imported, require_possible
 from softnlp.laboratory.pressure import is_pressure
 from softnlp.laboratory.samples import sample_checks
 from softnlp.laboratory.signals import noise, plateaus
+from softnlp.laboratory.specimen import ALONG
 from softnlp.laboratory.streams import with_pressures
-from softnlp.laboratory.table import RawTable, in_si
+from softnlp.laboratory.table import RawTable, in_si, no_unit
 from softnlp.studies.check import Check
 
 Array = NDArray[np.float64]
 
 _FORCE, _MOMENT = r"^(force[ _]?)?f?[xyz]$", r"^(torque[ _]?|moment[ _]?)?[tm][xyz]$"
-_COUNTS = r"counts? per {} *[:=]? *([\d.]+)"
+_COUNTS = r"counts? per {} {{0,3}}[:=]? {{0,3}}([\d.]+)"
 _SETTLED = 0.2  # of the spread of a plateau: the first one stands for the bias
 
 
@@ -37,7 +38,7 @@ def force_columns(table: RawTable) -> list[int]:
 
 def is_force(table: RawTable) -> bool:
     """Whether a table is of a load cell."""
-    return bool(force_columns(table)) and not table.named(r"displac|extension|strain|stretch")
+    return bool(force_columns(table)) and not table.named(ALONG)
 
 
 def import_force(tables: Sequence[RawTable], choices: Choices) -> Imported:
@@ -70,7 +71,7 @@ def import_force(tables: Sequence[RawTable], choices: Choices) -> Imported:
     checks.append(Check("largest force", top, (0.005, 100.0), (0.0, 1e5), "looks like mN, kN or counts read as N", "N"))
     numbers = {"noise_N": float(max(map(noise, force.T)))}
     if logs and time is not None:
-        columns, more, found = with_pressures(columns, force, logs[0], choices)
+        columns, more, found = with_pressures(columns, force, table, logs[0], choices)
         checks, numbers = [*checks, *more], numbers | found
     require_possible(checks, choices)
     files = tuple(t.file for t in tables)
@@ -87,8 +88,8 @@ def _newtons(table: RawTable, k: int, choices: Choices) -> Array:
         said = re.search(_COUNTS.format("n(?!m)"), " ".join(table.preamble), re.IGNORECASE)
         if said is None:
             raise AskError(
-                f"{table.file}: column {shown(table.names[k])} has no unit: --set unit.force=N, or counts_per_N=…; it "
-                f"has {listed(table.names)}"
+                f"{table.file}: {no_unit(table, k, 'force')}: --set unit.force=N, or counts_per_N=…; it has "
+                f"{listed(table.names)}"
             )
         counts = float(choices.take("counts_per_N", float(said[1]), f"{shown(said[0])} of the preamble"))
     plain: Array = table.columns[k]

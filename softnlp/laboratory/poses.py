@@ -14,20 +14,25 @@ from softnlp.base.errors import InputError, listed
 from softnlp.base.reading import shown
 from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.table import RawTable, in_si
-from softnlp.laboratory.units import UNITS
+from softnlp.laboratory.units import UNITS, unit_named
 
 Array = NDArray[np.float64]
 
 _POSITION = re.compile(r"^(?:tip[ _.]?|pos(?:ition)?[ _.]?|t|p)?([xyz])(?:[ _.]?(\w{1,12}))?$", re.IGNORECASE)
 _TURN = r"q(?:uat(?:ernion)?)?|rotation|orientation"
 _QUATERNION = re.compile(rf"^(?:{_TURN})[ _.]?([ow0-4xyzrs])(?:[ _.]?(\w{{1,12}}))?$", re.IGNORECASE)
-_PREFIXED = re.compile(r"^(.+?)[ _.:/]+(?:pos(?:ition)?[ _.:/]+)?(t?[xyz]|q[ow0-4xyz])$", re.IGNORECASE)
+_PREFIXED = re.compile(
+    rf"^(.+?)[ _.:/]+(?:pos(?:ition)?[ _.:/]+)?(t?[xyz]|q[ow0-4xyz]|(?:{_TURN})[ _.:/][wxyz])$", re.IGNORECASE
+)
 _STATE = re.compile(r"state|status", re.IGNORECASE)
 _SEEN = ("ok", "valid", "visible", "tracked", "enabled", "good", "1", "true")
 _TOOL = re.compile(r"^(tool|sensor|body|marker|rigid ?body|port ?handle|tool ?info|name)s?\b", re.IGNORECASE)
+_LENGTH_UNIT = re.compile(r"length ?units? {0,3}[:=]? {0,3}([a-zµ]+)", re.IGNORECASE)
 _REACH = (1e-3, 3.0)  # [m]: how far a tip moves in a test
 _SHORT = 0.04  # [m]: a robot for which positions in mm may as well be in cm
-_FARTHEST = 10.0  # [m]: beyond what any tracker sees
+_CAPPED = 0.3  # the correlation of how high tips are with the square of how far out
+_FLAT, _ROUND = 0.03, 0.3  # of the largest standard deviation: tips in a plane; tips all around
+FARTHEST = 10.0  # [m]: beyond what any tracker sees
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,33 +115,40 @@ def sensors(table: RawTable, choices: Choices) -> dict[str, tuple[RawTable, Sens
         For a file without positions.
     """
     groups = pose_groups(table)
+    scale = _scale(table, [places for places, _, _ in groups.values()], choices)
     if not groups:
         raise InputError(f"{table.file}: expected columns x, y, z of a tracker; it has {listed(table.names)}")
     found: dict[str, tuple[RawTable, Sensor]] = {}
-    for tool, part in _by_tool(table).items():
+    for tool, part in _by_tool(table, choices).items():
         for suffix, group in groups.items():
             name = " ".join(word for word in (tool, suffix) if word) or "tip"
-            found[name] = part, _sensor(part, name, group, choices)
+            found[name] = part, _sensor(part, name, group, scale, choices)
     return found
 
 
-def _by_tool(table: RawTable) -> dict[str, RawTable]:
+def _by_tool(table: RawTable, choices: Choices) -> dict[str, RawTable]:
     """Return the rows of each tool of a file that has a column for its name, by that."""
     for k, name in enumerate(table.names):
         cells = table.columns[k]
-        if _TOOL.match(name) and not table.is_number(k):
-            tools = list(dict.fromkeys(cells))
-            if 1 < len(tools) <= 20:
-                return {tool: table.kept(np.array([cell == tool for cell in cells])) for tool in tools}
+        if _TOOL.match(name):
+            tools = list(dict.fromkeys(cells if not table.is_number(k) else cells.tolist()))
+            if 1 < len(tools) <= 20 and 2 * len(tools) <= table.rows:
+                choices.read.add((table.file, name))
+                named = {tool: tool if isinstance(tool, str) else f"{tool:g}" for tool in tools}
+                return {named[tool]: table.kept(np.array([cell == tool for cell in cells])) for tool in tools}
     return {"": table}
 
 
-def _sensor(table: RawTable, name: str, group: tuple[list[int], list[int], str], choices: Choices) -> Sensor:
+def _sensor(
+    table: RawTable, name: str, group: tuple[list[int], list[int], str], scale: float, choices: Choices
+) -> Sensor:
+    """Return a sensor; scale : of positions without a unit [m]."""
     places, turns, order = group
     columns = [in_si(table, k, "length", choices, "position") for k in places]
+    choices.read |= {(table.file, table.names[k]) for k in turns}
     raw = np.column_stack([table.columns[k] for k in places])
     q = np.column_stack([table.columns[k] for k in turns]) if turns else None
-    seen = np.all(np.isfinite(raw), axis=1) & ~_placeholders(raw) & _state(table, min([*places, *turns]))
+    seen = np.all(np.isfinite(raw), axis=1) & ~_placeholders(raw) & _state(table, min([*places, *turns]), choices)
     if q is not None:
         norm = np.linalg.norm(np.nan_to_num(q), axis=1)
         seen &= np.isfinite(q).all(axis=1) & (norm > 0.5)
@@ -145,8 +157,8 @@ def _sensor(table: RawTable, name: str, group: tuple[list[int], list[int], str],
         zeros = (raw == 0).all(axis=1)
         seen &= ~zeros | bool(np.mean(zeros) > 0.5)
     known = [column for column in columns if column is not None]
-    position = np.column_stack(known) if len(known) == 3 else raw * _scale(raw[seen], table, choices)
-    seen &= np.linalg.norm(position, axis=1) < _FARTHEST
+    position = np.column_stack(known) if len(known) == 3 else raw * scale
+    seen &= np.linalg.norm(position, axis=1) < FARTHEST
     asked = choices.get("quaternion")
     if q is not None and asked is not None:
         if asked not in ("wxyz", "xyzw"):
@@ -168,7 +180,7 @@ def _as_xyzw(q: Array, order: str) -> Array:
     return q[:, [order.index(letter) for letter in "xyzw"]]
 
 
-def _state(table: RawTable, first: int) -> NDArray[np.bool_]:
+def _state(table: RawTable, first: int, choices: Choices) -> NDArray[np.bool_]:
     """Return in which rows the words of the state column nearest to a sensor's first column say that it was seen."""
     words = {
         k: [str(cell).strip().lower() for cell in table.columns[k]]
@@ -179,13 +191,26 @@ def _state(table: RawTable, first: int) -> NDArray[np.bool_]:
     if not telling:
         return np.ones(table.rows, bool)
     nearest = min(telling, key=lambda k: abs(first - k))
+    choices.read.add((table.file, table.names[nearest]))
     return np.array([cell in _SEEN for cell in words[nearest]])
 
 
-def _scale(position: Array, table: RawTable, choices: Choices) -> float:
-    """Return the unit of positions without one: that in which a robot's tip moves as far as it can."""
-    reach = float(np.linalg.norm(np.ptp(position, axis=0))) if len(position) else 0.0
-    size = max(reach, float(np.linalg.norm(np.median(position, axis=0))) if len(position) else 0.0)
+def _scale(table: RawTable, places: Sequence[list[int]], choices: Choices) -> float:
+    """Return the unit [m] of positions without one: what the preamble says, else that in which a tip moves as far."""
+    without = [group for group in places if any(table.units[k] is None for k in group)]
+    asked = choices.get("unit.position")
+    if not without or asked is not None:
+        return 1.0  # `in_si` takes it
+    said = _LENGTH_UNIT.search(" ".join(table.preamble))
+    unit = None if said is None else unit_named(said[1])
+    if said is not None and unit is not None and unit.kind == "length":
+        return UNITS[str(choices.take("unit.position", unit.name, f"{shown(said[0])} of the preamble"))].scale
+    size = 0.0
+    for group in without:
+        raw = np.column_stack([table.columns[k] for k in group])
+        seen = raw[np.isfinite(raw).all(axis=1) & ~_placeholders(raw) & (raw != 0).any(axis=1)]
+        if len(seen):
+            size = max(size, *(float(np.linalg.norm(v)) for v in (np.ptp(seen, axis=0), np.median(seen, axis=0))))
     likely = [u for u in ("mm", "m") if _REACH[0] <= size * UNITS[u].scale <= _REACH[1]]
     if size * UNITS["mm"].scale < _SHORT < size * UNITS["cm"].scale:
         likely.append("cm")
@@ -193,10 +218,8 @@ def _scale(position: Array, table: RawTable, choices: Choices) -> float:
         raise AskError(
             f"{table.file}: its positions have no unit and lie within {size:.4g}: --set unit.position=mm, or cm, m"
         )
-    unit = choices.take(
-        "unit.position", likely[0], f"the positions lie within {size:.4g}, {size * UNITS[likely[0]].scale:.3g} m"
-    )
-    return UNITS[str(unit)].scale
+    reason = f"the positions lie within {size:.4g}, {size * UNITS[likely[0]].scale:.3g} m"
+    return UNITS[str(choices.take("unit.position", likely[0], reason))].scale
 
 
 def tip_and_base(found: Mapping[str, Sensor], choices: Choices) -> tuple[str, str | None]:
@@ -274,3 +297,23 @@ def turn_sense(position: Array, quaternion: Array) -> float | None:
     if np.sum(used) < 3:
         return None
     return float(np.mean(np.sum(turned * moved, axis=1)[used] / (turn * far)[used]))
+
+
+def motion_axis(position: Array, rest: Array) -> tuple[Array, bool] | None:
+    """Return the unit vector of a robot at rest, by how its tips (rows, 3) lie, and whether it may lie in all a plane.
+
+    Tips that bend all around lie on a cap, thin along the robot, which rises towards the rest tip; those of one plane
+    tell its normal, which the robot is across. None where they tell neither.
+    """
+    centred = position - position.mean(axis=0)
+    _, size, axes = np.linalg.svd(centred, full_matrices=False)
+    size = size / max(size[0], 1e-30)
+    if size[2] < _FLAT and size[1] > 2 * size[2]:
+        return axes[2], True
+    if size[1] < _ROUND or size[2] > 0.6 * size[1]:
+        return None
+    along = centred @ axes[2]
+    away = np.linalg.norm(centred @ axes[:2].T - (rest - position.mean(axis=0)) @ axes[:2].T, axis=1)
+    rises = -float(np.corrcoef(along, away**2)[0, 1])
+    # a robot that grows longer while it bends may lie on no cap: the rest tip then says on which side it is
+    return axes[2] * np.sign(rises if abs(rises) > _CAPPED else float(axes[2] @ rest)), False

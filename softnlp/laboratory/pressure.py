@@ -16,15 +16,17 @@ from softnlp.laboratory.clock import time_of
 from softnlp.laboratory.imported import ANY, Imported, require_possible
 from softnlp.laboratory.samples import sample_checks
 from softnlp.laboratory.signals import lag_between, noise
-from softnlp.laboratory.table import RawTable, in_si
+from softnlp.laboratory.table import RawTable, in_si, no_unit
 from softnlp.laboratory.units import UNITS
 from softnlp.studies.check import Check
 
 Array = NDArray[np.float64]
 
 _NAMES = r"^(p|pressure|press|druck|ch|chamber|valve|actuator|sensor)[ _#-]?\(?(\d+)\)?$"
+_WORDS = r"(?<!com)press|(?<![a-z])druck|chamber|valve|actuator|supply|regulator|^p\b|^p_|^ch"
 _COMMAND = r"set ?point|set|command|cmd|soll|target|desired|ref"
 _ATMOSPHERE = (0.85, 1.08)  # [bar]: of the air where people live
+_AT_REST = 0.1  # [bar]: sets that rest at more than this, all of them, are hardly at 0
 _HIGHEST = 6.0  # [bar]: what drives no silicone robot
 _UNITS = ("mbar", "kPa", "bar", "psi", "Pa")
 
@@ -44,6 +46,14 @@ def pressure_columns(table: RawTable) -> list[int]:
 def is_pressure(table: RawTable) -> bool:
     """Whether a table is a log of pressures."""
     return bool(pressure_columns(table)) or any(u is not None and u.kind == "pressure" for u in table.units)
+
+
+def has_sets(table: RawTable) -> bool:
+    """Whether a table is a log of pressures by the names of its columns, not only by a unit that a stress has too."""
+    return bool(pressure_columns(table)) or any(
+        unit is not None and unit.kind == "pressure" and re.search(_WORDS, name, re.IGNORECASE)
+        for name, unit in zip(table.names, table.units, strict=True)
+    )
 
 
 def import_pressure(tables: Sequence[RawTable], choices: Choices) -> Imported:
@@ -107,6 +117,7 @@ def pressures_of(table: RawTable, choices: Choices, timed: bool = True) -> tuple
     values = _in_bar(table, chosen, choices)
     checks += _command_checks(table, chosen, choices)
     gauge = _gauge(values, choices)
+    checks.append(_rest_check(gauge, choices))
     known = np.all(np.isfinite(gauge), axis=1) & (np.isfinite(time) if time is not None else True)
     choices.drop(int(np.sum(~known)), "rows with a missing cell")
     return (None if time is None else time[known]), gauge[known], checks
@@ -135,6 +146,7 @@ def _in_bar(table: RawTable, chosen: Sequence[int], choices: Choices) -> Array:
         if (unit is not None and unit.kind == "other") or (unit is None and "calibration" in choices.given):
             columns.append(_calibrated(table, k, choices))
             continue
+        choices.read.add((table.file, table.names[k]))
         known = in_si(table, k, "pressure", choices, "pressure")
         if known is None:
             known = table.columns[k] * UNITS[_unit(table, chosen, choices)].scale
@@ -178,7 +190,7 @@ def _unit(table: RawTable, chosen: Sequence[int], choices: Choices) -> str:
     ]
     if counts:
         told.append("it may be counts too, for all are whole (--set calibration=[counts at 0 bar, bar a count])")
-    raise AskError(f"{table.file}: column {shown(table.names[chosen[0]])} has no unit: {'; '.join(told)}")
+    raise AskError(f"{table.file}: {no_unit(table, chosen[0], 'pressure')}: {'; '.join(told)}")
 
 
 def _gauge(values: Array, choices: Choices) -> Array:
@@ -204,6 +216,21 @@ def _gauge(values: Array, choices: Choices) -> Array:
     return values - float(
         choices.take("atmosphere_bar", round(float(np.median(low)), 6), "the median of the sets at rest")
     )
+
+
+def _rest_check(gauge: Array, choices: Choices) -> Check:
+    """Return the check of the level at which all sets rest [bar], which is that of the air, so 0 where it is gauge."""
+    level = float(np.min(np.nanpercentile(gauge, 5, axis=0)))
+    usual = (-_AT_REST, _AT_REST)
+    asked = choices.used.get("zero")
+    if asked == "gauge":  # a person knows that none of them goes to 0
+        usual = (-_AT_REST, max(_AT_REST, level))
+    likely = (
+        "neither 0, as a gauge shows at rest, nor the pressure of the air: --set zero=absolute where the air has so "
+        f"little, high up; zero=tare, or zero={level:.4g}, where a sensor or regulator rests there; zero=gauge where "
+        "no set goes to 0"
+    )
+    return Check("level at which all sets rest", level, usual, (-np.inf, usual[1]), likely, "bar")
 
 
 def lag_check(lag: float) -> Check:

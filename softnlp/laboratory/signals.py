@@ -15,6 +15,8 @@ Rows = NDArray[np.intp]
 _TURN = 0.1  # of the range: a smaller fall is noise and no turn
 _BROKEN = 0.5  # of the largest stress: what is left of it after a break
 _HELD, _RELAXED = 2e-3, 0.02  # of the range of the stretch, and of the largest stress
+_TRIED_ON = 4000  # samples on which a lag is looked for first
+_CHANGED = 0.05  # of the range: a step between two plateaus
 _NOISE = 6.0  # standard deviations of the change between samples
 
 
@@ -108,43 +110,67 @@ def lag_between(time: Array, response: Array, command_time: Array, command: Arra
     """Return how much later the clock of a command reads than that of a response [s], its uncertainty, and R^2.
 
     time : (n,). response : (n, channels) of one unit. command_time : (m,). command : (m, sets). The lag is the shift at
-    which the commands, as a linear map, explain the most of the response, but for samples at which they step.
+    which the commands, as a linear map, `explained` the most of the response; the two share half of the shorter record.
     """
-    step = min(float(np.median(np.diff(time))), float(np.median(np.diff(command_time)))) / 2
-    reach = max(np.ptp(time), np.ptp(command_time)) / 2
-    offset = 0.0 if abs(time[0] - command_time[0]) <= reach else float(command_time[0] - time[0])
-    tried = offset + np.arange(-reach, reach + step, max(step, 2 * reach / 2000))
-    quality = np.array([_explained(time, response, command_time - lag, command) for lag in tried])
-    best = int(np.argmax(quality))
-    fine = tried[best] + np.linspace(-2, 2, 41) * max(step, 2 * reach / 2000)
-    sharp = np.array([_explained(time, response, command_time - lag, command) for lag in fine])
+    half = min(np.ptp(time), np.ptp(command_time)) / 2
+    low, high = command_time[0] - time[-1] + half, command_time[-1] - time[0] - half
+    step = max(min(float(np.median(np.diff(time))), float(np.median(np.diff(command_time)))) / 2, (high - low) / 2000)
+    tried = np.arange(low, high + step, step)
+    some, few = (slice(None, None, 1 + len(time) // most) for most in (_TRIED_ON, 10 * _TRIED_ON))
+    thin = slice(None, None, 1 + len(command) // (10 * _TRIED_ON))
+    command_time, command = command_time[thin], command[thin]
+    steps = stepping(command)
+    quality = np.array([explained(time[some], response[some], command_time - lag, command, steps) for lag in tried])
+    fine = tried[int(np.argmax(quality))] + np.linspace(-2, 2, 41) * step
+    sharp = np.array([explained(time[few], response[few], command_time - lag, command, steps) for lag in fine])
     good = fine[sharp >= sharp.max() - 1e-9 - 0.02 * (1 - sharp.min())]
     return float(np.mean(good)), float(max(np.ptp(good) / 2, step / 2)), float(sharp.max())
 
 
-def _switching(time: Array, command_time: Array, command: Array) -> NDArray[np.bool_]:
-    """Return which times lie where a command steps between two of its samples, none where it moves all the time."""
+def stepping(command: Array) -> NDArray[np.bool_]:
+    """Return between which samples a command (m, sets) steps, nowhere for one that moves all the time."""
     limits = np.array([max(_NOISE * np.sqrt(2) * noise(c), 0.02 * float(np.ptp(c))) for c in command.T])
-    steps = np.any(np.abs(np.diff(command, axis=0)) > limits, axis=1)
-    if np.mean(steps) > 0.5:
-        return np.zeros(len(time), bool)
-    at = np.clip(np.searchsorted(command_time, time, side="right") - 1, 0, len(steps) - 1)
-    found: NDArray[np.bool_] = steps[at]
-    return found
+    found: NDArray[np.bool_] = np.any(np.abs(np.diff(command, axis=0)) > limits, axis=1)
+    return found & bool(np.mean(found) <= 0.5)
 
 
-def _explained(time: Array, response: Array, command_time: Array, command: Array) -> float:
-    """Return the part of a response that commands explain, 0 where they share less than half of the shorter record."""
-    inside = (time >= command_time[0]) & (time <= command_time[-1]) & ~_switching(time, command_time, command)
+def explained(
+    time: Array, response: Array, command_time: Array, command: Array, steps: NDArray[np.bool_] | None = None
+) -> float:
+    """Return the part of a response that commands explain as a linear map, but for samples at which they step.
+
+    It is R^2 adjusted for how many levels the commands hold (Theil 1961): four levels of three sets explain anything. 0
+    where the two share less than half of the shorter record. steps : as `stepping` finds them.
+    """
     shared = min(time[-1], command_time[-1]) - max(time[0], command_time[0])
-    if np.sum(inside) < 10 or shared < 0.5 * min(np.ptp(time), np.ptp(command_time)):
+    if shared < 0.49 * min(np.ptp(time), np.ptp(command_time)):
+        return 0.0
+    steps = stepping(command) if steps is None else steps
+    at = np.clip(np.searchsorted(command_time, time, side="right") - 1, 0, len(steps) - 1)
+    inside = (time >= command_time[0]) & (time <= command_time[-1]) & ~steps[at]
+    if np.sum(inside) < 10:
         return 0.0
     P = np.column_stack([np.interp(time[inside], command_time, c) for c in command.T])
-    size = np.maximum(np.ptp(command, axis=0), 1e-30)
-    P = P / size
-    A = np.column_stack([np.ones(len(P)), P])  # with squares and products another lag of few steps fits as well
-    y = response[inside]
-    y = y - y.mean(axis=0)
-    left = y - A @ np.linalg.lstsq(A, y, rcond=None)[0]
+    P = P[:, np.ptp(P, axis=0) > 0.02 * max(float(np.max(np.ptp(command, axis=0))), 1e-30)]
+    levels = 1 + int(np.sum(np.diff(np.cumsum(steps)[at[inside]]) > 0)) if np.any(steps) else len(P)
+    free = levels - 1 - P.shape[1]
+    y = response[inside] - response[inside].mean(axis=0)
     total = float(np.sum(y**2))
-    return 1 - float(np.sum(left**2)) / total if total > 0 else 0.0
+    if free < 1 or not P.shape[1] or not total > 0:
+        return 0.0
+    A = np.column_stack([np.ones(len(P)), P / np.ptp(P, axis=0)])  # with squares another lag fits as well
+    left = y - A @ np.linalg.lstsq(A.T @ A, A.T @ y, rcond=None)[0]  # of numbers near 1: faster, and exact enough
+    return float(max(0.0, 1 - np.sum(left**2) / total * (levels - 1) / free))
+
+
+def changes(time: Array, signals: Array) -> Array:
+    """Return from when to when (changes, 2) signals go from one plateau to another, a twentieth of the range away."""
+    still = list(plateaus(signals))
+    levels = [np.median(signals[rows], axis=0) for rows in still]
+    size = np.maximum(np.ptp(signals, axis=0), 1e-30)
+    found = [
+        (time[a[-1]], time[b[0]])
+        for (a, before), (b, after) in pairwise(zip(still, levels, strict=True))
+        if np.max(np.abs(after - before) / size) > _CHANGED
+    ]
+    return np.array(found).reshape(-1, 2)

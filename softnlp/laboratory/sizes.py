@@ -15,7 +15,7 @@ from softnlp.laboratory.units import UNITS
 from softnlp.studies.check import Check
 
 _GRIPS = r"\b(grip|jaw|clamp)|einspannl"
-_AREA = r"\barea\b.*\bmm(2|\^2|²)"
+_AREA = r"\barea\b|cross.?section|querschnitt"
 _MARKED = r"gauge|l0|messl"  # labels of what is stretched, and of nothing else
 _LABELS: Mapping[str, Sequence[str]] = {
     "gauge_length": (r"gauge", r"^(specimen |sample )?length", r"l0|messl"),
@@ -87,9 +87,11 @@ def _written(table: RawTable, key: str) -> tuple[str, float] | None:
 
 
 def _written_area(table: RawTable) -> tuple[str, float] | None:
-    """Return what a preamble calls the cross-section of the specimen, and it [mm^2], where its label has that unit."""
+    """Return what a preamble calls the cross-section of the specimen, and it [mm^2], where it has a unit of area."""
     found = table.value(_AREA)
-    return None if found is None or found[1] <= 0 else found[:2]
+    if found is None or found[2] is None or found[2].kind != "area" or found[1] <= 0:
+        return None
+    return found[0], round(found[1] * found[2].scale / MILLIMETRE**2, 9)
 
 
 def size_checks(table: RawTable, area: float | None, choices: Choices) -> list[Check]:

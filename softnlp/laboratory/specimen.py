@@ -13,14 +13,17 @@ from softnlp.base.reading import shown
 from softnlp.base.units import MEGAPASCAL, MILLIMETRE
 from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.sizes import area_of, gauge_length, size_checks
-from softnlp.laboratory.table import RawTable, in_si, one_column
-from softnlp.laboratory.units import UNITS
+from softnlp.laboratory.table import RawTable, in_si, no_unit, one_column
+from softnlp.laboratory.units import UNITS, unit_named
 from softnlp.studies.check import Check
 from softnlp.studies.plausibility import SHEAR_MODULUS, area_check, divisor_checks
 
 Array = NDArray[np.float64]
 
-DISPLACEMENT = r"extension|displac|crosshead|position|stroke|traverse|elongation|standardweg|^weg|verl[aä]ngerung"
+DISPLACEMENT = (
+    r"extension|disp(?![a-z])|displac|crosshead|position|stroke|travel|traverse|elongation|standardweg|^weg|verl[aä]ngerung|"
+    r"^d$|^delta ?l$"
+)
 _FORCE = r"load|force|kraft|^last|^f[yz]?$"
 _STRAIN, _STRESS, _STRETCH = r"strain|dehnung", r"stress|spannung|^sigma", r"stretch|lambda"
 ALONG, ACROSS = rf"{DISPLACEMENT}|{_STRAIN}|{_STRETCH}", rf"{_STRESS}|{_FORCE}"
@@ -115,11 +118,14 @@ def curve_of(table: RawTable, choices: Choices) -> Curve:
 
 def _stretch(table: RawTable, choices: Choices, missing: list[str]) -> tuple[Array | None, list[Check]]:
     """Return the stretch, and the check of the crosshead against a strain where the file has both."""
+    moved = table.named(DISPLACEMENT, f"{_STRAIN}|{_RATE}")
+    ratios = [k for k in moved if _is_ratio(table, k, choices)]  # an elongation in percent is a strain
+    strains = [*table.named(_STRAIN, f"{_TRUE}|{_GREEN}|{_RATE}"), *ratios]
     columns = {
         "stretch": one_column(table, "stretch", table.named(_STRETCH), choices),
-        "strain": one_column(table, "strain", table.named(_STRAIN, f"{_TRUE}|{_GREEN}|{_RATE}"), choices),
-        "displacement": one_column(table, "displacement", table.named(DISPLACEMENT, f"{_STRAIN}|{_RATE}"), choices),
-        "true strain": one_column(table, "true strain", table.named(rf"({_TRUE}).*({_STRAIN})", _RATE), choices),
+        "strain": one_column(table, "strain", strains, choices),
+        "displacement": one_column(table, "displacement", [k for k in moved if k not in ratios], choices),
+        "true strain": one_column(table, "true strain", table.named(rf"(?=.*({_TRUE})).*({_STRAIN})", _RATE), choices),
         "Green strain": one_column(table, "Green strain", table.named(rf"({_GREEN}).*({_STRAIN})", _RATE), choices),
     }
     known = [name for name, k in columns.items() if k is not None]
@@ -139,19 +145,20 @@ def _stretch(table: RawTable, choices: Choices, missing: list[str]) -> tuple[Arr
     gauge = gauge_length(table, choices, chosen == "displacement")
     crosshead = None
     if columns["displacement"] is not None and (gauge is not None or chosen == "displacement"):
-        moved = in_si(table, columns["displacement"], "length", choices, "displacement")
-        if moved is None and chosen == "displacement":
-            missing.append(f"column {shown(table.names[k])} has no unit: --set unit.displacement=mm, or another length")
+        way = in_si(table, columns["displacement"], "length", choices, "displacement")
+        if way is None and chosen == "displacement":
+            missing.append(f"{no_unit(table, k, 'length')}: --set unit.displacement=mm, or another length")
         elif gauge is None:
             missing.append(
                 f"column {shown(table.names[k])} needs the length that was stretched: --set gauge_length_mm=…"
             )
-        elif moved is not None:
-            crosshead = 1 + moved / (gauge * MILLIMETRE)
+        elif way is not None:
+            crosshead = 1 + way / (gauge * MILLIMETRE)
     if chosen == "displacement":
         return crosshead, []
     if chosen == "stretch":
-        return table.columns[k], []
+        known_unit = in_si(table, k, "ratio", choices, "stretch")
+        return (table.columns[k] if known_unit is None else known_unit), []
     strain = _strain(table, k, chosen, columns, choices, crosshead, missing)
     if strain is None:
         return None, []
@@ -159,6 +166,13 @@ def _stretch(table: RawTable, choices: Choices, missing: list[str]) -> tuple[Arr
         choices.take("extension", chosen, "(stretch^2 - 1) / 2, by its name")
     stretch = _stretch_of(strain, chosen)
     return stretch, [] if crosshead is None else _crosshead_check(crosshead, stretch)
+
+
+def _is_ratio(table: RawTable, k: int, choices: Choices) -> bool:
+    """Whether a column of an extension is over a length, by its unit or the one that a person gives it."""
+    asked = choices.given.get(f"unit.{table.names[k]}", choices.given.get("unit.displacement"))
+    unit = table.units[k] if asked is None else unit_named(str(asked))
+    return unit is not None and unit.kind == "ratio"
 
 
 def _require_tension(table: RawTable, k: int) -> None:
@@ -223,7 +237,7 @@ def _strain(
         return plain * UNITS["%"].scale
     plain_one, percent = (float(_stretch_of(np.array(largest * scale), chosen)) for scale in (1.0, 0.01))
     missing.append(
-        f"column {shown(table.names[k])} has no unit and goes to {largest:.4g}: a stretch of {plain_one:.4g} "
+        f"{no_unit(table, k, 'ratio')}; it goes to {largest:.4g}: a stretch of {plain_one:.4g} "
         f"(--set unit.strain=1) or of {percent:.4g} (--set unit.strain=%)"
     )
     return None
@@ -236,7 +250,7 @@ def _stress(
     columns = {
         "engineering stress": one_column(table, "stress", table.named(_STRESS, f"{_TRUE}|{_RATE}"), choices),
         "force": one_column(table, "force", table.named(_FORCE, f"{_RATE}|cell"), choices),
-        "true stress": one_column(table, "true stress", table.named(rf"({_TRUE}).*({_STRESS})"), choices),
+        "true stress": one_column(table, "true stress", table.named(rf"(?=.*({_TRUE})).*({_STRESS})"), choices),
     }
     known = [name for name, k in columns.items() if k is not None]
     if not known:
@@ -255,7 +269,7 @@ def _stress(
     if chosen == "force":
         pull = in_si(table, k, "force", choices, "force")
         if pull is None:
-            missing.append(f"column {shown(table.names[k])} has no unit: --set unit.force=N, or kN, mN, lbf")
+            missing.append(f"{no_unit(table, k, 'force')}: --set unit.force=N, or kN, mN, lbf")
         if area is None:
             missing.append("a force needs the specimen's size: --set area_mm2=…, or width_mm and thickness_mm")
         return (None if pull is None or area is None else pull / area), []
@@ -263,16 +277,15 @@ def _stress(
         choices.take("stress", chosen, f"the file has {' and '.join(known[1:])} too")
     stress = in_si(table, k, "pressure", choices, "stress")
     if stress is None:
-        missing.append(_without_unit(table.names[k], table.columns[k], stretch))
+        missing.append(_without_unit(no_unit(table, k, "pressure"), table.columns[k], stretch))
         return None, []
     if chosen == "true stress":
         return (None if stretch is None else stress / stretch), []
     return stress, [] if pull is None else list(divisor_checks(pull, stress, area))
 
 
-def _without_unit(name: str, stress: Array, stretch: Array | None) -> str:
+def _without_unit(head: str, stress: Array, stretch: Array | None) -> str:
     """Say what a stress without a unit would come to in each."""
-    head = f"column {shown(name)} has no unit"
     if stretch is None:
         return f"{head}: --set unit.stress=kPa, or MPa, Pa, psi"
     reduced = stretch - stretch**-2.0

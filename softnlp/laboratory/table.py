@@ -15,12 +15,15 @@ from softnlp.base.errors import InputError, listed
 from softnlp.base.reading import LONGEST_NAME, one_line, shown
 from softnlp.laboratory.cells import is_number, number
 from softnlp.laboratory.choices import AskError, Choices, NoHeaderError
-from softnlp.laboratory.units import Unit, split_unit, unit_named
+from softnlp.laboratory.units import Unit, nearest_unit, split_unit, unit_named, unknown_unit
 
 Array = NDArray[np.float64]
 
 SKIP = "-"
 _KINDS_OF_AXES = re.compile(r"^(position|rotation|orientation)$", re.IGNORECASE)
+_BRACKET = re.compile(r"\s*[(\[{<][^()\[\]{}<>]*[)\]}>]$")
+_COUNTS_ON = re.compile(r"time|zeit|^t$|index|^(no|nr|row|reading|sample|scan|frame|point)s?\b", re.IGNORECASE)
+_MOST_SUMMED = 8  # rows of a summary: mean, deviation, least, largest, count and the like
 _ONE_CELL = re.compile(r"^(.+?)\s*[:=]\s*([+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*(\S*)$")
 
 
@@ -96,14 +99,14 @@ class RawTable:
         return None
 
 
-def header_rows(before: Sequence[Sequence[str]], width: int, rows: Sequence[Sequence[str]]) -> Header:
+def header_rows(before: Sequence[Sequence[str]], width: int) -> Header:
     """Return the names and units above a block of numbers; before : the rows above it."""
     filled = [_stripped(row) for row in before if any(row)]
     if not filled:
         return Header((), ())
     units: list[str] = []
     last = filled[-1]
-    if len(filled) > 1 and any(last) and all(unit_named(c) is not None or not c for c in last):
+    if len(filled) > 1 and _are_units(last, filled[-2]):
         units, last = last, filled[-2]
     above = filled[-3 if units else -2] if len(filled) > (2 if units else 1) else []
     if len(set(last)) < len(last) and any(_KINDS_OF_AXES.search(cell) for cell in above):
@@ -118,11 +121,18 @@ def header_rows(before: Sequence[Sequence[str]], width: int, rows: Sequence[Sequ
     return Header(tuple(last), tuple(units))
 
 
+def _are_units(row: Sequence[str], above: Sequence[str]) -> bool:
+    """Whether a row holds the units of the names above it; one of them may be unknown, or a word for a count."""
+    cells = [cell for cell in row if cell]
+    known = sum(unit_named(cell) is not None for cell in cells)
+    return known > 0 and len(cells) <= len(above) and (known == len(cells) or (known > 1 and known + 1 == len(cells)))
+
+
 def _stripped(row: Sequence[str]) -> list[str]:
     cells = [cell.strip() for cell in row]
     while cells and not cells[-1]:
         cells.pop()
-    if cells and cells[0][:1] in ("#", "%"):
+    if cells and cells[0][:1] in ("#", "%") and (cells[0] != "%" or any(unit_named(c) is None for c in cells)):
         cells[0] = cells[0].lstrip("#% ")
         if not cells[0]:
             cells.pop(0)
@@ -165,8 +175,11 @@ def assembled(
     spelt = dict(enumerate(header.units)) | dict(enumerate(_labview_units(before)))
     split = [split_unit(one_line(name, LONGEST_NAME)) for name in names]
     units = [unit_named(spelt.get(k, "")) or unit for k, (_, unit) in enumerate(split)]
+    for k, word in spelt.items():
+        if word and k < count and unit_named(word) is None and split[k][1] is None:
+            split[k] = f"{split[k][0]} ({word.strip('()[]')})", None  # a unit that is not known stays with the name
     kept = [k for k in range(count) if names[k] != SKIP and not _is_blank(columns[k])]
-    return RawTable(
+    table = RawTable(
         file=label,
         names=tuple(split[k][0] or f"column {k + 1}" for k in kept),
         units=tuple(units[k] for k in kept),
@@ -177,6 +190,38 @@ def assembled(
         later=tuple(_values(above, decimal) for above in later),
         results=_results(before, decimal),
     )
+    end = summary_rows(table)
+    choices.drop(len(end), "rows at the end where what counted on turns back or jumps, as a summary of the rows does")
+    return table.kept(np.setdiff1d(np.arange(table.rows), end)) if len(end) else table
+
+
+def summary_rows(table: RawTable) -> NDArray[np.intp]:
+    """Return the rows at the end of each block that are no samples.
+
+    A column that counts on in all rows before, a time, an index or the first one but for a load, turns back or jumps
+    there.
+    """
+    counting = [
+        table.columns[k]
+        for k, name in enumerate(table.names)
+        if table.is_number(k)
+        and (_COUNTS_ON.search(name) or (k == 0 and getattr(table.units[k], "kind", "") not in ("force", "pressure")))
+    ]
+    found: set[int] = set()
+    for block in np.unique(table.repeat):
+        rows = np.flatnonzero(table.repeat == block)
+        last = min(_MOST_SUMMED, len(rows) // 4)
+        for column in counting:
+            steps = np.diff(column[rows])
+            body = steps[: len(steps) - last]
+            sign = np.sign(body[0]) if last > 2 else 0.0
+            if not sign or not np.all(sign * body > 0):
+                continue
+            tail = sign * steps[len(steps) - last :]
+            wrong = np.flatnonzero((tail < -3 * np.median(abs(body))) | (tail > 20 * np.max(abs(body))))
+            if wrong.size:
+                found |= set(rows[len(rows) - last + int(wrong[0]) :].tolist())
+    return np.array(sorted(found), int)
 
 
 def _whole(pieces: Sequence[Any]) -> Any:
@@ -265,14 +310,17 @@ def in_si(table: RawTable, k: int, kind: str, choices: Choices, role: str) -> Ar
         For a unit that is none, or that measures something else.
     """
     name = table.names[k]
+    choices.read.add((table.file, name))
     unit = own = table.units[k]
-    for key in (f"unit.{name}", f"unit.{role}"):
+    named = (f"unit.{name}", f"unit.{_BRACKET.sub('', name)}")  # the second of a column whose unit is not known
+    for key in dict.fromkeys((*named, f"unit.{role}")):
         asked = choices.get(key)
         if asked is not None:
             unit = unit_named(str(asked))
             if unit is None or unit.kind != kind:
-                raise InputError(f"expected a unit of {kind}, got {shown(asked)}", key=key)
-            if key != f"unit.{name}" and own is not None:
+                hint = nearest_unit(str(asked), kind) if unit is None else ""
+                raise InputError(f"expected a unit of {kind}, got {shown(asked)}{hint}", key=key)
+            if key not in named and own is not None:
                 if own != unit:
                     told = f"{table.file}: column {shown(name)} is in {own.name}, got {unit.name}"
                     choices.against[key] = f"{told}; where the file is wrong, say --set unit.{name}={unit.name}"
@@ -286,6 +334,14 @@ def in_si(table: RawTable, k: int, kind: str, choices: Choices, role: str) -> Ar
         raise InputError(f"{table.file}: column {shown(name)} is in {unit.name}, which is no unit of {kind}")
     column: Array = table.columns[k] * unit.scale
     return column
+
+
+def no_unit(table: RawTable, k: int, kind: str) -> str:
+    """Say that a column has no unit, or one that is not known, and which one of a kind is near."""
+    name, word = table.names[k], unknown_unit(table.names[k])
+    if not word:
+        return f"column {shown(name)} has no unit"
+    return f"column {shown(name)}: the unit {shown(word)} is not known{nearest_unit(word, kind)}"
 
 
 def one_column(table: RawTable, role: str, found: Sequence[int], choices: Choices) -> int | None:

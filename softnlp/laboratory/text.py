@@ -117,9 +117,24 @@ def text_table(label: str, content: bytes, choices: Choices) -> RawTable:
     choices.note("separator", SEPARATORS[block.dialect.separator])
     choices.note("decimal", "comma" if block.dialect.decimal == "," else "point")
     before = [list(_split(line, block.dialect.separator)) for line in lines[: block.first]]
-    header = header_rows(before, block.width, block.rows)
+    return _block_table(label, before, block, _rows(_lines(content, encoding), block), choices)
+
+
+def cells_table(label: str, rows: Sequence[Sequence[str]], choices: Choices) -> RawTable:
+    """Return what stands in rows of cells, whose numbers have a decimal point; raises `InputError` for no numbers."""
+    block = next(_blocks(rows, Dialect("", ".")), None)
+    if block is None:
+        raise InputError("expected rows of numbers, got none")
+    below = (list(row) for row in rows[block.first :])
+    return _block_table(label, [list(row) for row in rows[: block.first]], block, below, choices)
+
+
+def _block_table(
+    label: str, before: list[list[str]], block: Block, rows: Iterator[list[str]], choices: Choices
+) -> RawTable:
+    """Return the table of a block and of the rows from its first one on."""
+    header = header_rows(before, block.width)
     width = max(block.width, len(header.names))
-    rows = _rows(_lines(content, encoding), block)
     pieces, later = _columns(rows, block, width, header.names, choices)
     return assembled(label, header, before, pieces, choices, block.dialect.decimal, later)
 
@@ -162,7 +177,7 @@ def _decided(lines: Sequence[str], choices: Choices) -> Block:
             continue
         for decimal in (".", ",") if asked_decimal is None else (decimals[asked_decimal],):
             if (separator, decimal) != (",", ",") or quoted:
-                found += _blocks(lines, Dialect(separator, decimal))
+                found += _blocks([_split(line, separator) for line in lines], Dialect(separator, decimal))
     if not found:
         raise InputError("expected rows of numbers, got none")
     found.sort(key=lambda block: -block.score)
@@ -191,12 +206,11 @@ def _told(block: Block) -> str:
     return " | ".join(f"{number(c, decimal):.10g}" if is_number(c, decimal) else c for c in block.rows[0][:8])
 
 
-def _blocks(lines: Sequence[str], dialect: Dialect) -> Iterator[Block]:
-    """Yield the largest run of rows of numbers in the sample."""
+def _blocks(lines: Sequence[Sequence[str]], dialect: Dialect) -> Iterator[Block]:
+    """Yield the largest run of rows of numbers among rows of cells."""
     run: list[tuple[int, tuple[str, ...]]] = []
     best: list[tuple[int, tuple[str, ...]]] = []
-    for k, line in enumerate([*lines, "end of the sample"]):
-        row = tuple(_split(line, dialect.separator))
+    for k, row in enumerate([*map(tuple, lines), ("end",)]):
         while row and not row[-1]:
             row = row[:-1]
         if not row:
@@ -213,7 +227,7 @@ def _blocks(lines: Sequence[str], dialect: Dialect) -> Iterator[Block]:
         yield _scored(lines, dialect, best)
 
 
-def _scored(lines: Sequence[str], dialect: Dialect, run: Sequence[tuple[int, tuple[str, ...]]]) -> Block:
+def _scored(lines: Sequence[Sequence[str]], dialect: Dialect, run: Sequence[tuple[int, tuple[str, ...]]]) -> Block:
     rows = [row for _, row in run]
     widths = Counter(map(len, rows))
     width, usual = widths.most_common(1)[0]
@@ -226,9 +240,9 @@ def _scored(lines: Sequence[str], dialect: Dialect, run: Sequence[tuple[int, tup
     first = run[0][0]
     if dialect.separator == " ":
         score *= _WHITE
-    above = next((line for line in reversed(lines[:first]) if line.strip()), None)
+    above = next((row for row in reversed(lines[:first]) if any(row)), None)
     if above is not None:
-        cells = [cell for cell in _split(above, dialect.separator) if cell]
+        cells = [cell for cell in above if cell]
         if width > 1 and len(cells) < max(2, width - 2):
             score *= 0.6  # names of another number of columns
         elif len(cells) >= width - 1:
@@ -260,7 +274,7 @@ def _columns(
             if row and row[0][:1].isalpha():
                 notes_above.append(row)
             count = sum(1 for cell, is_one in zip(row, numeric, strict=False) if is_one and cell[:1] in _BEGINS)
-            if not count:
+            if not count or _begins_with_word(row, numeric):
                 if header and [c for c in row if c] == [n for n in header if n]:
                     repeat += 1
                     later.append(list(notes_above))
@@ -282,6 +296,14 @@ def _columns(
         pieces[width].append(np.array(repeats, float))
     choices.drop(wrong, "cells that are no number")
     return pieces, later
+
+
+def _begins_with_word(row: Sequence[str], numeric: Sequence[bool]) -> bool:
+    """Whether the first cell of a row that is not blank has a word where a column has numbers: "Mean", "Width"."""
+    for cell, is_one in zip(row, numeric, strict=False):
+        if cell:
+            return is_one and cell[:1].isalpha() and cell.lower() not in MISSING
+    return False
 
 
 _BEGINS = frozenset("0123456789+-.,nN")

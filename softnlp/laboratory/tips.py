@@ -13,7 +13,16 @@ from softnlp.base.units import MILLIMETRE
 from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.clock import time_of
 from softnlp.laboratory.imported import ANY, Imported, require_possible
-from softnlp.laboratory.poses import Sensor, order_misfits, pose_groups, sensors, tip_and_base, turn_sense
+from softnlp.laboratory.poses import (
+    FARTHEST,
+    Sensor,
+    motion_axis,
+    order_misfits,
+    pose_groups,
+    sensors,
+    tip_and_base,
+    turn_sense,
+)
 from softnlp.laboratory.pressure import is_pressure, pressure_columns, pressures_of
 from softnlp.laboratory.samples import sample_checks, spikes
 from softnlp.laboratory.signals import noise
@@ -29,7 +38,11 @@ Array = NDArray[np.float64]
 FRAMES = ("given", "base sensor", "rest", "fit")
 _AXES = ("x_mm", "y_mm", "z_mm")
 _QUATERNION = ("qx", "qy", "qz", "qw")
-_UP = {"z": (0.0, 0.0, 0.0), "y": (np.pi / 2, 0.0, 0.0), "x": (0.0, -np.pi / 2, 0.0)}  # rotation vectors onto +z
+_UP = {  # rotation vectors onto +z
+    **{"z": (0.0, 0.0, 0.0), "y": (np.pi / 2, 0.0, 0.0), "x": (0.0, -np.pi / 2, 0.0)},
+    **{"-z": (np.pi, 0.0, 0.0), "-y": (-np.pi / 2, 0.0, 0.0), "-x": (0.0, np.pi / 2, 0.0)},
+}
+_AXIS, _STRAIGHT = 25.0, 15.0  # [deg]: the robot's axis, and its rest tip as seen from its base, away from z
 
 
 def is_tips(table: RawTable) -> bool:
@@ -55,6 +68,11 @@ def import_tips(tables: Sequence[RawTable], choices: Choices) -> Imported:
     tip_name, base_name = tip_and_base({name: sensor for name, (_, sensor) in found.items()}, choices)
     table, tip = found[tip_name]
     lost = int(np.sum(~tip.seen))
+    if lost == len(tip.seen):
+        raise AskError(
+            f"{table.file}: sensor {tip_name} was seen in no row, or only beyond {FARTHEST:g} m: where its positions "
+            "are in another unit say --set unit.NAME=mm of each of their columns"
+        )
     choices.drop(lost, "rows in which the sensor was not seen")
     checks = _quaternion_checks(tip)
     position, quaternion, more = _in_frame(tip, None if base_name is None else found[base_name][1], choices)
@@ -83,9 +101,9 @@ def import_tips(tables: Sequence[RawTable], choices: Choices) -> Imported:
     if time is not None:
         numbers["noise_mm"] = float(max(map(noise, position.T))) / MILLIMETRE
     if logs:
-        columns, streamed, told = with_pressures(columns, position, logs[0], choices)
+        columns, streamed, told = with_pressures(columns, position, table, logs[0], choices)
         checks, numbers = [*checks, *streamed], numbers | told
-    checks += _rest_checks(columns, choices)
+    checks += [*_rest_checks(columns, choices), *_upright_checks(columns, choices)]
     require_possible(checks, choices)
     return Imported("tips", tuple(t.file for t in tables), columns, tuple(checks), choices, numbers)
 
@@ -212,3 +230,43 @@ def _rest_checks(columns: dict[str, Array], choices: Choices) -> list[Check]:
         )
         found.append(Check("rest tip, away from (0, 0, length)", away, (0, 0.02 * length), ANY, likely, "mm"))
     return found
+
+
+def _upright_checks(columns: dict[str, Array], choices: Choices) -> list[Check]:
+    """Return the checks of a robot along z: of its motion, and of its rest tip as seen from the origin [deg]."""
+    if choices.used.get("frame") == "fit":
+        return []
+    tips = np.column_stack([columns[name] for name in _AXES])
+    rest = np.median(tips[_rest_rows(tips)], axis=0)
+    how = (
+        "; else --set frame=rest or 'base sensor', rotation_world_from_base_quat_xyzw=…, or frame = \"fit\" in "
+        "[registration] of the scenario"
+    )
+    found = []
+    if (told := motion_axis(tips, rest)) is not None:
+        axis, in_plane = told
+        angle = _from_z(axis)
+        likely = f"the robot lies along {_nearest_axis(axis, choices)}{how}"
+        if in_plane:
+            angle = abs(90 - angle)
+            likely = f"the tips move in one plane, in which z is not: --set up=y, or another{how}"
+        found.append(Check("angle between the robot by its motion and z", angle, (0, _AXIS), ANY, likely, "deg"))
+    if np.any(rest) and choices.number("length_mm") is None:
+        likely = f"the tips are not in the frame of the robot, but along {_nearest_axis(rest, choices)}{how}"
+        found.append(Check("angle between the rest tip and z", _from_z(rest), (0, _STRAIGHT), ANY, likely, "deg"))
+    return found
+
+
+def _from_z(axis: Array) -> float:
+    """Return the angle between an axis and z [deg]."""
+    return float(np.degrees(np.arccos(np.clip(axis[2] / np.linalg.norm(axis), -1, 1))))
+
+
+def _nearest_axis(axis: Array, choices: Choices) -> str:
+    """Return in words which axis of the tracker is near to another, and how that becomes z."""
+    from scipy.spatial.transform import Rotation
+
+    near = [name for name, turn in _UP.items() if _from_z(Rotation.from_rotvec(turn).apply(axis)) < _AXIS]
+    if not near or choices.used.get("up", "z") != "z":
+        return "none of its axes"
+    return f"{near[0]} of the tracker: --set up={near[0]}"

@@ -8,14 +8,13 @@ from collections.abc import Iterator
 from datetime import datetime, time
 from typing import Any
 
-import numpy as np
-
 from softnlp.base.csv_columns import MOST_COLUMNS
 from softnlp.base.errors import InputError, listed
 from softnlp.base.reading import one_line, shown
-from softnlp.laboratory.cells import is_number, numbers
+from softnlp.laboratory.cells import is_number
 from softnlp.laboratory.choices import Choices
-from softnlp.laboratory.table import RawTable, assembled, header_rows
+from softnlp.laboratory.table import RawTable
+from softnlp.laboratory.text import cells_table
 
 _LARGEST, _GROWTH = 150_000_000, 300  # bytes of all parts together, and that over the size of the archive
 _MOST_ROWS = 300_000
@@ -55,7 +54,7 @@ def workbook_tables(label: str, content: bytes, choices: Choices) -> list[RawTab
     chosen = asked if asked is not None else max(counts, key=lambda name: counts[name])
     if asked is None and sum(count > 0 for count in counts.values()) > 1:
         choices.take("sheet", chosen, f"it holds the most numbers of {listed(sheets)}")
-    return [_table(label, sheets[chosen], choices)]
+    return [cells_table(label, sheets[chosen], choices)]
 
 
 def _sheets(content: bytes) -> dict[str, list[list[str]]]:
@@ -92,29 +91,3 @@ def _cell(value: Any) -> str:
     if isinstance(value, datetime | time):
         return value.isoformat()
     return repr(float(value)) if isinstance(value, int | float) else one_line(str(value), 200)
-
-
-def _table(label: str, rows: list[list[str]], choices: Choices) -> RawTable:
-    """Return the table of a sheet: its largest run of rows of numbers, and what stands above."""
-    best: tuple[int, int] = (0, 0)
-    first = 0
-    for k, row in enumerate([*rows, ["end"]]):
-        filled = [c for c in row if c]
-        if filled and 2 * sum(is_number(c, ".") for c in filled) >= len(filled):
-            continue
-        if k - first > best[1] - best[0]:
-            best = first, k
-        first = k + 1
-    if best[1] == best[0]:
-        raise InputError("expected rows of numbers, got none")
-    block = rows[best[0] : best[1]]
-    width = max(max((k + 1 for k, c in enumerate(row) if c), default=0) for row in block)
-    before = rows[: best[0]]
-    header = header_rows(before, width, block)
-    columns: list[list[Any]] = []
-    for k in range(width):
-        cells = [row[k] if k < len(row) else "" for row in block]
-        filled = [c for c in cells if c]
-        numeric = 2 * sum(is_number(c, ".") for c in filled) > len(filled)
-        columns.append([numbers(cells, ".")[0] if numeric else cells])
-    return assembled(label, header, before, [*columns, [np.zeros(len(block))]], choices, ".")

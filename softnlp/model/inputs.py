@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
-from softnlp.base.units import BAR, MILLIMETRE, NEWTON_MILLIMETRE
+from softnlp.base.units import BAR, DEGREE, MILLIMETRE, NEWTON_MILLIMETRE
+from softnlp.model.body import Segment
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import Coefficients, Conventions
 from softnlp.model.gravity import gravity_words
 from softnlp.model.materials import Material
 from softnlp.model.robot import DIMENSIONS, Robot
 from softnlp.model.rod import Loads
+from softnlp.model.segments import SegmentedRobot, whole_robot
 
 if TYPE_CHECKING:
     from softnlp.model.quantities import Model
@@ -47,6 +49,59 @@ def robot_of_table(table: Mapping[str, Any]) -> Robot:
         d.field: int(table[d.file_key]) if d.scale is None else float(table[d.file_key]) * d.scale for d in DIMENSIONS
     }
     return Robot(name=str(table["name"]), **values)
+
+
+def segment_tables(robot: SegmentedRobot) -> list[dict[str, Any]]:
+    """Return the segments of a robot as the `[[segment]]` tables of a scenario."""
+    found = []
+    for segment in robot.segments:
+        table = robot_table(segment.robot)
+        for d in DIMENSIONS:
+            if (varies := segment.tables.get(f"robot.{d.field}")) is not None:
+                s, value = varies
+                table[d.file_key] = {"s": s.tolist(), "value": [tidy(v, d.scale or 1.0) for v in value]}
+        found.append(
+            {
+                "robot": table,
+                "material": material_table(segment.material),
+                "connector_mm": tidy(segment.connector, MILLIMETRE),
+                "lines": segment.lines,
+                "turn_deg": tidy(segment.turn, DEGREE),
+            }
+        )
+    return found
+
+
+def robot_of_segments(tables: Sequence[Mapping[str, Any]]) -> SegmentedRobot:
+    """Return the robot of `segment_tables`, for its sizes: without silicones; KeyError where one is missing."""
+    segments = []
+    for table in tables:
+        sizes, along = dict(table["robot"]), {}
+        for d in DIMENSIONS:
+            if isinstance(given := sizes[d.file_key], Mapping):
+                along[f"robot.{d.field}"] = {"s": given["s"], "value": [v * (d.scale or 1.0) for v in given["value"]]}
+                sizes[d.file_key] = given["value"][0]
+        connector, turn = float(table["connector_mm"]) * MILLIMETRE, float(table["turn_deg"]) * DEGREE
+        nothing: Any = None
+        segments.append(
+            Segment(robot_of_table(sizes), nothing, along=along, connector=connector, lines=table["lines"], turn=turn)
+        )
+    return whole_robot(segments)
+
+
+def robot_of_attributes(attributes: Mapping[str, Any]) -> Robot:
+    """Return the robot of a file's attributes, parsed; KeyError where one is missing."""
+    if "segment" in attributes:
+        return robot_of_segments(attributes["segment"])
+    return robot_of_table(attributes["robot"])
+
+
+def silicone_of_attributes(attributes: Mapping[str, Any]) -> tuple[str, str]:
+    """Return the names of a file's silicones and of their laws, each once."""
+    segments = attributes.get("segment")
+    tables = [attributes["material"]] if segments is None else [table["material"] for table in segments]
+    name, law = (" + ".join(dict.fromkeys(str(table[key]) for table in tables)) for key in ("name", "model"))
+    return name, law
 
 
 def material_table(material: Material) -> dict[str, Any]:
@@ -121,9 +176,12 @@ def loads_of_table(table: Mapping[str, Any]) -> Loads:
 
 def asked_tables(model: Model, loads: Loads) -> dict[str, Any]:
     """Return what was asked of any study as tables by name."""
+    robot: dict[str, Any] = {"robot": robot_table(model.robot), "material": material_table(model.material)}
+    if isinstance(model.robot, SegmentedRobot):
+        robot = {"segment": segment_tables(model.robot)}
     return {
-        "robot": robot_table(model.robot),
-        "material": material_table(model.material),
+        **robot,
+        **({"material_set": model.material.set} if model.material.set else {}),
         "coefficients": coefficients_table(model.coefficients),
         "loads": loads_table(loads),
     }

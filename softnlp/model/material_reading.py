@@ -36,6 +36,13 @@ def file_label(file: Any) -> str:
     return text if isinstance(file, str | PathLike) and text.isprintable() else shown(file)
 
 
+def shipped_file() -> Path:
+    """Return the library's file: beside the package when installed, at the top level of a checkout."""
+    package = Path(__file__).parents[1]
+    installed = package / "materials.toml"
+    return installed if installed.is_file() else package.parent / "materials.toml"
+
+
 def read_table(file: Any) -> dict[str, Any]:
     """Return the tables of a TOML file, or raise `MaterialError`."""
     if not isinstance(file, str | PathLike):

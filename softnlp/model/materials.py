@@ -14,12 +14,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
-
 from softnlp.base import ranges
 from softnlp.base.errors import MaterialError, nearest
-from softnlp.base.units import MEGAPASCAL
-from softnlp.model.formula import check_constant_name, shown
+from softnlp.base.reading import choices
+from softnlp.model.formula import shown
 from softnlp.model.laws import LAWS, SYMBOLS, Constant, Law, evaluate, formula_law, function_law
 from softnlp.model.material_reading import (
     check_keys,
@@ -28,10 +26,12 @@ from softnlp.model.material_reading import (
     number,
     quoted,
     read_table,
+    shipped_file,
     stretch_range,
     text_of,
     within,
 )
+from softnlp.model.material_sets import check_response, given_fields, law_with_constants, read_sets, unknown_law
 
 __all__ = [
     "LAWS",
@@ -39,6 +39,7 @@ __all__ = [
     "Law",
     "Material",
     "MaterialEntry",
+    "MaterialSet",
     "formula_law",
     "function_law",
     "load_materials",
@@ -48,8 +49,6 @@ __all__ = [
 
 DENSITY = 1070.0  # of a silicone whose file gives none [kg/m^3]
 FITTED_STRETCH = (1.0, 2.0)  # where the published constants were fitted
-_CHECK_POINTS = 101  # stretches at which a law's stress must be finite
-_ENTRY_KEYS = ("density_kg_m3", "fitted_stretch", "source")
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +74,8 @@ class Material:
         A number [kg/m^3].
     fitted_stretch
         (2,) range of stretch that the constants were fitted on [1].
+    set
+        Of the constants where a materials file names it, else "".
     """
 
     name: str
@@ -82,6 +83,7 @@ class Material:
     constants: Mapping[str, Any]
     density: Any = DENSITY
     fitted_stretch: tuple[float, float] = FITTED_STRETCH
+    set: str = ""
 
     def __post_init__(self) -> None:
         names = [c.name for c in self.law.constants]
@@ -96,11 +98,11 @@ class Material:
         within(ranges.DENSITY, self.density, "density")
         object.__setattr__(self, "fitted_stretch", stretch_range(self.fitted_stretch))
         if not any(isinstance(value, SYMBOLS) for value in constants.values()):
-            _check_response(self)
+            check_response(self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A read-only mapping has no pickle of its own.
-        return type(self), (self.name, self.law, dict(self.constants), self.density, self.fitted_stretch)
+        return type(self), (self.name, self.law, dict(self.constants), self.density, self.fitted_stretch, self.set)
 
     def engineering_stress(self, stretch: Any) -> Any:
         """Return sigma_e (Table II), force over undeformed area.
@@ -164,15 +166,15 @@ class Material:
 
 
 @dataclass(frozen=True, eq=False)
-class MaterialEntry:
-    """A silicone of a materials file.
+class MaterialSet:
+    """Constants of one silicone that come from one source.
 
     Attributes
     ----------
     name
-        Of the silicone.
-    source
-        Where the constants come from, "" if not said.
+        Of the set.
+    source, test, rate, date
+        Where they come from, how the silicone was tested, how fast, and when; "" if not said.
     models
         A checked `Material` for each law that the file gives constants of.
     derived
@@ -181,8 +183,74 @@ class MaterialEntry:
 
     name: str
     source: str
+    test: str
+    rate: str
+    date: str
     models: Mapping[str, Material]
     derived: Mapping[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class MaterialEntry:
+    """A silicone of a materials file.
+
+    Attributes
+    ----------
+    name
+        Of the silicone.
+    sets
+        Its sets of constants by name, the default one first.
+    """
+
+    name: str
+    sets: Mapping[str, MaterialSet]
+
+    @property
+    def default(self) -> MaterialSet:
+        """The set that is taken where none is named."""
+        return next(iter(self.sets.values()))
+
+    @property
+    def source(self) -> str:
+        """Where the constants of the default set come from, "" if not said."""
+        return self.default.source
+
+    @property
+    def models(self) -> Mapping[str, Material]:
+        """The laws of the default set."""
+        return self.default.models
+
+    @property
+    def derived(self) -> Mapping[str, str]:
+        """By law, how constants of the default set that were not published were found."""
+        return self.default.derived
+
+    def chosen(self, name: str | None, where: str = "") -> MaterialSet:
+        """Return a set by its name.
+
+        Parameters
+        ----------
+        name
+            Of the set; None is the default one.
+        where
+            The file, in words, for an error.
+
+        Returns
+        -------
+        MaterialSet
+            The set.
+
+        Raises
+        ------
+        MaterialError
+            With the sets that there are.
+        """
+        if name is None:
+            return self.default
+        if not isinstance(name, str) or name not in self.sets:
+            message = f"unknown set {shown(name)} of {quoted(self.name)}{where}; expected {choices(self.sets)}"
+            raise MaterialError(message, key="set")
+        return self.sets[name]
 
 
 def load_materials(path: str | PathLike[str] | None = None) -> Mapping[str, MaterialEntry]:
@@ -203,7 +271,7 @@ def load_materials(path: str | PathLike[str] | None = None) -> Mapping[str, Mate
     MaterialError
         With source, table and key of the first thing in the file that is not right.
     """
-    file = _shipped_file() if path is None else path
+    file = shipped_file() if path is None else path
     entries = {}
     with located(source=file_label(file)):
         data = read_table(file)
@@ -218,7 +286,12 @@ def load_materials(path: str | PathLike[str] | None = None) -> Mapping[str, Mate
 
 
 def material(
-    name: str, model: str = "mooney-rivlin", *, file: str | PathLike[str] | None = None, density: Any = None
+    name: str,
+    model: str = "mooney-rivlin",
+    *,
+    set: str | None = None,
+    file: str | PathLike[str] | None = None,
+    density: Any = None,
 ) -> Material:
     """Return a silicone with one of its laws, from the shipped file or one of the same form.
 
@@ -226,6 +299,8 @@ def material(
     ----------
     name, model
         Of the silicone and of the law.
+    set
+        Of constants, where the file has several of the silicone; the first by default.
     file
         A materials file, the shipped one by default.
     density
@@ -239,23 +314,25 @@ def material(
     Raises
     ------
     MaterialError
-        With the nearest known name.
+        With the nearest known name, or the sets that there are.
     """
-    entries = _shipped(_shipped_file()) if file is None else load_materials(file)
+    entries = _shipped(shipped_file()) if file is None else load_materials(file)
     where = "" if file is None else f" in {file_label(file)}"
     if not isinstance(name, str) or name not in entries:
         raise MaterialError(f"unknown silicone {shown(name)}{where}{nearest(str(name), entries)}", key="name")
-    models = entries[name].models
+    chosen = entries[name].chosen(set, where)
+    models = chosen.models
     if not isinstance(model, str) or model not in models:
         no_such = f"{quoted(name)} has no constants of law" if model in list(LAWS) else "unknown law"
-        raise MaterialError(f"{no_such} {shown(model)}{where}{nearest(str(model), models)}", key="model")
+        of_set = "" if chosen is entries[name].default else f" in set {shown(chosen.name)}"
+        raise MaterialError(f"{no_such} {shown(model)}{of_set}{where}{nearest(str(model), models)}", key="model")
     return models[model] if density is None else replace(models[model], density=density)
 
 
 def material_from_table(table: Mapping[str, Any], *, folder: str | PathLike[str] = ".") -> Material:
     """Return the material of a scenario's `[material]`, in one of these forms.
 
-    - From the shipped file, or from `file` (relative to `folder`): `name` and `model`.
+    - From the shipped file, or from `file` (relative to `folder`): `name`, `model`, and `set` where there are several.
     - With constants of its own: `name`, a built-in law as `model`, `constants` under their file keys (`C10_MPa`, `b1`).
     - With a law of its own: `name`, a new name as `model`, a `formula` in MPa and the `constants` that it names.
 
@@ -265,29 +342,25 @@ def material_from_table(table: Mapping[str, Any], *, folder: str | PathLike[str]
         own = isinstance(table, Mapping) and ("constants" in table or "formula" in table)
         if own and "file" in table:
             raise MaterialError("constants come from a file or from this table, not from both", key="file")
-        optional = ("constants", "formula", "fitted_stretch") if own else ("file",)
+        if own and "set" in table:
+            raise MaterialError("constants come from a set of a file or from this table, not from both", key="set")
+        optional = ("constants", "formula", "fitted_stretch") if own else ("file", "set")
         check_keys(table, ("name", "model"), ("density_kg_m3", *optional))
         name, model = text_of(table, "name"), text_of(table, "model")
-        given = _given(table)
+        given = given_fields(table)
         if own:
             if "formula" in table and model in LAWS:
                 raise MaterialError(f"the built-in law '{model}' has its formula; name yours otherwise", key="formula")
             if "formula" not in table and model not in LAWS:
-                raise MaterialError(_unknown_law(model), key="model")
-            law, constants = _law_with_constants(model, table, "material.constants")
+                raise MaterialError(unknown_law(model), key="model")
+            law, constants = law_with_constants(model, table, "material.constants")
             return _checked(name, law, constants, given, "material" if "formula" in table else "material.constants")
         file = Path(folder, text_of(table, "file")) if "file" in table else None
-        return material(name, model, file=file, density=given.get("density"))
+        named = text_of(table, "set") if "set" in table else None
+        return material(name, model, set=named, file=file, density=given.get("density"))
 
 
 # --- reading tables ---------------------------------------------------------------------------------------------------
-
-
-def _shipped_file() -> Path:
-    """Return the library's file: beside the package when installed, at the top level of a checkout."""
-    package = Path(__file__).parents[1]
-    installed = package / "materials.toml"
-    return installed if installed.is_file() else package.parent / "materials.toml"
 
 
 @cache
@@ -298,46 +371,19 @@ def _shipped(file: Path) -> Mapping[str, MaterialEntry]:
 
 def _entry(name: str, table: Mapping[str, Any]) -> MaterialEntry:
     """Return the silicone of one top-level table of a materials file."""
-    laws = {key: value for key, value in table.items() if key not in _ENTRY_KEYS and isinstance(value, Mapping)}
-    check_keys({key: value for key, value in table.items() if key not in laws}, (), _ENTRY_KEYS)
-    if not laws:
-        raise MaterialError(f"expected the table of a law, such as [{quoted(name)}.mooney-rivlin]")
-    source = text_of(table, "source") if "source" in table else ""
-    given = _given(table)
-    models, derived = {}, {}
-    for model, law_table in laws.items():
-        table_name = f"{quoted(name)}.{quoted(model)}"
-        with located(table=table_name):
-            written = dict(law_table)
-            if "derived" in written:
-                derived[model] = text_of(written, "derived")
-                del written["derived"]
-            if model in LAWS:
-                law, constants = _law_with_constants(model, {"constants": written}, table_name)
-            else:
-                if "formula" not in written:
-                    raise MaterialError(_unknown_law(model))
-                check_keys(written, ("formula",), ("constants", "derived"))
-                law, constants = _law_with_constants(model, written, f"{table_name}.constants")
-            models[model] = _checked(name, law, constants, given, table_name)
-    return MaterialEntry(name, source, MappingProxyType(models), MappingProxyType(derived))
 
+    def law_of(model: str, written: dict[str, Any], fields: dict[str, Any], place: str) -> Material:
+        if model in LAWS:
+            law, constants = law_with_constants(model, {"constants": written}, place)
+        else:
+            if "formula" not in written:
+                raise MaterialError(unknown_law(model))
+            check_keys(written, ("formula",), ("constants", "derived"))
+            law, constants = law_with_constants(model, written, f"{place}.constants")
+        return _checked(name, law, constants, fields, place)
 
-def _law_with_constants(model: str, written: Mapping[str, Any], constants_table: str) -> tuple[Law, dict[str, float]]:
-    """Return a built-in law, or the one of `written["formula"]`, and its constants in SI."""
-    with located(table=constants_table):
-        values = written.get("constants", {})
-        if not isinstance(values, Mapping):
-            raise MaterialError(f"expected a table of constants, got {shown(values)}")
-        if "formula" not in written:
-            law = LAWS[model]
-            check_keys(values, [c.file_key for c in law.constants], what=f"constant of law '{model}'")
-            return law, {c.name: number(values[c.file_key], c.file_key) * c.scale for c in law.constants}
-        for key in values:
-            with located(key=quoted(str(key))):
-                check_constant_name(key)
-        constants = {key: number(value, key) for key, value in values.items()}
-    return formula_law(model, written["formula"], constants), constants
+    sets = {key: MaterialSet(**fields) for key, fields in read_sets(name, table, given_fields, law_of).items()}
+    return MaterialEntry(name, MappingProxyType(sets))
 
 
 def _checked(name: str, law: Law, constants: dict[str, float], given: dict[str, Any], table: str) -> Material:
@@ -346,44 +392,3 @@ def _checked(name: str, law: Law, constants: dict[str, float], given: dict[str, 
         return Material(name, law, constants, **given)
     except MaterialError as error:
         raise error.located(table=table, key=None if law.name in LAWS else "formula") from None
-
-
-def _unknown_law(model: str) -> str:
-    return f"unknown law {shown(model)}{nearest(model, LAWS)} (a law of your own needs a formula)"
-
-
-# --- checks -----------------------------------------------------------------------------------------------------------
-
-
-def _given(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of `Material` that a table states beside name, law and constants."""
-    fields: dict[str, Any] = {}
-    if "density_kg_m3" in table:
-        fields["density"] = number(table["density_kg_m3"], "density_kg_m3", positive=True)
-    if "fitted_stretch" in table:
-        fields["fitted_stretch"] = stretch_range(table["fitted_stretch"])
-    return fields
-
-
-def _check_response(material: Material) -> None:
-    """Raise `MaterialError` where the law with these numbers is no material; see `Material`."""
-    label = f"law {shown(material.law.name)} of {shown(material.name)}"
-    stress = np.asarray(material.engineering_stress(1.0))
-    modulus = np.asarray(material.tangent_modulus(1.0))
-    if not np.isfinite(stress).all():
-        raise MaterialError(f"{label}: its stress at stretch 1 is not a finite number; it must be 0")
-    if not (np.isfinite(modulus) & (modulus > 0)).all():
-        worst = modulus.min() / MEGAPASCAL
-        raise MaterialError(
-            f"{label}: its tangent modulus at stretch 1 is {worst:g} MPa; it must be positive and finite"
-        )
-    if (abs(stress) > 1e-9 * modulus).any():
-        worst = abs(stress).max() / MEGAPASCAL
-        raise MaterialError(f"{label}: its stress at stretch 1 is {worst:g} MPa; it must be 0")
-    low, high = material.fitted_stretch
-    stretches = np.linspace(min(low, 1.0), max(high, 1.0), _CHECK_POINTS)
-    # Constants may be arrays: the stretches go along a first axis of their own.
-    along = np.asarray(material.engineering_stress(stretches.reshape(-1, *(1,) * stress.ndim)))
-    bad = ~np.isfinite(along).reshape(_CHECK_POINTS, -1).all(axis=1)
-    if bad.any():
-        raise MaterialError(f"{label}: its stress at stretch {stretches[bad][0]:g} is not a finite number")

@@ -95,6 +95,16 @@ class Robot:
         return self.chamber_sets * self.chambers_per_set
 
     @property
+    def parts(self) -> Mapping[str, Robot]:
+        """The robots that it is made of by what messages call them; itself under ""."""
+        return {"": self}
+
+    @property
+    def notes(self) -> list[str]:
+        """What to know of it beside the rules of manufacture."""
+        return []
+
+    @property
     def outer_radius(self) -> Any:
         """r_r0, a number [m]."""
         return self.outer_diameter / 2
@@ -259,6 +269,9 @@ def check(robot: Robot, *, allow: Collection[str] = (), minimum_wall: float = MI
             reason = "which can never be lowered" if rule in RULES else "no such rule"
             hint = "" if rule in RULES else did_you_mean(str(rule), ALLOWABLE)
             raise RobotError(f"expected {choices(ALLOWABLE)}, got {shown(rule)}, {reason}{hint}", key="allow")
+    if "" not in robot.parts:
+        every = {part: _checked(part, one, allow, minimum_wall) for part, one in robot.parts.items()}
+        return (*(f"{part}: {note}" for part, notes in every.items() for note in notes), *robot.notes)
     found = violations(robot, minimum_wall)
     refused = [v for v in found if v.rule not in allow]
     if refused:
@@ -266,6 +279,14 @@ def check(robot: Robot, *, allow: Collection[str] = (), minimum_wall: float = MI
         told = [f"{v.rule}: {v.message}{hint}{metres_hint(robot)}" for v, hint in zip(refused, hints, strict=True)]
         raise first_of([RobotError(words) for words in told])
     return (*(f"{v.rule}: {v.message}" for v in found), *size_notes(robot))
+
+
+def _checked(part: str, robot: Robot, allow: Collection[str], minimum_wall: float) -> tuple[str, ...]:
+    """Return what `check` does of a part of a robot; its errors name the part."""
+    try:
+        return check(robot, allow=allow, minimum_wall=minimum_wall)
+    except RobotError as error:
+        raise RobotError(f"{part}: {error.message}", key=error.key) from None
 
 
 def metres_hint(robot: Robot) -> str:

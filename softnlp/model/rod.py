@@ -91,10 +91,23 @@ def field(x: Any, v: Any, u: Any, force: Any, moment: Any) -> Any:
     return ca.vertcat(dp, ca.reshape(R @ hat(u), 9, 1), -force, -ca.cross(dp, N) - moment)
 
 
-def base_balance(x: Any) -> Any:
-    """Return the 12 clamped-base residuals: p = 0 and R = I."""
+def base_balance(x: Any, turn: float = 0.0) -> Any:
+    """Return the 12 clamped-base residuals: p = 0 and R = I, or that turned about e3 by an angle."""
     p, R, _, _ = unpack(x)
-    return ca.vertcat(p, ca.reshape(R - ca.DM.eye(3), 9, 1))
+    return ca.vertcat(p, ca.reshape(R - turned(turn), 9, 1))
+
+
+def turned(angle: float) -> Any:
+    """Return the rotation about e3 by an angle."""
+    c, s = ca.cos(angle), ca.sin(angle)
+    return ca.DM([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+def carried(x: Any, length: Any, turn: float = 0.0) -> Any:
+    """Return the state at the far end of a rigid, weightless piece along R e3, with the body axes turned about it."""
+    p, R, N, M = unpack(x)
+    offset = length * R[:, 2]
+    return ca.vertcat(p + offset, ca.reshape(R @ turned(turn), 9, 1), N, M - ca.cross(offset, N))
 
 
 def tip_balance(x: Any, force: Any, moment: Any) -> Any:

@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 Path = Callable[[float], Array]
 
 _CORRECTIONS = 8
+_CALM = 3  # steps after a refused one before they grow again
+_ROUNDED = 1 + 1e-9  # a step is the difference of two fractions
 _CONTRACTION = 0.1  # of a correction by the next ones, below which Newton's method is on the branch it began at
 
 
@@ -71,7 +73,7 @@ def follow(
     done, step = 0.0, first_step
     previous: tuple[float, Array] | None = None
     missed: tuple[float, Array] | None = None
-    refused = False
+    calm = 0
     for _ in range(most_solves):
         if most_iterations is not None and iterations >= most_iterations:
             break
@@ -107,11 +109,11 @@ def follow(
             previous, current, done = (done, current.x), trial, target
             if done >= 1.0:
                 break
-            step *= change if not refused else min(change, 1.0)
-            refused = False
+            step *= change if not calm else min(change, 1.0)
+            calm = max(calm - 1, 0)
         else:
-            refused = True
-            if step <= smallest_step:
+            calm = _CALM
+            if step <= smallest_step * _ROUNDED:
                 break
             step = max(step * min(change, 0.5), smallest_step)
     return Followed(current, done, iterations)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import pairwise
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import casadi as ca
 import numpy as np
@@ -14,6 +15,9 @@ from softnlp.base.errors import IllPosedError
 from softnlp.nlp.problem import CompiledProblem
 
 Array = NDArray[np.float64]
+
+
+_CLOSE = 1e-2  # of a scaled unknown: how far a factorisation may be from where it corrects
 
 
 class LinearSolver(Protocol):
@@ -38,6 +42,13 @@ class SparseSolver:
 
     def __init__(self, problem: CompiledProblem) -> None:
         self._problem = problem
+        self._last: tuple[Array, Array, Any] | None = None  # where the last factorisation was made, and that
+
+    @cached_property
+    def _pattern(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """The rows of the entries of J, and where each column begins."""
+        pattern = self._problem.jacobian.sparsity_out(0)
+        return np.array(pattern.row(), np.int32), np.array(pattern.colind(), np.int32)
 
     def solve(self, x: Array, p: Array, g: Array) -> Array:
         """Return dx. Raises `numpy.linalg.LinAlgError` where J is singular or not finite."""
@@ -48,15 +59,31 @@ class SparseSolver:
         from scipy.sparse import csc_matrix
         from scipy.sparse.linalg import splu
 
-        J = self._problem.jacobian(x, p)
-        entries = np.asarray(J.nonzeros())
+        (J,) = self._problem.jacobian.call([x, p])
+        entries = np.array(J.nonzeros())
+        rows, columns = self._pattern
         if not np.all(np.isfinite(entries)):
             raise np.linalg.LinAlgError("the Jacobian is not finite")
         try:
-            factors = splu(csc_matrix((entries, J.row(), J.colind()), shape=J.shape))
+            factors = splu(csc_matrix((entries, rows, columns), shape=J.shape))
         except RuntimeError as error:
             raise np.linalg.LinAlgError(str(error)) from error
+        self._last = np.array(x), np.array(p), factors
         return np.asarray(factors.solve(-np.asarray(G, dtype=float)))
+
+
+class LastFactors:
+    """Solves with the factorisation that a sparse solver made last, where that was near: for corrections alone."""
+
+    def __init__(self, solver: SparseSolver) -> None:
+        self._solver = solver
+
+    def solve(self, x: Array, p: Array, g: Array) -> Array:
+        """Return dx, of a Jacobian within `_CLOSE` of x. Raises as `SparseSolver.solve`."""
+        last = self._solver._last
+        if last is None or not np.array_equal(last[1], p) or np.max(np.abs(last[0] - x)) > _CLOSE:
+            return self._solver.solve(x, p, g)
+        return np.asarray(last[2].solve(-np.asarray(g, dtype=float)))
 
 
 class BorderedSolver:

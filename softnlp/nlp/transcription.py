@@ -100,8 +100,13 @@ class Transcription(Hashable, Protocol):
         ...
 
 
+@lru_cache(maxsize=16)
 def rk_step(field: ca.Function, tableau: Tableau) -> ca.Function:
-    """Return one explicit Runge-Kutta step as a function (x, c, h) -> x_next."""
+    """Return one explicit Runge-Kutta step as a function (x, c, h) -> x_next; the same one for the same field.
+
+    Common subexpressions are looked for here alone: functions made of steps have hardly more, and would take longer to
+    search than to evaluate.
+    """
     nx = field.size1_in(0)
     x, c, h = ca.SX.sym("x", nx), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("h")
     k: list[ca.SX] = []
@@ -111,6 +116,7 @@ def rk_step(field: ca.Function, tableau: Tableau) -> ca.Function:
     return ca.Function("step", [x, c, h], [x_next], {"cse": True})
 
 
+@lru_cache(maxsize=16)
 def with_quadrature(field: ca.Function, quadrature: ca.Function) -> ca.Function:
     """Return the field with the integrals of `quadrature` (x, c) -> q appended to its state."""
     nx = field.size1_in(0)
@@ -119,7 +125,7 @@ def with_quadrature(field: ca.Function, quadrature: ca.Function) -> ca.Function:
 
 
 @lru_cache(maxsize=16)
-def _interval_slopes(field: ca.Function, method: Transcription) -> ca.Function:
+def interval_slopes(field: ca.Function, method: Transcription) -> ca.Function:
     """Return (states of one interval, c, h, dc) -> Jacobian by all but the last node, by that, and change along dc."""
     interval = method.interval(field)
     m, nc = interval.size1_out(0), interval.size1_in(1)
@@ -127,7 +133,7 @@ def _interval_slopes(field: ca.Function, method: Transcription) -> ca.Function:
     residual = interval(w, c, h)
     J = ca.jacobian(residual, w)
     moved = ca.densify(ca.jtimes(residual, c, dc))
-    return ca.Function("interval_slopes", [w, c, h, dc], [J[:, :m], J[:, m:], moved], {"cse": True})
+    return ca.Function("interval_slopes", [w, c, h, dc], [J[:, :m], J[:, m:], moved])
 
 
 def _slopes(field: ca.Function, method: Transcription, unknowns: ca.MX, c: ca.MX, dc: ca.MX) -> tuple[ca.MX, ca.MX]:
@@ -135,7 +141,7 @@ def _slopes(field: ca.Function, method: Transcription, unknowns: ca.MX, c: ca.MX
 
     Made of the blocks of one interval, since automatic differentiation of the whole takes some times as long.
     """
-    K, block = method.intervals, _interval_slopes(field, method.with_intervals(1))
+    K, block = method.intervals, interval_slopes(field, method.with_intervals(1))
     m, nx = block.size1_out(0), field.size1_in(0)
     windows = unknowns[(np.arange(m + nx)[:, None] + m * np.arange(K)).T.ravel().tolist()]
     own, following, moved = block.map(K)(ca.reshape(windows, m + nx, K), c, 1 / K, dc)

@@ -9,7 +9,7 @@ import numpy as np
 
 from softnlp.base.arrays import Array
 from softnlp.base.columns import OUTPUTS, Output
-from softnlp.base.netcdf import dataset_bytes, flag_attributes, said
+from softnlp.base.netcdf import Variable, file_bytes, flag_attributes, said
 from softnlp.model.inputs import file_attributes, pressure_bar
 from softnlp.model.quantities import Model
 from softnlp.nlp.solver import EquationResidual
@@ -22,13 +22,12 @@ from softnlp.studies.fields import (
     dataset_outputs,
     left_by_weights,
     series,
+    sizes_of,
     solved_pose,
 )
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Variable = tuple[tuple[str, ...], Any, dict[str, Any]]
 
 _CERTIFICATE = (
     "largest error of each equation",
@@ -69,10 +68,23 @@ def to_dataset(run: Run) -> xr.Dataset:
     """
     import xarray as xr
 
-    run = require_run(run, "softnlp.to_dataset")
+    variables, coordinates, attributes = _parts(require_run(run, "softnlp.to_dataset"))
+    return xr.Dataset(variables, coords=coordinates, attrs=attributes)
+
+
+def netcdf_bytes(run: Run) -> bytes:
+    """Return the netCDF file of a run.
+
+    It is made in memory: HDF5 writing to a full disk ends the interpreter instead of raising.
+    """
+    return file_bytes(*_parts(run))
+
+
+def _parts(run: Run) -> tuple[dict[str, Variable], dict[str, Variable], dict[str, Any]]:
+    """Return variables, coordinates and attributes: a run is written without xarray, which takes long to import."""
     steps, pressure = run.steps, OUTPUTS["pressure"]
     points = max((_points(step) for step in steps), default=0)
-    sizes = {"axis": 3, "row": 3, "col": 3, "chamber": run.robot.chambers, "s": points}
+    sizes = {"axis": 3, "row": 3, "col": 3, **sizes_of(run), "s": points}
     variables: dict[str, Variable] = {
         pressure.key: (
             ("step", *pressure.dims),
@@ -92,15 +104,7 @@ def to_dataset(run: Run) -> xr.Dataset:
             variables |= _errors("weighted_residual", "weighted_equation", "weighted_residual_unit", left, _WEIGHTED)
     model = Model(run.robot, run.material, run.coefficients, run.conventions)
     about = file_attributes(run.study, model, run.loads, run.contact, {"warnings": list(run.warnings)})
-    return xr.Dataset(variables, coords=_coordinates(run, variables["arc"][1]), attrs={"title": run.title, **about})
-
-
-def netcdf_bytes(run: Run) -> bytes:
-    """Return the netCDF file of a run.
-
-    It is made in memory: HDF5 writing to a full disk ends the interpreter instead of raising.
-    """
-    return dataset_bytes(to_dataset(run))
+    return variables, _coordinates(run, variables["arc"][1]), {"title": run.title, **about}
 
 
 def _words(along: str, texts: Sequence[str], meaning: str) -> Variable:
@@ -162,6 +166,8 @@ def _coordinates(run: Run, arc: Array) -> dict[str, Variable]:
         "chamber_set": (("chamber",), np.array(robot.set_of_chamber) + 1, said("1", "set of each chamber, from 1")),
         **{name: ((name,), list("xyz"), said("1", meaning)) for name, meaning in axes.items()},
     }
+    if (count := sizes_of(run)["segment"]) > 1:
+        coordinates["segment"] = (("segment",), np.arange(1, count + 1), said("1", "segment, base first, from 1"))
     if any(step.time is not None for step in run.steps):
         times = [np.nan if step.time is None else float(step.time) for step in run.steps]
         coordinates["t_s"] = (("step",), times, said("s", OUTPUTS["t"].meaning))

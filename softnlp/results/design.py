@@ -237,7 +237,7 @@ def best_scenario(done: Design, asked: Mapping[str, Any]) -> str | None:
         return None
     material = dict(asked["material"])
     if "material" in best.choices:
-        kept = {key: material[key] for key in ("file", "density_kg_m3") if key in material}
+        kept = {key: material[key] for key in ("set", "file", "density_kg_m3") if key in material}
         material = {"name": best.material.name, "model": best.material.law.name, **kept}
     robot = robot_table(best.robot) | {
         k: asked["robot"][k] for k in ("allow", "minimum_wall_mm") if k in asked["robot"]

@@ -12,12 +12,21 @@ from typing import Any
 
 import numpy as np
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.model.inputs import asked_tables, contact_table, package_version, pressure_bar, tidy
 from softnlp.model.quantities import Model
 from softnlp.nlp.solver import EquationResidual, Ipopt
 from softnlp.statics.step import Run, Step
-from softnlp.studies.fields import BLOCKED_FORCE, closure_of, document_outputs, left_by_weights, value
+from softnlp.studies.fields import (
+    BLOCKED_FORCE,
+    closure_of,
+    deviation_outputs,
+    document_outputs,
+    left_by_weights,
+    solved_pose,
+    value,
+)
 
 _SAID = ("status", "iterations", "multipliers")
 
@@ -28,6 +37,7 @@ def run_document(run: Run) -> dict[str, Any]:
         **document_head(run.title, run.study, run.conventions.name),
         **asked_tables(Model(run.robot, run.material, run.coefficients), run.loads),
         **({} if run.contact is None else {"contact": contact_table(run.contact)}),
+        **({"uncertainty": dict(run.uncertainty)} if run.uncertainty else {}),
         "warnings": list(run.warnings),
         "steps": [_step(run, step) for step in run.steps],
     }
@@ -80,7 +90,12 @@ def _step(run: Run, step: Step) -> dict[str, Any]:
         table["t_s"] = tidy(step.time)
     table["status"] = step.status.value
     table["message"] = step.message
-    table |= {output.key: plain(value(output, step)) for output in document_outputs(run)}
+    deviations = deviation_outputs(run)
+    table |= {o.key: plain(value(o, step)) for o in document_outputs(run) if o not in deviations}
+    table["segments"] = segments_of(step)
+    if deviations:
+        table["std"] = {o.key.removeprefix("std_"): plain(value(o, step)) for o in deviations}
+        table["std_message"] = "" if step.deviation is None else step.deviation.message
     if run.study == BLOCKED_FORCE:
         table["closure"] = closure_of(run, step)
         if table["closure"] == "weighted":
@@ -90,6 +105,16 @@ def _step(run: Run, step: Step) -> dict[str, Any]:
     table["certificate"] = _lines(step.certificate)
     table["warnings"] = list(step.warnings)
     return table
+
+
+def segments_of(step: Step) -> list[dict[str, Any]] | None:
+    """Return each segment of a step's pose by itself, None without a solution."""
+    if (pose := solved_pose(step)) is None:
+        return None
+    names = ("tip_position", "tip_rotation", "stretch", "bending_angle")
+    return [
+        {OUTPUTS[name].key: plain(OUTPUTS[name].shown(getattr(part, name))) for name in names} for part in pose.parts
+    ]
 
 
 def engine_table(engine: str | None, ipopt: Ipopt | None) -> dict[str, Any]:

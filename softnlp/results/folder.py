@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,32 +18,53 @@ from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.files import make_folder, write_whole
 from softnlp.base.status import Status
-from softnlp.model.inputs import loads_of_table, robot_of_table, versions
+from softnlp.model.inputs import loads_of_table, robot_of_attributes, silicone_of_attributes, versions
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.results.dataset import netcdf_bytes
 from softnlp.results.document import json_text, require_run
 from softnlp.results.table import table_text
 from softnlp.statics.step import Run, SectionRadii
-from softnlp.studies.fields import BLOCKED_FORCE, INVERSE, closure_of, series, si_value, solved_pose
+from softnlp.studies.fields import BLOCKED_FORCE, INVERSE, closure_of, deviation_outputs, series, si_value, solved_pose
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
 RESULTS_FILE = "results.nc"
+DEVIATING = ("bending_angle", "elongation", "blocked_force")
+"""What figures draw with a band of one standard deviation, where there is one."""
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
     """The body of one solved step.
 
-    position : (M, 3) p [m]. rotation : (M, 3, 3) R, columns are the body axes. radii : of the deformed section.
+    position : (M, 3) p [m]. rotation : (M, 3, 3) R, columns are the body axes. radii : of the deformed section; (M,)
+    each where it is not the same along it. parts : of several segments each by itself, without connectors.
     """
 
     position: Array
     rotation: Array
     radii: SectionRadii
+    parts: tuple[Body, ...] = ()
+
+    @property
+    def pieces(self) -> tuple[Body, ...]:
+        """Its segments, itself where there is one."""
+        return self.parts or (self,)
+
+
+def chain_body(position: Array, rotation: Array, radii: Mapping[str, Array], segment: Array) -> Body:
+    """Return the body of several segments. radii : (M,) by name. segment : (M,) of each point from 1, 0 of none."""
+
+    def of(chosen: Any) -> SectionRadii:
+        there: dict[str, Any] = {name: values[chosen] for name, values in radii.items()}
+        return SectionRadii(**there)
+
+    numbers = range(1, int(segment.max(initial=0)) + 1)
+    parts = [Body(position[own], rotation[own], of(own)) for own in (segment == k for k in numbers)]
+    return Body(position, rotation, of(slice(None)), tuple(parts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +112,7 @@ class RunView:
     material : its name and law. pressure : (S, sets) [Pa]. time : (S,) [s] or None.
     stable : (S,) of `STABLE_FLAGS`, undefined where unsolved. stretch : (S,). bending_angle : (S,) [rad].
     backbone_length : (S,) [m]. bodies : S entries. contact : of a blocked force, else None. targets : of inverse
-    kinematics, else None.
+    kinematics, else None. std : standard deviations (S,) of outputs by name [SI], none where nothing scatters.
     """
 
     title: str
@@ -110,6 +131,7 @@ class RunView:
     bodies: tuple[Body | None, ...]
     contact: ContactView | None = None
     targets: TargetView | None = None
+    std: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def solved(self) -> tuple[int, ...]:
@@ -126,8 +148,11 @@ def view_of_run(run: Run) -> RunView:
         pose, contact = solved_pose(run.steps[k]), run.steps[k].contact
         if prefix and pose is not None:
             pose = None if contact is None else contact.free
-        return None if pose is None else Body(pose.shape.position, pose.shape.rotation, pose.radii)
+        if pose is None or pose.outline is None:
+            return None if pose is None else Body(pose.shape.position, pose.shape.rotation, pose.radii)
+        return chain_body(pose.shape.position, pose.shape.rotation, vars(pose.outline), pose.segment)
 
+    known = {output.name for output in deviation_outputs(run)}
     return _view(
         lambda name: series(OUTPUTS[name], run.steps, sizes, si_value),
         body,
@@ -141,6 +166,7 @@ def view_of_run(run: Run) -> RunView:
         status=tuple(step.status for step in run.steps),
         pressure=np.array([step.pressure for step in run.steps], dtype=float),
         time=None if np.all(np.isnan(times)) else np.array(times),
+        std=[name for name in DEVIATING if f"std_{name}" in known],
     )
 
 
@@ -153,7 +179,7 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
         When a variable or an attribute is missing or not what `to_dataset` writes.
     """
     attributes = dataset.attrs
-    material = json.loads(attributes["material"])
+    asked = {name: json.loads(attributes[name]) for name in ("segment", "robot", "material") if name in attributes}
     values = {str(name): variable.values for name, variable in dataset.variables.items()}
 
     def number(name: str) -> Any:
@@ -165,8 +191,13 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
         points = np.isfinite(position).all(axis=1)
         if not points.any():
             return None
-        radii = {field.name: float(number(f"{field.name}_radius")[k]) for field in fields(SectionRadii)}
-        return Body(position[points], number(f"{prefix}rotation")[k][points], SectionRadii(**radii))
+        names = [field.name for field in fields(SectionRadii)]
+        place, turn = position[points], number(f"{prefix}rotation")[k][points]
+        if OUTPUTS["along_segment"].key in values and not prefix:
+            along = {name: number(f"along_{name}_radius")[k][points] for name in names}
+            return chain_body(place, turn, along, number("along_segment")[k][points].astype(int))
+        radii = {name: float(number(f"{name}_radius")[k]) for name in names}
+        return Body(place, turn, SectionRadii(**radii))
 
     return _view(
         number,
@@ -174,18 +205,23 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
         values.get("closure", ()),
         title=str(attributes["title"]),
         study=str(attributes["study"]),
-        material=_material_label(material["name"], material["model"]),
+        material=_material_label(*silicone_of_attributes(asked)),
         conventions=str(attributes["conventions"]),
-        robot=robot_of_table(json.loads(attributes["robot"])),
+        robot=robot_of_attributes(asked),
         loads=loads_of_table(json.loads(attributes["loads"])),
         status=tuple(Status(str(word)) for word in values["status"]),
         pressure=number("pressure"),
         time=values.get(OUTPUTS["t"].key),
+        std=[name for name in DEVIATING if OUTPUTS[f"std_{name}"].key in values],
     )
 
 
 def _view(number: Callable[[str], Any], body: Callable[[int, str], Body | None], closures: Any, **head: Any) -> RunView:
-    """Return a view. number : an output of every step by name, SI. body : of a step, with "free_" its free shape."""
+    """Return a view.
+
+    number : an output of every step by name, SI. body : of a step, with "free_" its free shape. head : the other
+    fields, `std` as the names of what has standard deviations.
+    """
     solved = [status.has_solution for status in head["status"]]
     contact = targets = None
     if head["study"] == INVERSE:
@@ -202,7 +238,7 @@ def _view(number: Callable[[str], Any], body: Callable[[int, str], Body | None],
             free=tuple(body(k, "free_") if k in known else None for k in range(len(solved))),
         )
     return RunView(
-        **head,
+        **{**head, "std": {name: np.asarray(number(f"std_{name}"), dtype=float) for name in head["std"]}},
         **{name: number(name) for name in ("stable", "stretch", "bending_angle", "backbone_length")},
         bodies=tuple(body(k, "") if solution else None for k, solution in enumerate(solved)),
         contact=contact,

@@ -18,7 +18,7 @@ th,td{padding:.2rem .7rem;text-align:left;border-bottom:1px solid #e5e8ec;font-v
 td.warned{background:#fff3cd}td.failed{background:#f8d7da}
 pre{background:#f4f6f8;padding:1rem;overflow-x:auto;font-size:.85rem}img{max-width:100%}
 """
-_LONGEST = 200  # rows of a table
+_LONGEST, _FEW = 200, 30  # rows of a table; of one that stands before the numbers
 _SKIPPED = ("notes", "warnings", "checks", "ipopt_multipliers", "correlation")
 _VERDICTS = ("warned", "failed")
 
@@ -54,8 +54,11 @@ def report_page(
     for caption, png in figures.items():
         image = base64.b64encode(png).decode("ascii")
         parts.append(f'<h2>{escape(caption)}</h2><img alt="{escape(caption)}" src="data:image/png;base64,{image}">')
+    parts += _tables(document, few=True)
     parts += map(_table, sections)
-    parts += _numbers(document)
+    numbers = {key: value for key, value in document.items() if not _is_rows(value) and key not in _SKIPPED}
+    parts.append(_table(Section("Numbers", ("name", "value"), [[key, _cell(value)] for key, value in _flat(numbers)])))
+    parts += _tables(document, few=False)
     for heading, text in texts.items():
         parts.append(f"<h2>{escape(heading)}</h2><pre>{escape(text)}</pre>")
     body = "\n".join(parts)
@@ -63,16 +66,45 @@ def report_page(
     return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>\n{body}\n</body></html>\n'
 
 
-def _numbers(document: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the numbers of a document: those at its top as one table, and each list of tables as one."""
-    plain = [[key, _cell(value)] for key, value in document.items() if not _is_rows(value) and key not in _SKIPPED]
-    yield _table(Section("Numbers", ("name", "value"), plain))
-    for key, value in document.items():
-        if _is_rows(value) and key not in _SKIPPED:
-            header = list(dict.fromkeys(name for row in value for name in row))
-            rows = [[_cell(row.get(name)) for name in header] for row in value[:_LONGEST]]
-            more = len(value) - _LONGEST
-            yield _table(Section(key.replace("_", " "), header, rows, f"and {more} rows more" if more > 0 else ""))
+def _tables(document: Mapping[str, Any], few: bool) -> Iterator[str]:
+    """Yield each list of tables of a document as one, those with few rows or the others."""
+    for key, rows in document.items():
+        if _is_rows(rows) and key not in _SKIPPED and (len(rows) <= _FEW) == few:
+            title, shown = key.replace("_", " ").capitalize(), [dict(row) for row in rows[:_LONGEST]]
+            deep = [name for name in shown[0] if _is_deep(shown[0][name])]
+            flat = [dict(_flat({name: row[name] for name in row if name not in deep})) for row in shown]
+            header = list(dict.fromkeys(name for row in flat for name in row))
+            more = len(rows) - _LONGEST
+            note = f"and {more} rows more" if more > 0 else ""
+            yield _table(Section(title, header, [[_cell(row.get(name)) for name in header] for row in flat], note))
+            for name in deep:
+                parts = [(str(n + 1), *part) for n, row in enumerate(shown) for part in _innermost(row[name])]
+                inner = list(dict.fromkeys(k for *_, part in parts for k in part))
+                lines = [[n, of, *(_cell(part.get(k)) for k in inner)] for n, of, part in parts]
+                yield _table(Section(f"{title}: {name.replace('_', ' ')}", ["row", "of", *inner], lines))
+
+
+def _innermost(value: Mapping[str, Any], label: str = "") -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the tables that hold numbers within tables of tables, by their keys."""
+    for key, part in value.items():
+        name = f"{label}{key}"
+        if _is_deep(part):
+            yield from _innermost(part, f"{name}, ")
+        else:
+            yield name, part
+
+
+def _flat(value: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the numbers within tables by their keys, those of inner tables behind a dot."""
+    for key, inner in value.items():
+        if isinstance(inner, Mapping) and inner:
+            yield from _flat(inner, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", inner
+
+
+def _is_deep(value: Any) -> bool:
+    return isinstance(value, Mapping) and bool(value) and all(isinstance(part, Mapping) for part in value.values())
 
 
 def _is_rows(value: Any) -> bool:
@@ -85,7 +117,7 @@ def _cell(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, list):
-        return ", ".join(map(_cell, value)) if len(value) <= 12 else f"{len(value)} entries"
+        return ", ".join(_cell(one) or "-" for one in value) if len(value) <= 12 else f"{len(value)} entries"
     return json.dumps(value, ensure_ascii=False) if isinstance(value, Mapping | bool) else str(value)
 
 

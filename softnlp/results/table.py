@@ -18,7 +18,15 @@ from softnlp.model.gravity import gravity_lines
 from softnlp.model.inputs import pressure_bar, tidy
 from softnlp.results.document import csv_text
 from softnlp.statics.step import Run, Step
-from softnlp.studies.fields import BLOCKED_FORCE, closure_of, document_outputs, left_by_weights, solved_pose, value
+from softnlp.studies.fields import (
+    BLOCKED_FORCE,
+    closure_of,
+    left_by_weights,
+    sizes_of,
+    solved_pose,
+    table_outputs,
+    value,
+)
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -43,7 +51,7 @@ def table_text(run: Run) -> str:
     weighted = {line.equation: line.unit for step in run.steps for line in left_by_weights(step)}
     header = ["step"] + ["t_s"] * timed
     header += [f"p{k + 1}_bar" for k in range(run.robot.chamber_sets)]
-    columns = {output: output.keys({"chamber": run.robot.chambers}, "") for output in document_outputs(run)}
+    columns = {output: output.keys(sizes_of(run), "") for output in table_outputs(run)}
     header += ["status", *(key for keys in columns.values() for key in keys)]
     header += ["closure"] * (run.study == BLOCKED_FORCE)
     header += ["_".join(["weighted_residual", *name.split(), unit.replace(" ", "")]) for name, unit in weighted.items()]
@@ -141,8 +149,16 @@ def _numbers(study: str, step: Step) -> list[str]:
         else:
             found = value(output, step)
             entries = [found] * len(output.headings) if found is None else np.ravel(found).tolist()
-            cells += [written(entry, output.form) for entry in entries]
+            cells += [written(entry, output.form) + _spread(output, step, k) for k, entry in enumerate(entries)]
     return cells
+
+
+def _spread(output: Output, step: Step, entry: int) -> str:
+    """Return the standard deviation of an entry of an output, in words, where there is one."""
+    scatter = OUTPUTS.get(f"std_{output.name}")
+    found = None if scatter is None or step.deviation is None else value(scatter, step)
+    spread = "" if found is None else written(float(np.ravel(found)[entry]), output.form, "")
+    return f" ± {spread}" if spread else ""
 
 
 def _shown(study: str) -> list[Output]:

@@ -11,9 +11,11 @@ from softnlp.base.errors import InputError
 from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.model.contact_settings import ClosureWeights, ContactSettings, ContactTask, require_in_front
 from softnlp.model.robot import Robot
+from softnlp.model.segments import SegmentedRobot
 from softnlp.scenario.data import Read, Scenario, run_of
 from softnlp.scenario.schema import ContactTable
 from softnlp.statics.step import Run, Step
+from softnlp.studies.blocked_chain import require_free
 from softnlp.studies.blocked_force import blocked_force, constrained_pose, force_against_offset
 from softnlp.studies.force_inversion import pressure_for_force
 
@@ -86,6 +88,12 @@ def contact_task(given: Read) -> ContactTask:
         As `contact_settings`, and where the pressures do not fit what is asked.
     """
     table, pressures = given.file.contact, given.steps.pressures
+    if isinstance(given.robot, SegmentedRobot):
+        require_free(contact_settings(table))
+        for key in table.written((*SEVERAL, "weight_sensitivity")):
+            raise InputError("expected only with one uniform segment so far", key=key)
+        if table.mode != "blocked":
+            raise InputError("expected 'blocked' with several segments or a section that varies", key="mode")
     several = table.written(SEVERAL)
     constrained = table.mode == "constrained"
     if table.weight_sensitivity:

@@ -16,6 +16,7 @@ from softnlp.scenario.identify import IdentifyFile
 from softnlp.scenario.inverse import InverseFile
 from softnlp.scenario.near_keys import meant
 from softnlp.scenario.schema import BlockedForceFile, ForwardFile, ScenarioFile
+from softnlp.scenario.segments import OF_SEGMENTS, of_segment, of_segments
 from softnlp.scenario.workspace import WorkspaceFile
 
 SCHEMAS: Mapping[str, type[ScenarioFile]] = {
@@ -31,7 +32,7 @@ SCHEMAS: Mapping[str, type[ScenarioFile]] = {
 HOW = ": --all-errors"
 """How to see all mistakes of a file."""
 
-_TABLES = {name for schema in SCHEMAS.values() for name in schema.model_fields} - {"title", "study"}
+_TABLES = {"segment", *(name for schema in SCHEMAS.values() for name in schema.model_fields)} - {"title", "study"}
 
 
 def parse(data: Mapping[str, Any]) -> ScenarioFile:
@@ -57,7 +58,7 @@ def parse_parts(data: Mapping[str, Any]) -> tuple[ScenarioFile, list[InputError]
         When the study is not one that this version runs.
     """
     study = _study(data)
-    schema = SCHEMAS[study]
+    schema = schema_of(data, study)
     details, file = [], None
     try:
         file = schema.model_validate(data)
@@ -68,7 +69,7 @@ def parse_parts(data: Mapping[str, Any]) -> tuple[ScenarioFile, list[InputError]
         if not any(loc[: len(place)] == place[: len(loc)] for loc in wrong):
             details.append({"type": "own", "loc": place, "msg": text, "input": number, "ctx": {"text": text}})
     bad = {str(detail["loc"][0]) for detail in details}
-    return file or _without(schema, data, bad), list(_errors(study, details)), bad
+    return file or _without(schema, data, bad), list(_errors(study, schema, details)), bad
 
 
 def _without(schema: type[ScenarioFile], data: Mapping[str, Any], bad: set[str]) -> ScenarioFile:
@@ -91,9 +92,25 @@ def _study(data: Mapping[str, Any]) -> str:
     return study
 
 
-def _errors(study: str, details: list[ErrorDetails]) -> Iterator[InputError]:
+def schema_of(data: Mapping[str, Any], study: str) -> type[ScenarioFile]:
+    """Return the tables that a file of a study may hold: with [[segment]] in place of [robot] and [material].
+
+    Raises
+    ------
+    InputError
+        For segments in a study that does not take them, and a single table of that name.
+    """
+    if "segment" not in data:
+        return SCHEMAS[study]
+    if study not in OF_SEGMENTS:
+        raise InputError(f"study {study!r} takes [robot] and [material] so far, not [[segment]]", table="segment")
+    if not isinstance(data["segment"], list):
+        raise InputError("expected one table [[segment]], in two brackets, for each segment", table="segment")
+    return of_segments(SCHEMAS[study])
+
+
+def _errors(study: str, schema: type[ScenarioFile], details: list[ErrorDetails]) -> Iterator[InputError]:
     """Yield an error of ours for each of pydantic's: unknown keys first, they explain missing ones."""
-    schema = SCHEMAS[study]
     aimed: set[tuple[int | str | None, ...]] = set()
     for detail in (d for d in details if d["type"] == "extra_forbidden"):
         *place, key = detail["loc"]
@@ -148,6 +165,10 @@ _EXPECTED = {
 
 def _placed(detail: ErrorDetails, message: str) -> InputError:
     """Name the table and the key: ("pressure", "sequence_bar", 2, 0) is row 3, column 1."""
+    if len(detail["loc"]) > 1 and detail["loc"][0] == "segment":
+        _, number, *rest = detail["loc"]
+        inner = _placed({**detail, "loc": tuple(rest)}, message) if rest else InputError(message)
+        return of_segment(int(number), inner)
     *path, last = [part for part in detail["loc"] if isinstance(part, str)]
     numbers = [part + 1 for part in detail["loc"] if isinstance(part, int)]
     where = [f"{word} {n}" for word, n in zip(("row", "column"), numbers, strict=False)]

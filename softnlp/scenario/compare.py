@@ -5,8 +5,6 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
-from functools import partial
 from os import PathLike
 from pathlib import Path
 
@@ -15,7 +13,7 @@ from numpy.typing import NDArray
 
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import TIME_COLUMN, Columns
-from softnlp.base.errors import InputError, listed, nearest
+from softnlp.base.errors import InputError, listed, located, nearest
 from softnlp.base.ranges import noise_note, unit_note
 from softnlp.base.reading import choices, read_text, shown
 from softnlp.model.contact_settings import CLOSURES, ContactSettings, ContactTask
@@ -23,16 +21,26 @@ from softnlp.model.conventions import CONVENTIONS, Coefficients, Conventions
 from softnlp.model.materials import Material, load_materials
 from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
+from softnlp.model.segments import require_one_segment
 from softnlp.scenario.data import Scenario
 from softnlp.scenario.laboratory import import_notes, laboratory_columns
-from softnlp.scenario.measured_rows import SCALARS, RobotRows, rows_by_robot
-from softnlp.scenario.registration import import_settings, registration_of
+from softnlp.scenario.measured_rows import (
+    ALIASES,
+    MEASURED_COLUMNS,
+    ORIENTATION_COLUMNS,
+    SCALARS,
+    RobotRows,
+    named_columns,
+    near_misses,
+    rows_by_robot,
+)
+from softnlp.scenario.registration import import_settings, registration_of, takes_orientations
 from softnlp.statics.kept import pose_solver
 from softnlp.studies.check import Check
 from softnlp.studies.compare import SHAPES, compare
 from softnlp.studies.comparison import Comparison
 from softnlp.studies.measurements import Measurements
-from softnlp.studies.predicted import unloaded_tips
+from softnlp.studies.predicted import free_tips
 from softnlp.studies.registration import Registration
 from softnlp.studies.tip_checks import frame_checks
 from softnlp.studies.variants import NAMED, OWN, Variant, every_variant, named_coefficients
@@ -43,13 +51,8 @@ Array = NDArray[np.float64]
 STUDIES = ("forward", "blocked-force", "workspace")
 _TILT, _BACKBONE, _ELONGATION = (OUTPUTS[name] for name in ("tilt", "backbone_length", "elongation"))
 _FORCE_COLUMN = SCALARS["blocked_force"].measured
-_COMPARED = (*(OUTPUTS[f"tip_{x}"] for x in "xyz"), *SCALARS.values(), _TILT, _BACKBONE)
-_OWN = ("p1_bar", *(output.measured for output in _COMPARED))
-MEASURED_COLUMNS = tuple(output.measured for output in _COMPARED)
-ALIASES: Mapping[str, str] = {other: output.measured for output in _COMPARED for other in output.others_measured}
-"""Other names of columns, as results and people spell them."""
+_OWN = ("p1_bar", *MEASURED_COLUMNS)
 ALL = "all"
-_NEAR = 0.85
 
 
 @dataclass(frozen=True)
@@ -169,30 +172,30 @@ def run_compare(task: CompareTask, progress: Callable[[int, int], None] | None =
 def comparison_checks(task: CompareTask, found: Comparison) -> tuple[Check, ...]:
     """Return the checks of the tips that were measured, by the first variant."""
     checks: list[Check] = []
-    if task.registration is not None and "frame" in task.registration.fit:
-        return ()
+    fit = () if task.registration is None else task.registration.fit
     variant, asked = found.variants[0], task.scenario
     for o, solved in zip(found.observed, found.simulated[0], strict=True):
-        placed, rows = solved.registration, o.measured[:, :3].all(axis=1)
+        placed, rows = solved.registration or Registration(), o.measured[:, :3].all(axis=1)
         model = Model(o.robot, variant.material, variant.coefficients, variant.conventions)
-        tips = None if asked.loads.act else partial(unloaded_tips, pose_solver(model, asked.numerics))
-        checks += frame_checks(o.pressure[rows], o.values[rows, :3], solved.values[rows, :3], o.robot, placed, tips)
+        poses = pose_solver(model, asked.numerics.without_ipopt())
+        checks += frame_checks(
+            o.pressure[rows],
+            o.values[rows, :3],
+            solved.values[rows, :3],
+            o.robot,
+            placed,
+            fit,
+            lambda P, loads, poses=poses: free_tips(poses, loads, P),  # type: ignore[misc]
+            asked.loads,
+        )
     return tuple(checks)
-
-
-def named_columns(columns: Columns) -> Columns:
-    """Return a file whose columns have the names of this package in place of `ALIASES`."""
-    header = [ALIASES.get(name, name) for name in columns.header]
-    for name in header:
-        if header.count(name) > 1 and name in MEASURED_COLUMNS:
-            both = [old for old, new in zip(columns.header, header, strict=True) if new == name]
-            raise InputError(f"expected {name!r} once, got {' and '.join(both)}", source=columns.file)
-    return replace(columns, header=tuple(header))
 
 
 def _require_study(scenario: Scenario) -> None:
     """Refuse a scenario that does not say how a pose at a pressure is solved."""
     source = str(scenario.path)
+    with located(source=source):
+        require_one_segment(scenario.robot, "a comparison with measurements")
     if scenario.study not in STUDIES:
         raise InputError(f"expected {choices(STUDIES)}, got {scenario.study!r}", source=source, key="study")
     task = scenario.task
@@ -214,16 +217,16 @@ def _notes(columns: Columns, scenario: Scenario) -> list[str]:
     found = []
     if scenario.contact is None and _FORCE_COLUMN in columns:
         found.append(f"{_FORCE_COLUMN} is not compared: study {scenario.study!r} of {scenario.path} has no wall")
-    for name in columns.header:
-        if name not in (*MEASURED_COLUMNS, *ALIASES):
-            wanted = [known for known in MEASURED_COLUMNS if known not in columns]
-            if near := get_close_matches(name, wanted, n=1, cutoff=_NEAR):
-                found.append(f"column {shown(name)} is not compared; did you mean {near[0]!r}?")
-    return found
+    asked = scenario.registration is not None and takes_orientations(scenario.registration)
+    if not asked and any(name in columns for names in ORIENTATION_COLUMNS for name in names):
+        found.append("orientations are not compared; [registration] tip_sensor_quat_xyzw says how the sensor lies")
+    return found + near_misses(columns, (*MEASURED_COLUMNS, "robot", *sum(ORIENTATION_COLUMNS, ())), "not compared")
 
 
 def _measured(scenario: Scenario, columns: Columns) -> tuple[tuple[RobotRows, ...], tuple[Measurements, ...]]:
     """Return the rows of each robot and what was measured of it."""
+    table = scenario.registration
+    oriented = table is not None and takes_orientations(table)
     own: dict[str, Robot] = {scenario.robot.name: scenario.robot}
     rows = tuple(rows_by_robot([columns], own, lambda _, row: scenario.robot))
     measurements = []
@@ -243,6 +246,7 @@ def _measured(scenario: Scenario, columns: Columns) -> tuple[tuple[RobotRows, ..
                 **seen,
                 tilt=tilt,
                 label=of_robot.label,
+                orientation=of_robot.orientation() if oriented else None,
             )
         )
     kept = [k for k, m in enumerate(measurements) if _has_numbers(m)]
@@ -252,8 +256,8 @@ def _measured(scenario: Scenario, columns: Columns) -> tuple[tuple[RobotRows, ..
 
 
 def _has_numbers(m: Measurements) -> bool:
-    parts = (m.tip_position, m.bending_angle, m.elongation, m.tilt, m.blocked_force)
-    return any(np.isfinite(part).any() for part in parts)
+    parts = (m.tip_position, m.bending_angle, m.elongation, m.tilt, m.blocked_force, m.orientation)
+    return any(np.isfinite(part).any() for part in parts if part is not None)
 
 
 def _variants(scenario: Scenario, asked: Asked, against_wall: bool) -> tuple[Variant, ...]:
@@ -290,7 +294,7 @@ def _materials(scenario: Scenario, names: Sequence[str]) -> tuple[Material, ...]
     known: dict[str, Material] = {own.law.name: own}
     if "constants" not in table and "formula" not in table:
         file = scenario.path.parent / table["file"] if "file" in table else None
-        models = load_materials(file)[own.name].models
+        models = load_materials(file)[own.name].chosen(table.get("set")).models
         known = {law: replace(found, density=own.density) for law, found in models.items()} | known
         known = {law: known[law] for law in models}
     wanted = [law for name in names for law in (known if name == ALL else (name,))]

@@ -22,6 +22,7 @@ from softnlp.model.rod import Loads
 from softnlp.scenario.pressures import PressurePath
 from softnlp.scenario.schema import RegistrationTable
 from softnlp.statics.step import Run, Step
+from softnlp.studies.uncertainty import Uncertainty
 
 Array = NDArray[np.float64]
 
@@ -63,6 +64,8 @@ class Scenario:
         count as 0.
     registration
         Of measured tips that the scenario is compared with, where it says so.
+    uncertainty
+        What scatters, where it says so.
     """
 
     path: Path
@@ -81,6 +84,7 @@ class Scenario:
     task: Task | None
     warnings: tuple[str, ...]
     registration: RegistrationTable | None = None
+    uncertainty: Uncertainty | None = None
 
     @property
     def model(self) -> Model:
@@ -136,4 +140,5 @@ def run_of(scenario: Scenario, steps: Iterable[Step], *notes: str) -> Run:
     """Return the run that these steps make of a scenario, with its warnings and then `notes`."""
     same = ("study", "robot", "material", "coefficients", "conventions", "loads", "title", "contact")
     asked: dict[str, Any] = {key: getattr(scenario, key) for key in same}
-    return Run(steps=tuple(steps), warnings=(*scenario.warnings, *notes), **asked)
+    told = {} if scenario.uncertainty is None else scenario.uncertainty.written
+    return Run(steps=tuple(steps), warnings=(*scenario.warnings, *notes), uncertainty=told, **asked)

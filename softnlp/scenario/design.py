@@ -240,7 +240,7 @@ def _materials(table: MaterialChoices, base: Mapping[str, Any], folder: Path) ->
     for name in names:
         for model in models:
             try:
-                made = material(name, model, file=file)
+                made = material(name, model, set=base.get("set"), file=file)
             except InputError as error:
                 key = f"material.{error.key}" if error.key in ("name", "model") else "material"
                 raise InputError(error.message, table="choices", key=key) from None

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.csv_columns import Columns
-from softnlp.base.errors import InputError, located, of_table
+from softnlp.base.errors import InputError, listed, located, of_table
 from softnlp.base.ranges import noise_note, unit_note
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import Coefficients
@@ -21,8 +21,17 @@ from softnlp.model.robot import Robot
 from softnlp.scenario.blocked_force import SEVERAL
 from softnlp.scenario.data import Read, Scenario
 from softnlp.scenario.laboratory import import_notes, laboratory_columns
-from softnlp.scenario.measured_rows import SCALARS, TIP_COLUMNS, RobotRows, rows_by_robot
-from softnlp.scenario.registration import import_settings, registration_of
+from softnlp.scenario.measured_rows import (
+    ALIASES,
+    ORIENTATION_COLUMNS,
+    SCALARS,
+    TIP_COLUMNS,
+    RobotRows,
+    named_columns,
+    near_misses,
+    rows_by_robot,
+)
+from softnlp.scenario.registration import import_settings, registration_of, takes_orientations
 from softnlp.scenario.schema import (
     ContactTable,
     MaterialTable,
@@ -37,7 +46,15 @@ from softnlp.studies.identified import free_constants
 from softnlp.studies.measurements import OBSERVABLES, Measurements, RobotTask, TensileTask, checked_measurements
 from softnlp.studies.registration import Registration
 
-_OWN = ("p1_bar", *TIP_COLUMNS, *(output.measured for output in SCALARS.values()))
+_MEASURED = (*TIP_COLUMNS, *(output.measured for output in SCALARS.values()))
+_OWN = ("p1_bar", *_MEASURED, *ALIASES)
+_KNOWN = (
+    *_MEASURED,
+    "robot",
+    "weight",
+    *sum(ORIENTATION_COLUMNS, ()),
+    *(f"sigma_{OUTPUTS[name].key}" for name in OBSERVABLES),
+)
 
 if TYPE_CHECKING:  # imported where needed: to read a scenario takes none of them
     from softnlp.studies.identified import Identified
@@ -65,7 +82,7 @@ class MeasurementsTable(DataTable):
 def _sigma_keys() -> Iterator[str]:
     for name in OBSERVABLES:
         yield OUTPUTS[name].key
-        if name != "tip_position":
+        if name not in ("tip_position", "orientation"):
             yield f"{name}_percent"
 
 
@@ -125,16 +142,20 @@ def _robots(given: Read, table: MeasurementsTable) -> RobotTask:
     files = table.named()
     groups = [files] if settings is not None else [(file,) for file in files]
     every = [laboratory_columns(given.folder, group, "tips", _OWN, settings) for group in groups]
-    tables = [columns for columns, _ in every]
+    tables = [named_columns(columns) for columns, _ in every]
     told = tuple(note for _, imported in every if imported is not None for note in import_notes(imported))
     own = {}
     for name, described in given.file.robots.items():
         with located(table=f"robots.{name}"):
             own[name] = described.made()[0]
     header = tuple(dict.fromkeys(name for columns in tables for name in columns.header))
+    misses = tuple(f"{c.file}: {words}" for c in tables for words in near_misses(c, _KNOWN, "not read"))
     for columns in tables:
         if "robot" not in columns and "robot" not in given.data:
             raise InputError(f"{columns.file}: expected a column robot, or a table [robot] for every row", key="file")
+    if not any(name in header for name in _MEASURED):
+        why = f" ({misses[0]})" if misses else ""
+        raise InputError(f"expected a column of {', '.join(_MEASURED)}; it has {listed(header)}{why}", key="file")
 
     def unnamed(columns: Columns, row: int) -> Robot:
         if "robot" in given.data:
@@ -145,11 +166,17 @@ def _robots(given: Read, table: MeasurementsTable) -> RobotTask:
     for rows in rows_by_robot(tables, own, unnamed):
         readings.append(rows.readings().ravel())
         placed = registration_of(registration, rows.robot.chamber_sets)
-        made.append(_measurements(rows, given.file.sigma, placed))
+        made.append(_measurements(rows, given.file.sigma, placed, takes_orientations(registration)))
         cells.append(tuple(tuple(_cell(c, k, column) for column in header) for c, k in rows.places))
     free, bounds = _free(table, given.material)
     pressed = np.concatenate(readings)
-    notes = (*told, *noise_note(pressed), *unit_note(pressed))
+    notes = (*told, *misses, *noise_note(pressed), *unit_note(pressed))
+    unused = any(c in header for names in ORIENTATION_COLUMNS for c in names)
+    if unused and all(m.orientation is None for m in made):
+        notes = (
+            *notes,
+            f"orientations are not fitted; [sigma] {OUTPUTS['orientation'].key}, their noise, makes them count",
+        )
     sets = made[0].robot.chamber_sets
     return RobotTask(tuple(made), free, bounds, header, tuple(cells), notes, registration_of(registration, sets))
 
@@ -158,8 +185,10 @@ def _cell(columns: Columns, row: int, name: str) -> str:
     return columns.rows[row][columns.header.index(name)].strip() if name in columns else ""
 
 
-def _measurements(rows: RobotRows, sigmas: SigmaTable, registration: Registration | None) -> Measurements:
-    """Return the measurements of one robot."""
+def _measurements(
+    rows: RobotRows, sigmas: SigmaTable, registration: Registration | None, oriented: bool
+) -> Measurements:
+    """Return the measurements of one robot; orientations count where they are asked for, or their noise is stated."""
     pressure, seen = rows.pressure(), rows.scalars()
     if registration is not None:
         pressure = registration.ordered(pressure)
@@ -181,6 +210,8 @@ def _measurements(rows: RobotRows, sigmas: SigmaTable, registration: Registratio
     weight = np.where(np.isnan(weight), 1.0, weight)
     tip = rows.tip_position()
     made = Measurements(rows.robot, pressure, tip_position=tip, **seen, sigma=sigma, weight=weight, label=rows.label)
+    if oriented or "orientation" in sigma:
+        made = replace(made, orientation=rows.orientation())
     try:
         checked_measurements(made)
     except InputError as error:

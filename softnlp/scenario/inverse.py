@@ -12,7 +12,17 @@ from pydantic import ConfigDict, Field, PlainValidator, TypeAdapter
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.scenario.data import Read, Scenario, run_of
-from softnlp.scenario.schema import MOST_STEPS, Normal, NotNegative, Positive, ScenarioFile, Table, Vector
+from softnlp.scenario.schema import (
+    MOST_STEPS,
+    Normal,
+    NotNegative,
+    Positive,
+    ScenarioFile,
+    Table,
+    UncertaintyTable,
+    Vector,
+)
+from softnlp.scenario.segments import allowed
 from softnlp.statics.step import Run, Step
 from softnlp.studies.forward import followed
 from softnlp.studies.inverse_solver import InverseKinematics
@@ -62,6 +72,7 @@ class InverseFile(ScenarioFile):
 
     target: TargetTable = Field(description="a table with tip_position_mm, tip_direction or both")
     bounds: BoundsTable = BoundsTable()
+    uncertainty: UncertaintyTable | None = None
 
 
 def inverse_task(given: Read) -> InverseTask:
@@ -93,7 +104,7 @@ def inverse_task(given: Read) -> InverseTask:
     weight = float(given.robot.length)
     if target.length_per_radian_mm is not None:
         weight = target.length_per_radian_mm * MILLIMETRE
-    return InverseTask(targets, lower, upper, weight, allow=tuple(given.file.robot.allow))
+    return InverseTask(targets, lower, upper, weight, allow=allowed(given.file))
 
 
 def _pressures(table: BoundsTable, sets: int) -> tuple[Array, Array]:

@@ -125,4 +125,4 @@ def import_notes(imported: Imported) -> tuple[str, ...]:
     name = ", ".join(imported.files)
     guesses = tuple(f"{name}: {g.key} = {g.value} was guessed: {g.reason}" for g in imported.choices.guesses)
     dropped = tuple(f"{name}: left out {count} {reason}" for reason, count in imported.choices.dropped.items())
-    return (*guesses, *dropped, *imported.warnings)
+    return (*guesses, *dropped, *(f"{name}: {note}" for note in imported.choices.notes), *imported.warnings)

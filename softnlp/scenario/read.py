@@ -16,11 +16,14 @@ from softnlp.base.errors import InputError, first_of, of_table
 from softnlp.base.ranges import file_unit_note
 from softnlp.base.reading import BACKSLASH_HINT, LARGEST_TOML, LONGEST_NAME, one_line, read_text, toml_tables
 from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
+from softnlp.model.body import Segment
 from softnlp.model.conventions import COEFFICIENT_SETS, CONVENTIONS, Coefficients
-from softnlp.model.materials import material_from_table
+from softnlp.model.materials import Material, material_from_table
 from softnlp.model.numerics import Numerics
-from softnlp.model.robot import MOST_CHAMBERS, Robot, Violation, violations
+from softnlp.model.quantities import Model
+from softnlp.model.robot import DIMENSIONS, MOST_CHAMBERS, Robot, Violation, violations
 from softnlp.model.rod import Loads
+from softnlp.model.segments import SegmentedRobot, segmented_robot
 from softnlp.scenario.blocked_force import contact_settings, contact_task
 from softnlp.scenario.check import HOW, parse, parse_parts
 from softnlp.scenario.data import Read, Task
@@ -30,6 +33,8 @@ from softnlp.scenario.identify import identify_task
 from softnlp.scenario.inverse import inverse_task
 from softnlp.scenario.pressures import PressurePath, pressure_path
 from softnlp.scenario.schema import ScenarioFile
+from softnlp.scenario.segments import OF_SEGMENTS, read_segments
+from softnlp.scenario.uncertainty import uncertainty_of
 from softnlp.scenario.workspace import workspace_task
 from softnlp.studies.plausibility import modulus_notes
 
@@ -90,6 +95,8 @@ def robot_of_scenario(path: str | PathLike[str]) -> tuple[Robot, tuple[Violation
     """
     try:
         file = parse(parse_toml(read_text(Path(path), LARGEST_TOML)))
+        if getattr(file, "segment", None) is not None or file.robot.along:
+            raise InputError("the cross-section of a robot of one uniform segment is drawn so far", table="segment")
         robot = file.robot.described()
         return robot, violations(robot, file.robot.minimum_wall_mm * MILLIMETRE)
     except InputError as error:
@@ -100,15 +107,12 @@ def _scenario(text: str, path: Path) -> Scenario:
     """Build a scenario; errors do not name the file yet."""
     data = parse_toml(text)
     file, errors, bad = parse_parts(data)  # what does not fit is in no table of the file
-    made = _attempt(errors, "robot", file.robot.made) if "robot" not in bad else None
-    chosen = steps = contact = task = numerics = None
-    if "material" not in bad:
-        silicone = data.get("material") or file.material.model_dump(exclude_none=True)
-        chosen = _attempt(errors, "material", lambda: material_from_table(silicone, folder=path.parent))
-    if not bad & {"robot", "pressure"}:
-        with suppress(InputError):  # of a robot that is not described, which was said
-            sets = min(file.robot.described().chamber_sets, MOST_CHAMBERS)
-            steps = _attempt(errors, "pressure", lambda: _steps(file, sets, path.parent))
+    made, chosen, unlikely = _robot(file, data, path.parent, errors, bad)
+    steps = contact = task = numerics = None
+    if "pressure" not in bad and (made is not None or not bad & {"robot", "segment"}):
+        with suppress(InputError, AttributeError):  # of a robot that is not described, which was said
+            sets = made[0].chamber_sets if made is not None else file.robot.described().chamber_sets
+            steps = _attempt(errors, "pressure", lambda: _steps(file, min(sets, MOST_CHAMBERS), path.parent))
     if "contact" not in bad and (wall := getattr(file, "contact", None)) is not None:
         single = None if made is None or file.study == "design" else made[0]  # a design judges each candidate
         contact = _attempt(errors, "contact", lambda: contact_settings(wall, single))
@@ -118,11 +122,25 @@ def _scenario(text: str, path: Path) -> Scenario:
         task = _attempt(errors, table, lambda: read_task(given))
     if "solver" not in bad:
         numerics = _attempt(errors, "solver", lambda: _numerics(file))
+    scatter = None
+    asked = getattr(file, "uncertainty", None)
+    said = None if asked is None else asked.model_dump(exclude_unset=True, warnings=False)
+    if said is not None and made is not None and isinstance(made[0], SegmentedRobot):
+        errors.append(
+            InputError(
+                "a robot of several segments, or one that varies along s, takes none so far", table="uncertainty"
+            )
+        )
+    if said is not None and not errors and made is not None and chosen is not None:
+        silicone = data.get("material") or file.material.model_dump(exclude_none=True)
+        model = Model(made[0], chosen, _coefficients(file), CONVENTIONS[file.corrections.conventions])
+        pressed = contact if file.study == "blocked-force" else None
+        scatter = _attempt(
+            errors, "uncertainty", lambda: uncertainty_of(said, model, silicone, path.parent, pressed, task)
+        )
     if errors or made is None or chosen is None or steps is None or numerics is None:
         raise first_of(errors, HOW)
     robot, warnings = made
-    # Where constants are to be found, those given only begin the search.
-    unlikely = () if file.study == "identify" else modulus_notes(chosen.name, float(chosen.shear_modulus(1.0)))
     return Scenario(
         path=path,
         text=text,
@@ -140,7 +158,49 @@ def _scenario(text: str, path: Path) -> Scenario:
         task=task,
         warnings=(*warnings, *unlikely, *file_unit_note(data), *steps.notes),
         registration=getattr(file, "registration", None) if "registration" in data else None,
+        uncertainty=scatter,
     )
+
+
+def _robot(
+    file: ScenarioFile, data: dict[str, Any], folder: Path, errors: list[InputError], bad: set[str]
+) -> tuple[tuple[Robot, tuple[str, ...]] | None, Material | None, tuple[str, ...]]:
+    """Return the robot with its warnings, the silicone, and what is unlikely of it; None with an error for each.
+
+    bad : the tables that do not fit, of which nothing is read.
+    """
+
+    def notes(material: Material) -> tuple[str, ...]:
+        # Where constants are to be found, those given only begin the search.
+        known = file.study == "identify"
+        return () if known else modulus_notes(material.name, float(material.shear_modulus(1.0)))
+
+    if "segment" in bad:
+        return None, None, ()
+    if (tables := getattr(file, "segment", None)) is not None:
+        found = read_segments(tables, data["segment"], folder, errors)
+        if found is None:
+            return None, None, ()
+        robot, silicone, warnings = found
+        every = [s.material for s in robot.segments] if isinstance(robot, SegmentedRobot) else [silicone]
+        unlikely = dict.fromkeys(note for one in every for note in notes(one))
+        return (robot, warnings), silicone, tuple(unlikely)
+    made = chosen = None
+    if "robot" not in bad:
+        made = _attempt(errors, "robot", file.robot.made)
+    if "material" not in bad:
+        written = data.get("material") or file.material.model_dump(exclude_none=True)
+        chosen = _attempt(errors, "material", lambda: material_from_table(written, folder=folder))
+    if made is None or chosen is None:
+        return made, chosen, ()
+    if along := file.robot.along:
+        if file.study not in OF_SEGMENTS:
+            key = next(iter(along)).removeprefix("robot.")
+            text = f"study {file.study!r} takes one number here so far, not one that varies along s"
+            errors.append(InputError(text, table="robot", key=next(d.file_key for d in DIMENSIONS if d.field == key)))
+        varying = segmented_robot([Segment(made[0], chosen, along=along)])
+        return (varying, made[1]), varying.material, notes(chosen)
+    return made, chosen, notes(chosen)
 
 
 def _numerics(file: ScenarioFile) -> Numerics:

@@ -40,6 +40,7 @@ def registration_of(table: RegistrationTable, sets: int) -> Registration | None:
         raise InputError(text, table="registration", key="set_order")
     fit = [name for name, wanted in (("frame", frame == "fit"), ("tip_offset", table.tip_offset_mm is None)) if wanted]
     fit += ["clock"] if table.clock_deg is None else []
+    fit += ["tip_sensor"] if table.tip_sensor_quat_xyzw is None else []
     q = table.rotation_world_from_base_quat_xyzw
     offset = (0.0, 0.0, 0.0) if table.tip_offset_mm is None else tuple(v * MILLIMETRE for v in table.tip_offset_mm)
     made = Registration(
@@ -49,9 +50,15 @@ def registration_of(table: RegistrationTable, sets: int) -> Registration | None:
         tip_offset=(0.0, 0.0, 0.0) if frame == "base sensor" else offset,
         clock=(table.clock_deg or 0.0) * DEGREE,
         fit=tuple(fit),
+        tip_sensor=rotation_of_quaternion(table.tip_sensor_quat_xyzw or [0.0, 0.0, 0.0, 1.0]),
         set_order=order if order != tuple(range(1, sets + 1)) else (),
     )
     return made if made.acts or made.set_order else None
+
+
+def takes_orientations(table: RegistrationTable) -> bool:
+    """Whether a table says how the axes of the tip's sensor lie, so that orientations count."""
+    return "tip_sensor_quat_xyzw" in table.model_fields_set
 
 
 def import_settings(table: RegistrationTable) -> dict[str, Any] | None:
@@ -63,4 +70,9 @@ def import_settings(table: RegistrationTable) -> dict[str, Any] | None:
             'expected numbers; "fit" goes with frame = "fit" or "given"', table="registration", key="tip_offset_mm"
         )
     known = {key: getattr(table, key) for key in _IMPORTED if getattr(table, key) is not None}
+    if table.tip_sensor_quat_xyzw is None and any(table.tip_offset_mm):
+        text = "expected numbers: the base sensor's frame takes tip_offset_mm off along the axes of the tip's sensor"
+        raise InputError(text, table="registration", key="tip_sensor_quat_xyzw")
+    axes = rotation_of_quaternion(table.tip_sensor_quat_xyzw or [0.0, 0.0, 0.0, 1.0])
+    known["tip_offset_mm"] = [float(v) for v in np.array(table.tip_offset_mm) @ axes]  # along those of the sensor
     return {"frame": "base sensor", **known}

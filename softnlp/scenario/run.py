@@ -17,6 +17,7 @@ from softnlp.scenario.inverse import run_inverse
 from softnlp.scenario.workspace import run_workspace
 from softnlp.statics.step import Run, Step
 from softnlp.studies.forward import forward
+from softnlp.studies.uncertainty import Deviations
 
 if TYPE_CHECKING:  # imported where needed: a run takes none of them
     from softnlp.studies.design import Design
@@ -75,7 +76,20 @@ def run_scenario(
 
 def solve_steps(scenario: Scenario, progress: Progress | None = None, branches: int = 0) -> Run:
     """Run a scenario whose study is a run, every step in order; as `run_scenario`."""
-    return replace(STUDIES[scenario.study](scenario, progress, branches), warnings=scenario.warnings)
+    study = STUDIES[scenario.study]
+    if scenario.uncertainty is None:
+        return replace(study(scenario, progress, branches), warnings=scenario.warnings)
+    contact = scenario.contact if scenario.study == "blocked-force" else None
+    deviations = Deviations(scenario.model, scenario.numerics, scenario.loads, contact, scenario.uncertainty)
+    steps: list[Step] = []
+
+    def keep(count: int, step: Step) -> None:
+        steps.append(deviations.added(step))
+        if progress is not None:
+            progress(count, steps[-1])
+
+    run = study(scenario, keep, branches)
+    return replace(run, steps=tuple(steps), warnings=scenario.warnings, uncertainty=dict(scenario.uncertainty.written))
 
 
 def partial_run(scenario: Scenario, steps: Sequence[Step]) -> Run:

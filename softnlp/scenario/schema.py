@@ -8,12 +8,12 @@ is checked where it is read.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PlainValidator, create_model
+from numpy import interp
+from pydantic import ConfigDict, Field, PlainValidator, create_model
 
 from softnlp.base.errors import InputError, nearest
 from softnlp.base.reading import shown
@@ -24,35 +24,17 @@ from softnlp.model.numerics import EngineName, Numerics, Transcribing
 from softnlp.model.robot import DIMENSIONS, MINIMUM_WALL, ROBOTS, Robot, check
 from softnlp.scenario.values import MOST_STEPS as MOST_STEPS
 from softnlp.scenario.values import Count as Count
-from softnlp.scenario.values import Direction, intervals_of, number_or_fit, vector_or_fit
+from softnlp.scenario.values import Direction, deviation, intervals_of, number_or_fit, vector_or_fit
 from softnlp.scenario.values import FileName as FileName
 from softnlp.scenario.values import Label as Label
 from softnlp.scenario.values import Normal as Normal
 from softnlp.scenario.values import NotNegative as NotNegative
 from softnlp.scenario.values import Positive as Positive
+from softnlp.scenario.values import Table as Table
 from softnlp.scenario.values import Vector as Vector
+from softnlp.scenario.values import optional_keys as optional_keys
 from softnlp.scenario.values import wrong as wrong
-
-
-class Table(BaseModel):
-    """A table of the file: no unknown key, no conversion of types (but a whole number is a number), no nan or inf."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
-
-    def written(self, keys: Iterable[str]) -> list[str]:
-        """Return which of some keys the file has, in their order."""
-        return [key for key in keys if key in self.model_fields_set]
-
-    def refuse(self, keys: Iterable[str], message: str, table: str | None = None) -> None:
-        """Raise `InputError` for the first of some keys that the file has."""
-        for key in self.written(keys):
-            raise InputError(message, table=table, key=key)
-
-
-def optional_keys(kinds: Mapping[str, Any]) -> Any:
-    """Return a table whose keys may each be left out; kinds : of each."""
-    fields: dict[str, Any] = {key: (kind | None, None) for key, kind in kinds.items()}
-    return create_model("OptionalKeys", __base__=Table, **fields)
+from softnlp.scenario.varying import Along, Varying
 
 
 class RobotTable(Table):
@@ -73,38 +55,63 @@ class RobotTable(Table):
     """
 
     name: Label | None = None
-    outer_diameter_mm: Positive | None = None
-    lumen_diameter_mm: Positive | None = None
-    chamber_circle_diameter_mm: Positive | None = None
-    chamber_diameter_mm: Positive | None = None
-    chamber_wall_mm: Positive | None = None
+    outer_diameter_mm: Along[Positive] = None
+    lumen_diameter_mm: Along[Positive] = None
+    chamber_circle_diameter_mm: Along[Positive] = None
+    chamber_diameter_mm: Along[Positive] = None
+    chamber_wall_mm: Along[Positive] = None
     length_mm: Positive | None = None
     chamber_sets: Count | None = None
     chambers_per_set: Count | None = None
-    chamber_angle_deg: NotNegative | None = None
-    allow: list[str] = []
+    chamber_angle_deg: Along[NotNegative] = None
+    allow: list[str] = Field(default=[])
     minimum_wall_mm: Positive = MINIMUM_WALL / MILLIMETRE
 
     def made(self) -> tuple[Robot, tuple[str, ...]]:
         """Return the robot and its warnings; raises `InputError` where it cannot be made."""
-        robot = self.described()
+        robot, warnings, where = self.described(), list[str](), ""
         try:
-            return robot, check(robot, allow=self.allow, minimum_wall=self.minimum_wall_mm * MILLIMETRE)
+            for place, there in self.sections(robot).items():
+                where = place
+                warnings += check(there, allow=self.allow, minimum_wall=self.minimum_wall_mm * MILLIMETRE)
+            return robot, tuple(dict.fromkeys(warnings))
         except InputError as error:
             file_keys = {d.field: d.file_key for d in DIMENSIONS}
             key = file_keys.get(error.key or "", error.key)
-            raise type(error)(error.message, key=key, every=error.every) from None
+            raise type(error)(f"{where}{error.message}", key=key, every=error.every) from None
+
+    @property
+    def along(self) -> dict[str, dict[str, Any]]:
+        """What varies along s, as `softnlp.Segment` takes it."""
+        return {
+            f"robot.{d.field}": {"s": value.s, "value": [v * (d.scale or 1.0) for v in value.value]}
+            for d in DIMENSIONS
+            if isinstance(value := getattr(self, d.file_key), Varying)
+        }
+
+    def sections(self, robot: Robot) -> dict[str, Robot]:
+        """Return the robot at each knot of what varies along s, by the place in words."""
+        knots = sorted({0.0, *(s for table in self.along.values() for s in table["s"])})
+        every: dict[str, dict[str, Any]] = {
+            f"at s = {s:g}: " if self.along else "": {
+                key.removeprefix("robot."): float(interp(s, t["s"], t["value"])) for key, t in self.along.items()
+            }
+            for s in knots
+        }
+        return {where: replace(robot, **sizes) for where, sizes in every.items()}
 
     def described(self) -> Robot:
-        """Return the robot, whether it can be made or not."""
+        """Return the robot, at the base where it varies along s, whether it can be made or not."""
         given: dict[str, Any] = {}
         for dimension in DIMENSIONS:
             value = getattr(self, dimension.file_key)
+            if isinstance(value, Varying):
+                value = value.value[0]
             if value is not None:
                 given[dimension.field] = value if dimension.scale is None else value * dimension.scale
         missing = [d.file_key for d in DIMENSIONS if d.field not in given]
         if self.name is not None and self.name in ROBOTS:
-            changed = any(getattr(ROBOTS[self.name], key) != value for key, value in given.items())
+            changed = bool(self.along) or any(getattr(ROBOTS[self.name], k) != v for k, v in given.items())
             return replace(ROBOTS[self.name], **given, name=f"{self.name} (modified)" if changed else self.name)
         if not missing:
             return Robot(name=self.name or "robot", **given)
@@ -124,6 +131,7 @@ class MaterialTable(Table):
 
     name : of a silicone of the library (`softnlp materials`) or of `file`, or your own; as in "Ecoflex 00-50"
     model : linear, neo-hookean, mooney-rivlin, yeoh, ogden, or a law of your own; as in "mooney-rivlin"
+    set : of constants, where the library has several of a silicone; by default "shi-2025"; as in "srmd"
     density_kg_m3 : for the weight; by default 1070.0
     file : a materials file of your own; as in "my_silicone.toml"
     constants : of the law, in place of the library's; as in { C10_MPa = 0.004, C01_MPa = 0.015, C20_MPa = 0.001 }
@@ -133,6 +141,7 @@ class MaterialTable(Table):
 
     name: Label = Field(description="a silicone of the library, or a name for your own")
     model: str = Field(description="linear, neo-hookean, mooney-rivlin, yeoh, ogden or a law of your own")
+    set: Label | None = None
     density_kg_m3: Positive | None = None
     file: FileName | None = None
     constants: dict[str, float] | None = None
@@ -185,8 +194,8 @@ class TipLoadTable(Table):
     moment_Nmm : x, y, z
     """
 
-    force_N: Vector = [0.0, 0.0, 0.0]
-    moment_Nmm: Vector = [0.0, 0.0, 0.0]
+    force_N: Vector = Field(default=[0.0, 0.0, 0.0])
+    moment_Nmm: Vector = Field(default=[0.0, 0.0, 0.0])
 
 
 class RampTable(Table):
@@ -333,20 +342,41 @@ class RegistrationTable(Table):
     rotation_world_from_base_quat_xyzw : of a given frame, a quaternion x, y, z, w; as in [0.0, 0.0, 0.0, 1.0]
     translation_mm : of a given frame; as in [0.0, 0.0, 0.0]
     base_sensor_mm : where the base sensor sits in the robot's frame; as in [0.0, 0.0, 0.0]
+    tip_sensor_quat_xyzw : the sensor's turn in the frame of the tip, a quaternion x, y, z, w, or "fit"
     """
 
     frame: Literal["given", "base sensor", "fit"] = "given"
-    tip_offset_mm: Annotated[list[float] | None, PlainValidator(vector_or_fit)] = [0.0, 0.0, 0.0]
+    tip_offset_mm: Annotated[list[float] | None, PlainValidator(partial(vector_or_fit, 3))] = Field(
+        default=[0.0, 0.0, 0.0]
+    )
     clock_deg: Annotated[float | None, PlainValidator(number_or_fit)] = 0.0
     set_order: Annotated[list[int], Field(min_length=1)] | None = None
     rotation_world_from_base_quat_xyzw: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
     translation_mm: Vector | None = None
     base_sensor_mm: Vector | None = None
+    tip_sensor_quat_xyzw: Annotated[list[float] | None, PlainValidator(partial(vector_or_fit, 4))] = Field(
+        default=[0.0, 0.0, 0.0, 1.0]
+    )
+
+
+class UncertaintyTable(Table):
+    """[uncertainty]: standard deviations of the silicone, of pressures, and of any dimension of [robot] by its key.
+
+    material : relative, of the stress, or "sets", the spread of the library's sets; as in 0.15
+    pressure_bar : of each set, or in percent of its pressure; as in 0.01
+    """
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Annotated[float | str, PlainValidator(deviation)]] = Field(init=False)
+
+    material: Annotated[float | str | None, PlainValidator(deviation)] = None
+    pressure_bar: Annotated[float | str | None, PlainValidator(deviation)] = None
 
 
 class ForwardFile(ScenarioFile):
     """A whole scenario of `forward`."""
 
+    uncertainty: UncertaintyTable | None = None
     registration: RegistrationTable = RegistrationTable()
     pressure: PressureTable = Field(description="a table with one of sequence_bar, ramp, file")
 

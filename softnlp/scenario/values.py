@@ -1,14 +1,16 @@
-"""What single keys of a scenario may hold: types of pydantic, and how they word what does not fit."""
+"""What tables and single keys of a scenario may hold: types of pydantic, and how they word what does not fit."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from math import hypot, isfinite
 from typing import Annotated, Any
 from unicodedata import category
 
-from pydantic import AfterValidator, Field, PlainValidator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, PlainValidator, create_model
 from pydantic_core import PydanticCustomError
 
+from softnlp.base.errors import InputError
 from softnlp.base.reading import BACKSLASH_HINT, as_typed, choices, shown
 from softnlp.model.gravity import DIRECTIONS, unknown_direction
 
@@ -61,22 +63,30 @@ def intervals_of(value: Any) -> int | None:
     return value
 
 
-def _is_number(value: Any) -> bool:
+def is_number(value: Any) -> bool:
+    """Whether a value is a finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 
 def number_or_fit(value: Any) -> float | None:
     """Return a number, None for "fit"."""
-    if value != "fit" and not _is_number(value):
+    if value != "fit" and not is_number(value):
         raise wrong(f"expected a number or 'fit', got {shown(value)}")
     return None if value == "fit" else float(value)
 
 
-def vector_or_fit(value: Any) -> list[float] | None:
-    """Return three numbers, None for "fit"."""
-    if value != "fit" and not (isinstance(value, list) and len(value) == 3 and all(map(_is_number, value))):
-        raise wrong(f"expected a list of 3 numbers or 'fit', got {shown(value)}")
+def vector_or_fit(size: int, value: Any) -> list[float] | None:
+    """Return so many numbers, None for "fit"."""
+    if value != "fit" and not (isinstance(value, list) and len(value) == size and all(map(is_number, value))):
+        raise wrong(f"expected a list of {size} numbers or 'fit', got {shown(value)}")
     return None if value == "fit" else [float(v) for v in value]
+
+
+def deviation(value: Any) -> float | str:
+    """Return a standard deviation as it is written: a number, or text that says what it is a part of."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        raise wrong(f"expected a number, or text such as '3%', got {shown(value)}")
+    return value
 
 
 def _file_name(value: str) -> str:
@@ -105,3 +115,24 @@ Direction = Annotated[tuple[float, float, float], PlainValidator(_direction)]
 Normal = Annotated[tuple[float, float, float], PlainValidator(_normal)]
 Label = Annotated[str, Field(max_length=LONGEST_LABEL), AfterValidator(_label)]
 FileName = Annotated[str, Field(max_length=LONGEST_FILE_NAME), AfterValidator(_file_name)]
+
+
+class Table(BaseModel):
+    """A table of the file: no unknown key, no conversion of types (but a whole number is a number), no nan or inf."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+    def written(self, keys: Iterable[str]) -> list[str]:
+        """Return which of some keys the file has, in their order."""
+        return [key for key in keys if key in self.model_fields_set]
+
+    def refuse(self, keys: Iterable[str], message: str, table: str | None = None) -> None:
+        """Raise `InputError` for the first of some keys that the file has."""
+        for key in self.written(keys):
+            raise InputError(message, table=table, key=key)
+
+
+def optional_keys(kinds: Mapping[str, Any]) -> Any:
+    """Return a table whose keys may each be left out; kinds : of each."""
+    fields: dict[str, Any] = {key: (kind | None, None) for key, kind in kinds.items()}
+    return create_model("OptionalKeys", __base__=Table, **fields)

@@ -23,6 +23,7 @@ from softnlp.batch.plan import CHUNK, Plan, cells
 from softnlp.model.contact_settings import require_in_front
 from softnlp.model.materials import Material
 from softnlp.model.robot import Robot
+from softnlp.model.segments import require_one_segment
 from softnlp.scenario.blocked_force import SEVERAL, contact_settings
 from softnlp.scenario.data import Read, Scenario, scenario_of
 from softnlp.scenario.pressures import require_sets
@@ -90,6 +91,12 @@ def workspace_task(given: Read) -> WorkspaceTask:
         other = 'not in a sweep, which finds the force at every pressure; use study = "blocked-force"'
         wall.refuse(SEVERAL, other, "contact")
     _check_source(file)
+    if wall is not None:
+        with located(table="contact"):
+            require_one_segment(robot, "a wall")
+    if table.vary:
+        with located(table="workspace.vary"):
+            require_one_segment(robot, "a sweep of other numbers than pressures")
     sets = list(range(1, robot.chamber_sets + 1)) if table.sets is None else table.sets
     require_sets(sets, robot.chamber_sets, "sets")
     task = WorkspaceTask(
@@ -229,7 +236,7 @@ def _check_varied(task: WorkspaceTask, file: WorkspaceFile, robot: Robot, materi
         part = table[start : start + _MATERIALS_AT_ONCE]
         constants = {**material.constants, **{name: part[:, k] for name, k in of_material.items()}}
         try:
-            Material(material.name, material.law, constants, material.density, material.fitted_stretch)
+            Material(material.name, material.law, constants, material.density, material.fitted_stretch, material.set)
         except InputError as error:
             raise InputError(error.message, key="vary") from None
 

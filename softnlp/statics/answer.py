@@ -92,7 +92,7 @@ class Answer:
         if found is None:
             raise KeyError(f"no case is named '{case}'{nearest(case, [c.name for c in self.problem.cases])}")
         chained = found.transcribed if isinstance(found, Chain) else (found.transcribed,)
-        segment_of = found.segment_of if isinstance(found, Chain) else (0,)
+        segment_of = [part.segment for part in found.parts] if isinstance(found, Chain) else [0]
         places = [self.problem.variables[f"{case}: {label}"] for label in found.labels if label.endswith("states")]
         parts = [
             self.solution.x[where].reshape(-1, transcribed.state_size).T

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.model.quantities import LOADS
-from softnlp.model.rod import STATE_SIZE
 from softnlp.nlp.continuation import Followed, Path, around_folds, follow, straight_path
 from softnlp.nlp.solver import Solution
-from softnlp.statics.pose_grid import Grid, pose_distance, pose_weight
+from softnlp.statics.pose_grid import Grid
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Any]
@@ -87,7 +86,7 @@ class Goal:
     @property
     def is_a_column(self) -> bool:
         """Whether nothing but rounding bends the robot: the arc is straight and every load is along it."""
-        tip = self.arc(self.values)[-STATE_SIZE:]
+        tip = self.arc(self.values)[self.grid.tip]
         loads = np.array([self.values[name] for name in LOADS], dtype=float)
         sideways = np.abs(loads[:, :2]).max(axis=1)
         straight = np.abs(tip[:2]).max() <= _ROUNDING
@@ -189,7 +188,7 @@ def _follow(
         grid.stepper,
         path,
         start,
-        distance=pose_distance,
+        distance=grid.distance,
         most_iterations=most,
         first_step=steps[0],
         smallest_step=steps[1],
@@ -202,7 +201,7 @@ def _snapped(grid: Grid, path: Path, start: Solution, fraction: float, work: Wor
     assert linear is not None
     most = min(1500, work.iterations_left(grid))
     for x, iterations in around_folds(
-        grid.stepper, linear, path, start, fraction, weight=pose_weight(start.x), most_solves=most
+        grid.stepper, linear, path, start, fraction, weight=grid.weight(start.x), most_solves=most
     ):
         if x is None:  # the last: the curve leads to no other end
             yield Attempt(replace(start, iterations=iterations), fraction)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,8 @@ from softnlp.model.rod import Loads
 from softnlp.model.tip import TipContact
 from softnlp.nlp.continuation import follow
 from softnlp.nlp.solver import Solution
-from softnlp.statics.blocked_grid import Blocked, BlockedGrid, kept_grid, transferred
+from softnlp.statics.blocked_grid import Blocked, BlockedGrid, kept_grid, transferred, unjudged
+from softnlp.statics.blocked_resume import LARGEST_JUMP, MOST_STEPS, Ended, Reached, point_before, resumed
 from softnlp.statics.blocked_step import failed_step, solved_step, touching_step
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.compiled import RodEquations, rod_equations
@@ -34,25 +35,13 @@ Array = NDArray[np.float64]
 
 TOUCHING = 1e-9  # of the length: a free contact point nearer to the wall than this touches it
 _NEAR_FOLD = 0.2  # of the largest in-plane determinant on the way: below it a branch that ends has turned
-_LARGEST_JUMP = 0.3
 _FINEST_FIRST = 55  # intervals of a first grid, however far the free shape curls: the wall keeps the rod from that
 _SEARCHED_ON = 20  # intervals, at most, of the grid on which a branch is followed first
-_MOST_STEPS, _MOST_STEPS_MINIMUM = 5, 24  # to a point of a path; what takes more leads off it
+_MOST_STEPS_MINIMUM = 24  # to a point of a path where that is a minimum, see `MOST_STEPS`
 _MOST_WORK, _LEAST = 20_000, 100  # to follow a branch, in intervals of Newton's iterations; iterations on any grid
 _SOUND = 0.5  # of the largest determinant: nearer to a fold an error is that of the place of the fold
 _NEAR_END = 0.98  # of a path: a fold that a coarse grid finds beyond it may lie behind the end
 _SURE = 1e-3  # estimated error of a shape on that grid below which the end of the branch after it is believed
-
-
-@dataclass(frozen=True, eq=False)
-class _Ended:
-    """Where a branch was lost, whether it had turned, the iterations, the error there and whether work ran out."""
-
-    situation: Situation
-    folded: bool
-    iterations: int
-    error: float = 0.0
-    stopped: bool = False
 
 
 class BlockedSolver:
@@ -78,7 +67,8 @@ class BlockedSolver:
         self.has_wall = wall
         # Without loads the free lengths and tip are taken from the closed form, so the grid need not show it.
         self.poses = poses or PoseSolver(model, numerics, unloaded_accuracy=numerics.accuracy)
-        self.equations = equations or rod_equations(model, (TipContact(contact.closure, wall),))
+        loads = (TipContact(contact.closure, wall),)
+        self.equations = equations or rod_equations(model, loads, like=self.poses.equations)
 
     def with_contact(self, contact: ContactSettings) -> BlockedSolver:
         """Return a solver with other settings that shares what both need compiled."""
@@ -129,7 +119,7 @@ class BlockedSolver:
                 return replace(step, solve_time=time.perf_counter() - began), None
         found, spent = self._settle(situation, free, near)
         spent += free.iterations
-        if isinstance(found, _Ended):
+        if isinstance(found, Ended):
             return failed_step(
                 situation.pressure, found.situation.pressure, found.folded, found.stopped, spent, began
             ), None
@@ -147,7 +137,7 @@ class BlockedSolver:
         solution = closed(grid.reference, found.solution, self.numerics, grid.tip)
         return found if solution is found.solution else replace(found, solution=solution)
 
-    def _settle(self, situation: Situation, free: Free, near: Blocked | None) -> tuple[Blocked | _Ended, int]:
+    def _settle(self, situation: Situation, free: Free, near: Blocked | None) -> tuple[Blocked | Ended, int]:
         """Follow the branch to a situation and refine the grid until its accuracy is met."""
         plane = self.plane(situation)
         pressed = np.array([float(situation.pressure[k] > 0) for k in self.model.section.set_of_chamber])
@@ -155,7 +145,7 @@ class BlockedSolver:
         first = self.numerics.intervals or (min(first, _FINEST_FIRST) if situation.wall is not None else first)
         intervals = near.grid.intervals if near else first
         spent = 0
-        found: Blocked | _Ended | None = None
+        found: Blocked | Ended | None = None
         usable = near is not None and self._leads_to(near, situation, pressed, plane)
         if near is not None and usable:
             found = self._continued(self.grid(intervals, plane), situation, pressed, free, plane, near)
@@ -180,7 +170,7 @@ class BlockedSolver:
 
     def _searched(
         self, situation: Situation, pressed: Array, free: Free, plane: Array | None, first: int, near: Blocked | None
-    ) -> tuple[Blocked | _Ended, int]:
+    ) -> tuple[Blocked | Ended, int]:
         """Follow the branch from `near` or zero pressure, on a coarse grid where its word is good, to one of `first`.
 
         A fold costs many steps that all fail, so it is worth finding where a step is cheap.
@@ -193,13 +183,16 @@ class BlockedSolver:
             tried = [(_SEARCHED_ON, SEARCHED_BY), (max(like, 2 * _SEARCHED_ON), SEARCHED_BY), (first, own)]
         elif first > _SEARCHED_ON:
             tried.insert(0, (_SEARCHED_ON, own))
+        before: Reached | None = None
         for size, name in tried:
             cost, shown = iteration_cost(size, name), name == own and size >= first
             grid = self.grid(size, plane, name)
-            found = self._followed(grid, route, situation, pressed, free, plane, near, max(left // cost, _LEAST))
+            most = max(left // cost, _LEAST)
+            found = self._followed(grid, route, situation, pressed, free, plane, near, most, before)
+            before = found.before if isinstance(found, Ended) else None
             more = found.solution.iterations if isinstance(found, Blocked) else found.iterations
             spent, left = spent + more, left - more * cost
-            if isinstance(found, _Ended) and found.folded and (shown or size >= like or found.error <= _SURE):
+            if isinstance(found, Ended) and found.folded and (shown or size >= like or found.error <= _SURE):
                 break
             if isinstance(found, Blocked):
                 finer = found if shown else self._refined(found, self.grid(first, plane))
@@ -248,7 +241,7 @@ class BlockedSolver:
         x = near.solution.x
         guess = grid.predicted(x, p) if grid.has_tangent else x
         rough = grid.stepper.solve(p, guess)
-        if not rough.holds(10 * grid.stepper.tolerance) or not grid.distance(rough.x - x) <= _LARGEST_JUMP:
+        if not rough.holds(10 * grid.stepper.tolerance) or not grid.distance(rough.x - x) <= LARGEST_JUMP:
             return None
         if grid.has_tangent and grid.strayed(guess - x, rough.x - x) > 1:
             return None
@@ -307,8 +300,12 @@ class BlockedSolver:
         plane: Array | None,
         near: Blocked | None,
         most: int,
-    ) -> Blocked | _Ended:
-        """Follow the branch along a route to `end`, in so many iterations at most."""
+        before: Reached | None = None,
+    ) -> Blocked | Ended:
+        """Follow the branch along a route to `end`, in so many iterations at most.
+
+        before : where another grid came on it, which this one goes on from where it has the same point.
+        """
         begin, shapes = route.begin, route.shapes
         shapes.begin(*route.start)
 
@@ -316,38 +313,50 @@ class BlockedSolver:
             lengths = free.lengths if u >= 1.0 else route.lengths(u)
             return grid.problem.pack(self.values(begin.towards(end, u), pressed, lengths))
 
-        if near is not None:
-            x = transferred(near, grid.case, self.equations.shape)
-        else:
-            free_x = shapes.guess(begin, grid.case.transcribed.points)
-            x = np.concatenate([free_x, np.zeros(self.functions.tip_unknowns)])
         trace: list[tuple[float, tuple[float, float]]] = []
         sound: list[Solution] = []
+        begun, first = resumed(grid, self.equations.shape, path, plane, before), 0.0
+        if begun is not None and before is not None:
+            first, trace = before.fraction, list(before.trace)
+        else:
+            shapes.begin(*route.start)
+            if near is not None:
+                x = transferred(near, grid.case, self.equations.shape)
+            else:
+                free_x = shapes.guess(begin, grid.case.transcribed.points)
+                x = np.concatenate([free_x, np.zeros(self.functions.tip_unknowns)])
+            begun = grid.stepper.solve(path(0.0), x)
+        points: list[Solution | None] = [None] * len(trace)  # what another grid passed is not gone back to
+
+        def along(v: float) -> float:
+            """Return the fraction of the whole way."""
+            return 1.0 if v >= 1.0 else first + v * (1 - first)
 
         def same_branch(u: float, solution: Solution) -> bool:
             determinants = grid.determinants(solution, plane)
             if trace and not grid.is_minimum and determinants[0] * trace[0][1][0] <= 0:
                 return False
             trace.append((u, determinants))
+            points.append(solution)
             if abs(determinants[0]) >= _SOUND * max(abs(size) for _, (size, _) in trace):
                 sound.append(solution)
             return True
 
-        begun = grid.stepper.solve(path(0.0), x)
         if begun.holds(10 * grid.stepper.tolerance):
-            same_branch(0.0, begun)
+            same_branch(first, begun)
+        first_step = 0.5 if near is not None else 0.25
         followed = follow(
             grid.stepper,  # type: ignore[arg-type]
-            path,
+            lambda v: path(along(v)),
             begun.x,
             distance=grid.distance,
-            first_step=0.5 if near is not None else 0.25,
-            smallest_step=1 / 2048,
-            largest_jump=_LARGEST_JUMP,
-            same_branch=same_branch,
+            first_step=first_step if before is None or not first else min(before.step / (1 - first), first_step),
+            smallest_step=1 / 2048 / (1 - first),
+            largest_jump=LARGEST_JUMP,
+            same_branch=lambda v, solution: same_branch(along(v), solution),
             predict=grid.predicted if grid.has_tangent else None,
             most_iterations=most,
-            most_steps=_MOST_STEPS_MINIMUM if grid.is_minimum else _MOST_STEPS,
+            most_steps=_MOST_STEPS_MINIMUM if grid.is_minimum else MOST_STEPS,
             strayed=grid.strayed,
         )
         spent = begun.iterations + followed.iterations
@@ -356,12 +365,14 @@ class BlockedSolver:
             found = self._arrived(grid, rough, begin, end, pressed, free, trace, near)
             if found is not None:
                 return found
-        reached = begin.towards(end, followed.fraction)
+        fraction = along(followed.fraction)
+        reached = begin.towards(end, fraction)
         sizes = [abs(size) for _, (size, _) in trace]
         stopped = followed.iterations >= most
         folded = not stopped and len(sizes) > 1 and (grid.is_minimum or sizes[-1] < _NEAR_FOLD * max(sizes))
-        error = max(grid.refinement(sound[-1])) if folded and followed.fraction < _NEAR_END else 1.0
-        return _Ended(reached, folded, spent, error, stopped)
+        error = max(grid.refinement(sound[-1])) if folded and sound and fraction < _NEAR_END else 1.0
+        before = point_before(grid, trace, points, fraction, (begin, end), pressed, free) or before
+        return Ended(reached, folded, spent, error, stopped, before)
 
     def _refined(self, found: Blocked, grid: BlockedGrid) -> Blocked | None:
         """Return a solution solved again on a finer grid, or None where that leads elsewhere."""
@@ -385,6 +396,5 @@ class BlockedSolver:
     ) -> Blocked:
         """Return a solution with its discretisation error."""
         position, rotation, force = grid.refinement(solution)
-        constants = np.asarray(grid.problem.case_constants(solution.x, solution.p)).ravel()
-        worst = max(position, rotation / 5, force / 5)
-        return Blocked(situation, pressed, grid, solution, constants, position, worst, *aside, free)
+        found = unjudged(grid, solution, situation, pressed, aside, free)
+        return replace(found, error=position, refinement_error=max(position, rotation / 5, force / 5))

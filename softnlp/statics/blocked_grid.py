@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from softnlp.model.contact_settings import ClosureWeights
 from softnlp.model.numerics import Numerics
 from softnlp.nlp.evaluation import evaluated
-from softnlp.nlp.linear import LinearSolver, SparseSolver
+from softnlp.nlp.linear import LinearSolver
 from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.solver import Engine, Solution, discretisation_correction
-from softnlp.nlp.transcription import MultipleShooting, method_named
+from softnlp.nlp.transcription import Collocation, MultipleShooting, method_named
 from softnlp.statics.compiled import RodEquations
 from softnlp.statics.condensed import CondensedSolver, plane_directions
+from softnlp.statics.condensed_collocation import CondensedCollocation
 from softnlp.statics.free_shape import Free
 from softnlp.statics.loadcase import LoadCase, load_case
 from softnlp.statics.pose import Mapped, between_nodes
@@ -159,6 +160,19 @@ class Blocked:
     free: Free
 
 
+def unjudged(
+    grid: BlockedGrid,
+    solution: Solution,
+    situation: Situation,
+    pressed: Array,
+    aside: tuple[float | None, tuple[float, float]],
+    free: Free,
+) -> Blocked:
+    """Return a solution whose errors are not known. aside : slips and determinants, see `Blocked`."""
+    constants = np.asarray(grid.problem.case_constants(solution.x, solution.p)).ravel()
+    return Blocked(situation, pressed, grid, solution, constants, np.inf, np.inf, *aside, free)
+
+
 def transferred(found: Blocked, case: LoadCase, shape: Mapped) -> Array:
     """Return the unknowns of a solution as those of the same rod's case on another grid, see `between_nodes`."""
     x = found.solution.x
@@ -192,7 +206,7 @@ def _compiled(
 
     case, problem, judge = equations.kept((name, intervals), in_space)
     condensed = CondensedSolver(functions, shooting, plane)
-    exact, loose = _engines(problem, condensed, numerics)
+    exact, loose = _engines(problem, case, condensed, numerics)
     engine: Engine | Weighted = exact
     stepper: Engine | Weighted = loose
     if weights is not None:
@@ -200,12 +214,13 @@ def _compiled(
     return BlockedGrid(case, engine, stepper, exact, condensed, judge, intervals, functions.state_size, name)
 
 
-def _engines(problem: CompiledProblem, condensed: CondensedSolver, numerics: Numerics) -> tuple[Engine, Engine]:
+def _engines(
+    problem: CompiledProblem, case: LoadCase, condensed: CondensedSolver, numerics: Numerics
+) -> tuple[Engine, Engine]:
     """Return what solves a blocked problem to full tolerance, and loosely for points of a path."""
-    shooting = numerics.transcription == "multiple-shooting"
-    linear: LinearSolver | None = condensed if shooting else None
-    if numerics.engine != "ipopt" and not shooting:
-        linear = SparseSolver(problem)
+    linear: LinearSolver | None = condensed
+    if isinstance(case.method, Collocation):
+        linear = CondensedCollocation(case.functions, case.method) if numerics.engine != "ipopt" else None
     common: dict[str, Any] = {"linear": linear, "options": numerics.ipopt, "ipopt_only": numerics.engine == "ipopt"}
     quick = linear is not None and numerics.engine != "ipopt"
     exact = Engine(problem, **common, newton_only=numerics.engine == "newton")

@@ -82,20 +82,20 @@ class Fit:
         return tuple(found)
 
 
-def fit_of(position: Array, rotation: Array, radius: float, curvature: Array | None = None) -> Fit:
+def fit_of(position: Array, rotation: Array, radius: float | Array, curvature: Array | None = None) -> Fit:
     """Return how a shape suits a body.
 
-    position : (M, 3) of the axis [m]. rotation : (M, 3, 3), columns are the body axes. radius : outer, deformed [m].
-    curvature : (M,) of the axis per its deformed length [1/m], inf where v_z <= 0; by default that of the screws
-    between stations.
+    position : (M, 3) of the axis [m]. rotation : (M, 3, 3), columns are the body axes. radius : outer, deformed, one
+    or (M,) [m]. curvature : (M,) of the axis per its deformed length [1/m], inf where v_z <= 0; by default that of the
+    screws between stations.
     """
     if curvature is None:
         chord = np.linalg.norm(np.diff(position, axis=0), axis=1)
         turn = np.linalg.norm(turns(rotation)[:, :2], axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):  # a circular arc over this chord
             curvature = np.where(advances(position, rotation) > 0, 2 * np.sin(turn / 2) / chord, np.inf)
-    tightness = float(np.max(curvature)) * radius
-    return Fit(tightness, bool(overlapping(position[None], rotation[None, :, :, 2], np.array([radius]))[0]))
+    tightness = float(np.max(curvature * radius))
+    return Fit(tightness, bool(overlapping(position[None], rotation[None, :, :, 2], np.asarray(radius)[None])[0]))
 
 
 def advances(position: Array, rotation: Array) -> Array:
@@ -118,8 +118,10 @@ def turns(rotation: Array) -> Array:
 def overlapping(position: Array, axis: Array, radius: Array) -> Mask:
     """Return which of n bodies, bent less sharply than their radius allows, have parts inside each other.
 
-    position, axis : (n, M, 3), of the axis and its unit direction R e3. radius : (n,), in the unit of the positions.
+    position, axis : (n, M, 3), of the axis and its unit direction R e3. radius : (n,) or (n, M), in the unit of the
+    positions.
     """
+    radius = np.broadcast_to(radius[:, None] if radius.ndim == 1 else radius, position.shape[:2])
     found = np.zeros(len(position), bool)
     cosine = np.clip((axis[:, 1:] * axis[:, :-1]).sum(axis=2), -1, 1)
     curled = np.flatnonzero(np.arccos(cosine).sum(axis=1) > TURN)
@@ -128,9 +130,9 @@ def overlapping(position: Array, axis: Array, radius: Array) -> Mask:
         near = _near(_apart(position[some]), _along(position[some]), radius[some], step[some])
         found[some] = near.any(axis=(1, 2))
     close = np.flatnonzero(found)
-    parts = int(np.clip(np.ceil((step / radius)[close].max(initial=0.0) / _STEP), 1, _FINEST))
+    parts = int(np.clip(np.ceil((step / radius.min(axis=1))[close].max(initial=0.0) / _STEP), 1, _FINEST))
     for some in _blocks(close, parts * position.shape[1]):
-        found[some] = _meeting(*_finer(position[some], axis[some], parts), radius[some])
+        found[some] = _meeting(*_finer(position[some], axis[some], radius[some], parts))
     return found
 
 
@@ -156,15 +158,16 @@ def _apart(p: Array) -> Array:
 def _near(apart: Array, s: Array, radius: Array, slack: Array) -> Mask:
     """Return which stations (n, M, M), the first before the second, may be parts that lie inside each other.
 
-    slack : (n,) how far from a station a point between stations may be, both ends taken together.
+    radius : (n, M). slack : (n,) how far from a station a point between stations may be, both ends taken together.
     """
-    far = s[:, None] - s[:, :, None] >= (np.pi * radius - slack)[:, None, None]
-    near: Mask = far & (apart < ((2 * radius + slack) ** 2)[:, None, None])
+    both = radius[:, None] + radius[:, :, None]
+    far = s[:, None] - s[:, :, None] >= np.pi / 2 * both - slack[:, None, None]
+    near: Mask = far & (apart < (both + slack[:, None, None]) ** 2)
     return near
 
 
-def _finer(position: Array, axis: Array, parts: int) -> tuple[Array, Array, Array]:
-    """Return positions, directions and lengths along the axis with intervals cut by the cubic through their ends."""
+def _finer(position: Array, axis: Array, radius: Array, parts: int) -> tuple[Array, Array, Array, Array]:
+    """Return positions, directions, lengths along the axis and radii, intervals cut by the cubic through their ends."""
     step = np.diff(position, axis=1)
     chord = np.linalg.norm(step, axis=2)
     t = (np.arange(parts) / parts)[:, None]
@@ -172,41 +175,46 @@ def _finer(position: Array, axis: Array, parts: int) -> tuple[Array, Array, Arra
     curve = position[:, :-1, None] + step[:, :, None] * (3 * t**2 - 2 * t**3)
     curve = curve + before * (t - 2 * t**2 + t**3) + after * (t**3 - t**2)
     straight = axis[:, :-1, None] * (1 - t) + axis[:, 1:, None] * t
+    wide = radius[:, :-1, None] * (1 - t[:, 0]) + radius[:, 1:, None] * t[:, 0]
 
     def joined(inside: Array, last: Array) -> Array:
         return np.concatenate([inside.reshape(len(position), -1, 3), last[:, None]], axis=1)
 
     p, a = joined(curve, position[:, -1]), joined(straight, axis[:, -1])
-    return p, a / np.linalg.norm(a, axis=2, keepdims=True), _along(p)
+    r = np.concatenate([wide.reshape(len(position), -1), radius[:, -1:]], axis=1)
+    return p, a / np.linalg.norm(a, axis=2, keepdims=True), _along(p), r
 
 
 def _meeting(p: Array, a: Array, s: Array, radius: Array) -> Mask:
-    """Return which of n bodies meet themselves; stations as of `_finer`, radius (n,)."""
+    """Return which of n bodies meet themselves; stations as of `_finer`."""
     apart = _apart(p)
-    near = _near(apart, s, radius, -_ROUNDING * radius)
+    near = _near(apart, s, radius, -_ROUNDING * radius.min(axis=1))
+    apart = apart / (radius[:, None] + radius[:, :, None]) ** 2
     found = np.zeros(len(p), bool)
     for k in np.flatnonzero(near.any(axis=(1, 2))):
         i, j = np.nonzero(near[k, 1:-1, 1:-1])
         around = [apart[k, i + m, j + n] for m in range(3) for n in range(3)]
         least = around[4] <= np.min(around, axis=0) * (1 + _ROUNDING)
-        found[k] = bool(least.any()) or _ends_inside(p[k], a[k], s[k], float(radius[k]))
+        found[k] = bool(least.any()) or _ends_inside(p[k], a[k], s[k], radius[k])
     return found
 
 
-def _ends_inside(p: Array, a: Array, s: Array, radius: float) -> bool:
+def _ends_inside(p: Array, a: Array, s: Array, radius: Array) -> bool:
     """Return whether a point of the face of an end lies in a part of the body that is no neighbour of it."""
     angle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
     disc = np.concatenate([r * np.column_stack([np.cos(angle), np.sin(angle)]) for r in (0.0, 0.4, 0.7, 1.0)])
     for end in (0, -1):
-        close = (np.abs(s - s[end]) >= np.pi * radius) & (np.linalg.norm(p - p[end], axis=1) < 2.5 * radius)
+        both = radius + radius[end]
+        close = (np.abs(s - s[end]) >= np.pi / 2 * both) & (np.linalg.norm(p - p[end], axis=1) < 1.25 * both)
         k = np.flatnonzero(close[:-1] & close[1:])
         x = np.cross(a[end], np.eye(3)[np.argmin(np.abs(a[end]))])
         x /= np.linalg.norm(x)
-        points = p[end] + radius * (disc @ np.array([x, np.cross(a[end], x)]))
+        points = p[end] + radius[end] * (disc @ np.array([x, np.cross(a[end], x)]))
         ahead, behind = (points @ a[j].T - (p[j] * a[j]).sum(axis=1) for j in (k, k + 1))
         point, at = np.nonzero((ahead >= 0) & (behind < 0))
         part = ahead[point, at] / (ahead[point, at] - behind[point, at])
         centre = p[k[at]] + part[:, None] * (p[k[at] + 1] - p[k[at]])
-        if (np.linalg.norm(points[point] - centre, axis=1) < (1 - _ROUNDING) * radius).any():
+        wide = radius[k[at]] + part * (radius[k[at] + 1] - radius[k[at]])
+        if (np.linalg.norm(points[point] - centre, axis=1) < (1 - _ROUNDING) * wide).any():
             return True
     return False

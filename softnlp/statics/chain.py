@@ -20,7 +20,6 @@ from softnlp.model import rod
 from softnlp.model.body import Body
 from softnlp.nlp.case import Equation
 from softnlp.nlp.transcription import Transcribed, Transcription
-from softnlp.statics.branch import stretch_on_branch
 from softnlp.statics.compiled import RodEquations
 from softnlp.statics.varying import STATE_BLOCKS, STRETCH, in_units
 from softnlp.statics.wrenches import tip_equations, unknown_units
@@ -29,13 +28,32 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
+class Part:
+    """A segment, or what of it is between two knots. segment : its number, from 0. between : fractions of its length.
+
+    varies : whether its states hold the stretch and the place too. length_unit, force_unit : of its states [m, N].
+    """
+
+    segment: int
+    between: tuple[float, float]
+    varies: bool
+    transcribed: Transcribed
+    constants: ca.MX
+    stretch: ca.MX
+    length_unit: ca.MX
+    force_unit: ca.MX
+
+
+@dataclass(frozen=True, eq=False)
 class Chain:
     """Several rods in one state of loading, as equations in scaled units; a `softnlp.nlp.case.Case`.
 
     symbols : the stretch and the states of each part in turn, then what the loads add. labels : what these are called.
-    segment_of : the segment of each part, from 0. outputs : as `LoadCase`, of the whole body, "stretch" (segments), at
-    their bases, and "segment.k.tip_position", "segment.k.tip_rotation", "segment.k.tip_stretch" for each. given : its
-    quantities by key. column : all of them. length_unit, force_unit : of the last states [m, N].
+    outputs : as `LoadCase`, of the whole body, "stretch" (segments), at their bases, and for each
+    "segment.k.tip_position", "segment.k.tip_rotation", without the connector behind it, "segment.k.tip_stretch",
+    "segment.k.mean_stretch" and "segment.k.bending_angle". given : its quantities by key. column : all of them. blocks
+    : of each part the rows before its intervals and `Transcribed.slopes`; the rows of the tip. length_unit, force_unit
+    : of the last states [m, N]. whole_length : of segments and connectors, unpressurised [m].
     """
 
     name: str
@@ -43,23 +61,62 @@ class Chain:
     equations_of: tuple[RodEquations, ...]
     method: Transcription
     given: Mapping[str, Quantity]
-    transcribed: tuple[Transcribed, ...]
-    segment_of: tuple[int, ...]
-    symbols: tuple[ca.MX, ...]
-    labels: tuple[str, ...]
+    parts: tuple[Part, ...]
+    added: ca.MX
     constants: ca.MX
     column: ca.MX
     residuals: ca.MX
+    blocks: tuple[tuple[tuple[ca.MX, tuple[ca.MX, ca.MX]], ...], ca.MX]
     fine_residuals: ca.MX
     equations: tuple[Equation, ...]
     outputs: Mapping[str, ca.MX]
     length_unit: ca.MX
     force_unit: ca.MX
+    whole_length: ca.MX
+
+    @property
+    def transcribed(self) -> tuple[Transcribed, ...]:
+        """Of each part."""
+        return tuple(part.transcribed for part in self.parts)
+
+    @property
+    def symbols(self) -> tuple[ca.MX, ...]:
+        """The unknowns."""
+        every = [symbol for part in self.parts for symbol in (part.stretch, part.transcribed.unknowns)]
+        return (*every, *([self.added] if self.added.numel() else []))
+
+    @property
+    def labels(self) -> list[str]:
+        """What the unknowns are called, one name each of `symbols`."""
+        labels = []
+        for part in self.parts:
+            several = sum(other.segment == part.segment for other in self.parts) > 1
+            number = sum(other.segment == part.segment and other.between <= part.between for other in self.parts)
+            label = f"segment {part.segment + 1} part {number}" if several else f"segment {part.segment + 1}"
+            labels += [f"{label} stretch", f"{label} states"]
+        return [*labels, *([self.added.name()] if self.added.numel() else [])]
 
     @property
     def slope(self) -> ca.MX:
-        """The Jacobian of the residuals by the unknowns."""
-        return ca.horzcat(*(ca.jacobian(self.residuals, symbol) for symbol in self.symbols))
+        """The Jacobian of the residuals by the unknowns, made of the blocks of one interval."""
+        symbols, (parts, tip) = self.symbols, self.blocks
+
+        def near(rows: ca.MX, first: int) -> ca.MX:
+            """Return the Jacobian of rows that take the unknowns from some on, of two parts at most."""
+            known = range(max(first, 0), min(max(first, 0) + 4, len(symbols)))
+            return ca.horzcat(
+                *(ca.jacobian(rows, s) if k in known else ca.MX(rows.numel(), s.numel()) for k, s in enumerate(symbols))
+            )
+
+        found = []
+        for k, (head, (by_states, by_stretch)) in enumerate(parts):
+            own = {2 * k: by_stretch, 2 * k + 1: by_states}
+            zero = by_states.shape[0]
+            found += [
+                near(head, 2 * k - 2),
+                ca.horzcat(*(own.get(j, ca.MX(zero, s.numel())) for j, s in enumerate(symbols))),
+            ]
+        return ca.vertcat(*found, near(tip, 2 * len(parts) - 2))
 
     def first_guess(self, values: Mapping[str, Array]) -> tuple[Array, Array]:
         """Return x of the shape without loads at values of `given` by key, SI, and its last state, SI.
@@ -73,8 +130,8 @@ class Chain:
             functions, knots = equations.functions, self.body.knots(k)
             columns = [_column_of(self.body, equations, k, values, s) for s in knots]
             pressure = self.body.of_segment(k, values)["pressure"]
-            own = columns[0][: equations.branch.size1_in(0)]
-            stretch = stretch_on_branch(equations.branch, own, pressure).stretch
+            stretch = equations.stretch(columns[0], pressure).stretch
+            R = R @ np.asarray(rod.turned(self.body.segments[k].turn))
             L_0, F_0 = (float(unit) for unit in np.asarray(functions.section(columns[0], stretch)[2]).ravel())
             varies = k in self.body.varying
             for (s_a, s_b), (a, b) in zip(pairwise(knots), pairwise(columns), strict=True):
@@ -89,6 +146,8 @@ class Chain:
                 parts += [np.array([stretch]), states.T.ravel()]
                 p, R = L_0 * states[:3, -1], states[3:12, -1].reshape(3, 3).T
                 stretch = states[STRETCH, -1] if varies else stretch
+            if self.body.connected[k]:
+                p = p + float(np.ravel(values[self.body.connector_key(k)])[0]) * R[:, 2]
         unknown = functions.tip_unknowns
         return np.concatenate([*parts, np.zeros(unknown)]), np.concatenate([p, R.T.ravel(), np.zeros(6)])
 
@@ -107,18 +166,19 @@ def chain_case(
     equations_of : what is compiled for each segment, under the same loads. given : every key of `body.quantities` and
     of the loads. method : of each segment, with as many intervals; each part of one that varies has its share of them.
     """
-    made = _Rows([], [], [], 0)
-    pieces, symbols, labels, segment_of = [], list[ca.MX](), list[str](), list[int]()
-    lengths, angles, backbone, stretches, outputs = [], [], [], [], {}
+    made, whole_length = _Rows([], [], [], 0), ca.MX(0)
+    parts, outputs = list[Part](), dict[str, ca.MX]()
+    lengths, angles, backbone, stretches, slopes = [], [], [], [], []
     values = {key: q.symbol for key, q in given.items()}
     before: tuple[ca.MX, ca.MX, ca.MX] | None = None  # the last state of the part before, and its units
     for k, compiled in enumerate(equations_of):
         functions, knots, varies = compiled.functions, body.knots(k), k in body.varying
+        turn = body.segments[k].turn
         columns = []
         for s in knots:
             own = {**values, **body.of_segment(k, values, s)}
             columns.append(ca.vertcat(*(own[key] for key in functions.taken)))
-        summed = ca.MX.zeros(functions.model.chambers + 2)
+        summed, mean = ca.MX.zeros(functions.model.chambers + 2), ca.MX(0)
         for j, (column, following) in enumerate(pairwise(columns)):
             several = len(knots) > 2
             label = f"segment {k + 1} part {j + 1}" if several else f"segment {k + 1}"
@@ -126,7 +186,7 @@ def chain_case(
             constants, balance, units = functions.section(column, stretch)
             if j == 0:
                 L_0, F_0 = units[0], units[1]
-            field, rates, part = functions.field, functions.lengths, method
+            field, rates, share, part = functions.field, functions.lengths, 1.0, method
             if varies:
                 share = knots[j + 1] - knots[j]
                 field, rates = compiled.varying.field, compiled.varying.lengths
@@ -135,7 +195,11 @@ def chain_case(
             transcribed = part.transcribe(field, constants)
             first, last = transcribed.nodes[:, 0], transcribed.nodes[:, -1]
             scales = _scales(L_0, F_0)
-            start = rod.base_balance(first) if before is None else first[: rod.STATE_SIZE] - in_units(*before, L_0, F_0)
+            if before is None:
+                start = rod.base_balance(first, turn)
+            else:
+                start = first[: rod.STATE_SIZE] - in_units(*before, L_0, F_0)
+            at = made.count
             made.add(f"{label}: stretch balance", balance, "N", units[1])
             word = "base" if before is None else "junction"
             for key, where in rod.STATE_BLOCKS.items():
@@ -144,39 +208,51 @@ def chain_case(
             if varies:
                 made.add(f"{label}: {word} stretch", first[STRETCH] - stretch, "1", ca.MX(1))
                 made.add(f"{label}: {word} place", first[STRETCH + 1], "1", ca.MX(1))
+            head = made.since(at)
             made.along(label, transcribed, scales)
             summed += transcribed.integrate(rates)
-            pieces.append((transcribed, constants))
-            symbols += [stretch, transcribed.unknowns]
-            labels += [f"{label} stretch", f"{label} states"]
-            segment_of.append(k)
+            mean += transcribed.integrate(compiled.varying.mean) if varies else stretch
+            parts.append(Part(k, (knots[j], knots[j + 1]), varies, transcribed, constants, stretch, L_0, F_0))
+            slopes.append((head, transcribed.slopes(ca.jacobian(constants, stretch))))
             if j == 0:
                 stretches.append(stretch)
             before = last[: rod.STATE_SIZE], L_0, F_0
         end = last[STRETCH] if varies else stretch
-        lengths.append(summed[:-2] * L_0)
+        own_chambers = body.chambers[k]
+        lengths.append(summed[:own_chambers] * L_0)
+        whole_length += L_0
         angles.append(summed[-2])
         backbone.append(summed[-1] * L_0)
-        outputs[f"segment.{k + 1}.tip_position"] = last[:3] * L_0
-        outputs[f"segment.{k + 1}.tip_rotation"] = ca.reshape(last[3:12], 3, 3)
-        outputs[f"segment.{k + 1}.tip_stretch"] = end
-    reached = last
+        outputs |= {
+            f"segment.{k + 1}.tip_position": last[:3] * L_0,
+            f"segment.{k + 1}.tip_rotation": ca.reshape(last[3:12], 3, 3),
+            f"segment.{k + 1}.tip_stretch": end,
+            f"segment.{k + 1}.mean_stretch": mean,
+            f"segment.{k + 1}.bending_angle": summed[-2],
+        }
+        connector = values[body.connector_key(k)] if body.connected[k] else ca.MX(0)
+        following_turn = body.segments[k + 1].turn if k + 1 < len(body.segments) else 0.0
+        if body.connected[k] or following_turn:
+            backbone.append(connector)
+            whole_length += connector
+            before = rod.carried(last, connector / L_0, following_turn), L_0, F_0
+    assert before is not None
+    reached = tip_state = before[0]
     if varies:
         constants, _, units = functions.section(columns[-1], end)
-        reached = in_units(last[: rod.STATE_SIZE], L_0, F_0, units[0], units[1])
+        reached = in_units(tip_state, L_0, F_0, units[0], units[1])
     y = ca.MX.sym("tip_forces", functions.tip_unknowns)
     tip = functions.tip(reached, constants, y, functions.tip_column(given), units)
     made.equations += tip_equations(made.count, functions.loads, units[0], units[1])
     whole = {
         "stretch": ca.vertcat(*stretches),
-        "tip_position": last[:3] * L_0,
-        "tip_rotation": ca.reshape(last[3:12], 3, 3),
+        "tip_position": tip_state[:3] * L_0,
+        "tip_rotation": ca.reshape(tip_state[3:12], 3, 3),
         "chamber_lengths": ca.vertcat(*lengths),
         "bending_angle": ca.sum1(ca.vertcat(*angles)),
         "backbone_length": ca.sum1(ca.vertcat(*backbone)),
     }
     if functions.tip_unknowns:
-        symbols, labels = [*symbols, y], [*labels, y.name()]
         whole["tip_forces"] = y * unknown_units(functions.loads, units[0], units[1])
     return Chain(
         name=name,
@@ -184,18 +260,18 @@ def chain_case(
         equations_of=equations_of,
         method=method,
         given=given,
-        transcribed=tuple(transcribed for transcribed, _ in pieces),
-        segment_of=tuple(segment_of),
-        symbols=tuple(symbols),
-        labels=tuple(labels),
-        constants=ca.vertcat(*(constants for _, constants in pieces)),
+        parts=tuple(parts),
+        added=y,
+        constants=ca.vertcat(*(part.constants for part in parts)),
         column=ca.vertcat(*values.values()),
         residuals=ca.vertcat(*made.residuals, tip),
+        blocks=(tuple(slopes), tip),
         fine_residuals=ca.vertcat(*made.fine, tip),
         equations=tuple(made.equations),
         outputs=whole | outputs,
         length_unit=L_0,
         force_unit=F_0,
+        whole_length=whole_length,
     )
 
 
@@ -214,6 +290,10 @@ class _Rows:
     fine: list[ca.MX]
     equations: list[Equation]
     count: int
+
+    def since(self, count: int) -> ca.MX:
+        """Return the rows from some on."""
+        return ca.vertcat(*self.residuals)[count:]
 
     def add(self, name: str, rows: ca.MX, unit: str, scale: ca.MX) -> None:
         """Add rows that are the same on every grid."""

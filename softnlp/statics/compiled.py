@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from softnlp.base.quantity import Quantity
 from softnlp.model.load import Load
 from softnlp.model.quantities import Model
-from softnlp.statics.branch import branch_function
+from softnlp.statics.branch import BranchPoint, branch_function, stretch_on_branch
 from softnlp.statics.loadcase import RodFunctions, rod_functions
 from softnlp.statics.pose import Mapped, shape_function
 from softnlp.statics.single_shooting import SingleShooting, single_shooting
@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 
 _WORTH_COMPILING = 16  # poses
+_MOST_POINTS = 16  # of the branch that are kept
 _OF_A_POSE = 0.15  # that a shape takes
 MOST_GRIDS = 64
 """How many grids, and problems on grids, are kept of one rod."""
@@ -41,13 +42,24 @@ class RodEquations:
     functions: RodFunctions
     declared: dict[str, Quantity]
     grids: dict[Hashable, Any] = field(default_factory=dict)
-    _mapped: dict[int, ca.Function] = field(default_factory=dict)
+    _mapped: dict[tuple[int, bool], ca.Function] = field(default_factory=dict)
+    _points: dict[bytes, BranchPoint] = field(default_factory=dict)
     _asked: list[float] = field(default_factory=lambda: [0.0])
 
     @cached_property
     def branch(self) -> ca.Function:
         """The stretch's branch, see `branch_function`; built at first use, as all that follows."""
         return branch_function(self.functions.model)
+
+    def stretch(self, column: Array, pressures: Array) -> BranchPoint:
+        """Return where the branch of the stretch stands, see `stretch_on_branch`; the last ones asked for are kept."""
+        own = column[: self.branch.size1_in(0)]
+        key = own.tobytes()
+        if key not in self._points:
+            self._points[key] = stretch_on_branch(self.branch, own, pressures)
+            while len(self._points) > _MOST_POINTS:
+                del self._points[next(iter(self._points))]
+        return self._points[key]
 
     def single_shooting(self) -> SingleShooting | None:
         """Return machine code for single poses, from when what was done without it has taken as long as to compile it.
@@ -88,10 +100,14 @@ class RodEquations:
 
     def conjugate_points(self, nodes: Array, constants: Array) -> int:
         """Count the directions in which the energy falls, 0 where the pose is stable; see `conjugate_points`."""
-        K = min(nodes.shape[1] - 1, MOST_INTERVALS)
-        if K not in self._mapped:
-            self._mapped[K] = self._transition.map(K)
-        return conjugate_points(self._mapped[K], nodes, constants)
+        return conjugate_points(self.transition(nodes.shape[1] - 1), nodes, constants)
+
+    def transition(self, intervals: int, *, varies: bool = False) -> ca.Function:
+        """Return what `conjugate_points` takes for a grid, of the uniform rod or of the one that varies."""
+        K = min(intervals, MOST_INTERVALS)
+        if (K, varies) not in self._mapped:
+            self._mapped[K, varies] = (self.varying.transition if varies else self._transition).map(K)
+        return self._mapped[K, varies]
 
     def kept(self, key: Hashable, make: Callable[[], T]) -> T:
         """Return what was compiled under a key, made at first use; what was used least recently goes."""
@@ -110,7 +126,9 @@ class RodEquations:
         }
 
 
-def rod_equations(model: Model, loads: Sequence[Load] = (), *, by_machine: bool = True) -> RodEquations:
-    """Compile the rod of a model. loads : beside the dead ones. by_machine : see `RodFunctions`."""
-    functions = rod_functions(model, loads, by_machine=by_machine)
+def rod_equations(
+    model: Model, loads: Sequence[Load] = (), *, by_machine: bool = True, like: RodEquations | None = None
+) -> RodEquations:
+    """Compile the rod of a model, see `rod_functions`."""
+    functions = rod_functions(model, loads, by_machine=by_machine, like=like.functions if like else None)
     return RodEquations(functions, functions.declared())

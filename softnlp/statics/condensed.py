@@ -32,7 +32,8 @@ from softnlp.statics.tangents import Tangents, tangents
 Array = NDArray[np.float64]
 
 _FORCE = slice(12, 18)
-_LARGEST = 1e150  # whose square is finite
+LARGEST = 1e150
+"""Entries up to which a matrix counts as finite: their squares are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +108,7 @@ class CondensedSolver:
         else:
             directions, tip, turned = evaluated(self._sweep(r), x, p, G)
             every = directions.reshape(*self._shape, known + r)
-        if not np.max(np.abs(tip)) < _LARGEST:  # nan is not either
+        if not np.max(np.abs(tip)) < LARGEST:  # nan is not either
             raise np.linalg.LinAlgError("the linearised tip equations are not finite")
         return every, tip, turned
 
@@ -115,21 +116,16 @@ class CondensedSolver:
         """Return what the sweep function does, its intervals differentiated in machine code and then put together."""
         nx, nodes = self._shape
         r, known, rows, K = G.shape[1], self._base.shape[1], len(self._into[0]), nodes - 1
-        _, tip, section = _pieces(self._functions, self._method.tableau, known + r, r)
-        n_p = section.size1_in(0)
-        c, slope, balance_slope, scales = evaluated(section, p[:n_p], x[:1])
+        ends = end_pieces(self._functions, known + r, r)
+        n_p = ends.section.size1_in(0)
+        c, slope, balance_slope, scales = evaluated(ends.section, p[:n_p], x[:1])
         d_stretch = -G[:1] / balance_slope
         states = x[1 : 1 + nx * nodes].reshape(nodes, nx)
         maps, by_stretch = own.maps(states[:K].T, c[:, 0], slope[:, 0], 1 / K)
         forced = by_stretch[:, :, None] * d_stretch + G[1 + nx - 6 : -rows].reshape(K, nx, r)
-        every = np.zeros((nodes, nx, known + r))
-        every[0, _FORCE, :known] = self._base
-        every[0, :12, known:], every[0, 18:, known:] = -G[1:13], -G[13 : 1 + nx - 6]
-        for k in range(K):
-            np.matmul(maps[k], every[k], out=every[k + 1])
-            every[k + 1, :, known:] += forced[k]
+        every = chained(self._base, G[1 : 1 + nx - 6], maps, forced)
         y, a = x[1 + nx * nodes :], self._functions.tip_numbers(p)
-        (linear,) = evaluated(tip, every[K], states[K], c, slope @ d_stretch, y, a, scales)
+        (linear,) = evaluated(ends.tip, every[K], states[K], c, slope @ d_stretch, y, a, scales)
         return every.transpose(1, 0, 2), linear, d_stretch
 
     def _sweep(self, right_sides: int) -> ca.Function:
@@ -153,6 +149,22 @@ class CondensedSolver:
         known = self._base.shape[1]
         tip: Array = system.directions[:, -1, :known] @ moves[:known]
         return tip
+
+
+def chained(base: Array, at_base: Array, maps: Array, forced: Array) -> Array:
+    """Return how every node follows the base, and the known part: (K + 1, nx, d + r).
+
+    base : (6, d) directions of N(0), M(0). at_base : (nx - 6, r) residuals of the others there. maps, forced :
+    (K, nx, nx), (K, nx, r), what an interval does to a change of its first node and what it adds for each right side.
+    """
+    (K, nx, r), known = forced.shape, base.shape[1]
+    every = np.zeros((K + 1, nx, known + r))
+    every[0, _FORCE, :known] = base
+    every[0, :12, known:], every[0, 18:, known:] = -at_base[:12], -at_base[12:]
+    for k in range(K):
+        np.matmul(maps[k], every[k], out=every[k + 1])
+        every[k + 1, :, known:] += forced[k]
+    return every
 
 
 def plane_directions(normal: Array, size: int) -> tuple[Array, Array]:
@@ -200,52 +212,58 @@ class StretchSolver:
         return -np.asarray(G) / slope
 
 
+@dataclass(frozen=True, eq=False)
+class EndPieces:
+    """The linearised tip and section, and which of the constants follow the stretch."""
+
+    tip: ca.Function
+    section: ca.Function
+    rows: list[int]
+
+
 @lru_cache(maxsize=16)
-def _pieces(
-    functions: RodFunctions, tableau: Tableau, columns: int, right_sides: int
-) -> tuple[ca.Function, ca.Function, ca.Function]:
-    """Return one linearised step, the linearised tip and section; shared by every grid.
+def end_pieces(functions: RodFunctions, columns: int, right_sides: int) -> EndPieces:
+    """Return what is linearised beside the intervals; shared by every grid.
 
-    columns : directions, of which the last `right_sides` carry gaps and a change of the constants.
+    columns : directions, of which the last `right_sides` carry a change of the constants.
     """
-    nx, ny = functions.state_size, functions.tip_unknowns
-    nc, na = functions.field.size1_in(1), functions.tip.size1_in(3)
-    step = rk_step(functions.field, tableau)
-
-    def sym(name: str, *shape: int) -> ca.SX:
-        return ca.SX.sym(name, *shape)
-
-    column, stretch = sym("p", functions.section.size1_in(0)), sym("stretch")
+    ny, r = functions.tip_unknowns, right_sides
+    column, stretch = ca.SX.sym("p", functions.section.size1_in(0)), ca.SX.sym("stretch")
     constants, balance, scales = functions.section(column, stretch)
     c_slope = ca.jacobian(constants, stretch)
     section = ca.Function(
         "section",
         [column, stretch],
         [constants, ca.densify(c_slope), ca.jacobian(balance, stretch), scales],
-        {"cse": True},
     )
-    r = right_sides
-    V, state, gap, c, dc, h = (
-        sym("V", nx, columns),
-        sym("x", nx),
-        sym("gap", nx, r),
-        sym("c", nc),
-        sym("dc", nc, r),
-        sym("h"),
-    )
-    moving = ca.SX(nc, r)  # those of the constants that follow the stretch
-    moving[c_slope.sparsity().row(), :] = dc[c_slope.sparsity().row(), :]
-    moves = ca.vertcat(V, ca.horzcat(ca.SX(nc, columns - r), moving))
-    arrived = ca.jtimes(step(state, c, h), ca.vertcat(state, c), moves)
-    arrived[:, columns - r :] += gap
-    advance = ca.Function("advance", [V, state, gap, c, dc, h], [arrived], {"cse": True})
-
-    y, a, units = sym("y", ny), sym("a", na), sym("units", 2)
+    rows = list(c_slope.sparsity().row())
+    V, state, c, dc, moves = _moves(functions, columns, r, rows)
+    y, a, units = ca.SX.sym("y", ny), ca.SX.sym("a", functions.tip.size1_in(3)), ca.SX.sym("units", 2)
     tip_residual = functions.tip(state, c, y, a, units)
     linear = ca.horzcat(ca.jtimes(tip_residual, ca.vertcat(state, c), moves), ca.jacobian(tip_residual, y))
-    tip = ca.Function("tip", [V, state, c, dc, y, a, units], [ca.densify(linear)], {"cse": True})
+    tip = ca.Function("tip", [V, state, c, dc, y, a, units], [ca.densify(linear)])
+    return EndPieces(tip, section, rows)
 
-    return advance, tip, section
+
+def _moves(functions: RodFunctions, columns: int, right_sides: int, rows: list[int]) -> tuple[ca.SX, ...]:
+    """Return symbols for directions, state, constants, their change, and how state and constants move together."""
+    nx, nc, r = functions.state_size, functions.field.size1_in(1), right_sides
+    V, state = ca.SX.sym("V", nx, columns), ca.SX.sym("x", nx)
+    c, dc = ca.SX.sym("c", nc), ca.SX.sym("dc", nc, r)
+    moving = ca.SX(nc, r)
+    moving[rows, :] = dc[rows, :]
+    return V, state, c, dc, ca.vertcat(V, ca.horzcat(ca.SX(nc, columns - r), moving))
+
+
+@lru_cache(maxsize=16)
+def _advance(functions: RodFunctions, tableau: Tableau, columns: int, right_sides: int) -> ca.Function:
+    """Return one linearised step, shared by every grid. columns, right_sides : as of `end_pieces`; these carry gaps."""
+    rows = end_pieces(functions, columns, right_sides).rows
+    V, state, c, dc, moves = _moves(functions, columns, right_sides, rows)
+    gap, h = ca.SX.sym("gap", functions.state_size, right_sides), ca.SX.sym("h")
+    arrived = ca.jtimes(rk_step(functions.field, tableau)(state, c, h), ca.vertcat(state, c), moves)
+    arrived[:, columns - right_sides :] += gap
+    return ca.Function("advance", [V, state, gap, c, dc, h], [arrived])
 
 
 def _sweep_function(
@@ -257,7 +275,8 @@ def _sweep_function(
     """
     K, nx, ny, r = method.intervals, functions.state_size, functions.tip_unknowns, right_sides
     columns = base_directions.shape[1] + r
-    advance, tip, section = _pieces(functions, method.tableau, columns, r)
+    advance, ends = _advance(functions, method.tableau, columns, r), end_pieces(functions, columns, r)
+    tip, section = ends.tip, ends.section
     n_p, every = section.size1_in(0), sum(q.size for q in functions.declared().values())
     x, p = ca.MX.sym("x", 1 + nx * (K + 1) + ny), ca.MX.sym("p", every)
     g = ca.MX.sym("g", x.numel(), r)

@@ -23,12 +23,14 @@ def most_intervals(transcription: str) -> int:
     return _MOST_COLLOCATION if transcription == "collocation" else MOST_INTERVALS
 
 
-def first_intervals(transcription: str, constants: Array, moment: Array, arc_target: float | None = None) -> int:
+def first_intervals(
+    transcription: str, constants: Array, moment: Array, arc_target: float | None = None, share: float = 1.0
+) -> int:
     """Return a grid coarse enough to be quick and fine enough for the curl of the unloaded robot.
 
     constants : of a load case at its stretch. moment : (3,) at the tip, scaled. arc_target : for a robot without loads,
     the error to meet at once: RK4 turns a circular arc of angle a by a (a / K)^4 / 120 too little, of which the tip's
-    position shows about 0.6.
+    position shows about 0.6. share : of the robot's length that the rod is.
     """
     section = unpack_section(constants)
     length = float(section.length)
@@ -38,7 +40,7 @@ def first_intervals(transcription: str, constants: Array, moment: Array, arc_tar
     # The dead tip moment alone would bend or twist the rod so far; half as finely: it is not there at first.
     turned = float(np.linalg.norm(moment)) * length / min(section.bending_x, section.bending_y, section.torsion)
     curl = max(curl, turned / 2)
-    wanted = max(first, curl / (_TURN * FIRST_INTERVALS["multiple-shooting"] / first))
+    wanted = max(share * first, curl / (_TURN * FIRST_INTERVALS["multiple-shooting"] / first))
     if arc_target is not None and transcription == "multiple-shooting":
         wanted = max(wanted, curl * (0.6 * curl / (120 * arc_target)) ** 0.25)
     return min(next_size(wanted), most_intervals(transcription))

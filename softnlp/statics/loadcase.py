@@ -102,10 +102,13 @@ class RodFunctions:
         return ca.vertcat(*(given[name].symbol for name in self._tip_names))
 
 
-def rod_functions(model: Model, loads: Sequence[Load] = (), *, by_machine: bool = True) -> RodFunctions:
+def rod_functions(
+    model: Model, loads: Sequence[Load] = (), *, by_machine: bool = True, like: RodFunctions | None = None
+) -> RodFunctions:
     """Compile the rod of a model for symbols in place of its numbers.
 
-    loads : beside the dead ones. by_machine : see `RodFunctions`.
+    loads : beside the dead ones. by_machine : see `RodFunctions`. like : the same kind of rod under other loads, whose
+    section is taken where the loads along the rod are the same.
     """
     chambers = model.chambers
     line, loads = line_loads(model, loads)
@@ -138,7 +141,8 @@ def rod_functions(model: Model, loads: Sequence[Load] = (), *, by_machine: bool 
         ]
 
     declared = {**quantities(model), **{q.name: q for _, own, _ in line.loads[1:] for q in own}}
-    packed = section_function(declared, build)
+    same = like is not None and like.model.kind == model.kind and like.taken == tuple(declared)
+    packed = like.section if like is not None and same else section_function(declared, build)
     column = ca.SX.sym("quantities", packed.size1_in(0))
     stretch, s = ca.SX.sym("stretch"), ca.SX.sym("s")
     at_rest = packed(column, stretch)[0]
@@ -233,6 +237,11 @@ class LoadCase:
     outputs: Mapping[str, ca.MX]
     length_unit: ca.MX
     force_unit: ca.MX
+
+    @property
+    def whole_length(self) -> ca.MX:
+        """L_0 [m]."""
+        return self.length_unit
 
     @property
     def labels(self) -> list[str]:

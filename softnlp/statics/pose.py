@@ -47,7 +47,7 @@ def shape_function(functions: RodFunctions) -> ca.Function:
         end = step(end, c, h / _SUBSTEPS)
     section = unpack_section(c)
     every = ca.vertcat(end, *functions.strains(end[: rod.STATE_SIZE], c), *rod.wall_resultants(end, section))
-    return ca.Function("shape", [x, c, h], [every], {"cse": True})
+    return ca.Function("shape", [x, c, h], [every])
 
 
 class Mapped(Protocol):
@@ -65,16 +65,17 @@ def between_nodes(function: Mapped, nodes: Array, constants: Array, s: Array) ->
     return np.asarray(function.map(s.size)(nodes[:, left], constants, (s - left / K)[None, :]))
 
 
-def bending_angle(function: Mapped, nodes: Array, constants: Array) -> float:
+def bending_angle(function: Mapped, nodes: Array, constants: Array, length: float | None = None) -> float:
     """Return the integral of sqrt(u_x^2 + u_y^2) over s [rad], to 1e-7 also where the curvature vanishes on the way.
 
-    function : of `shape_function`. The curvature is smooth, its norm has a kink where it crosses zero, or nearly so. In
+    function : of `shape_function`. length : of the rod that its curvature is of, by default that in the constants.
+    The curvature is smooth, its norm has a kink where it crosses zero, or nearly so. In
     every interval, or part of the rod where those are many, the curvature is the polynomial through `_SAMPLES` points.
     Where it changes little its norm is smooth too; elsewhere the quadrature of the norm is graded towards the point
     where that is smallest.
     """
     K = min(nodes.shape[1] - 1, _MOST_PARTS)
-    length = float(unpack_section(constants).length)  # in L_0
+    length = float(unpack_section(constants).length) if length is None else length  # in L_0
     s = ((np.arange(K)[:, None] + _ENDS[:-1]) / K).ravel()
     u = between_nodes(function, nodes, constants, np.append(s, 1.0))[21:23]
     last = u[:, _SAMPLES - 1 :: _SAMPLES - 1]  # the right end of each interval is the left one of the next
@@ -165,7 +166,12 @@ def pose_of(
 
 def pose_warnings(model: Model, pose: Pose) -> tuple[str, ...]:
     """Return what a designer should know of a solved pose: fitted range, touching chambers, stability, its body."""
-    found = model.section.warnings(pose.stretch)
+    return (*model.section.warnings(pose.stretch), *shape_warnings(pose))
+
+
+def shape_warnings(pose: Pose) -> tuple[str, ...]:
+    """Return what to know of a pose whatever its section."""
+    found = []
     if pose.fit.inside_out:
         found.append("the load compresses the rod to nothing somewhere (v_z <= 0); the model does not hold there")
     elif pose.stable is None:

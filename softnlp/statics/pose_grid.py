@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from softnlp.model.numerics import Numerics
 from softnlp.model.rod import STATE_SIZE
-from softnlp.nlp.linear import SparseSolver
+from softnlp.nlp.linear import LinearSolver
 from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.solver import Engine, Solution
-from softnlp.nlp.transcription import method_named
+from softnlp.nlp.transcription import Collocation, method_named
 from softnlp.statics.compiled import RodEquations
 from softnlp.statics.condensed import case_solver
+from softnlp.statics.condensed_collocation import CondensedCollocation
 from softnlp.statics.loadcase import LoadCase, load_case
 from softnlp.statics.single_shooting import AtStretch, Shot
 
@@ -58,9 +59,43 @@ class Grid:
         return self.engine.problem
 
     @property
+    def corrector(self) -> LinearSolver | None:
+        """What the estimate of the discretisation error is solved with."""
+        return self.engine.linear
+
+    @property
     def intervals(self) -> int:
         """The number of intervals."""
         return self.case.transcribed.node_index.size - 1
+
+    @property
+    def tip(self) -> slice:
+        """Where x holds the tip's position."""
+        return TIP
+
+    @property
+    def stretch_places(self) -> list[int]:
+        """Where x holds a stretch."""
+        return [0]
+
+    def last_state(self, x: Array) -> Array:
+        """Return the last state in x (18,)."""
+        return x[-STATE_SIZE:]
+
+    def tip_error(self, change: Array, solution: Solution) -> tuple[float, float]:
+        """Return how far a change (18,) of the last state moves the tip [L_0] and turns it [rad]."""
+        return float(np.linalg.norm(change[:3])), float(np.linalg.norm(change[3:12]) / np.sqrt(2))
+
+    def distance(self, change: Array) -> float:
+        """Return the largest change of a scaled position or of a direction cosine between two x."""
+        states = change[1:].reshape(-1, STATE_SIZE)
+        return float(np.max(np.abs(states[:, :12])))
+
+    def weight(self, x: Array) -> Array:
+        """Return the weight of each entry of x in an arc length, the mean over the nodes of the change of pose."""
+        states = np.zeros((x.size // STATE_SIZE, STATE_SIZE))
+        states[:, :12] = 1.0 / len(states)
+        return np.concatenate([[0.0], states.ravel()])
 
     def nodes(self, x: Array) -> Array:
         """Return the scaled node states (18, K + 1) in x."""
@@ -83,7 +118,9 @@ def compiled_grid(equations: RodEquations, numerics: Numerics, intervals: int) -
     given = equations.declared
     case = load_case("pose", equations.functions, given, method)
     problem = compile_problem(list(given.values()), [case])
-    linear = case_solver(case) or SparseSolver(problem)
+    linear: Any = case_solver(case)
+    if isinstance(method, Collocation):
+        linear = CondensedCollocation(equations.functions, method)
     chosen: dict[str, Any] = {"linear": linear, "newton_only": True}
     if numerics.engine == "ipopt":
         chosen = {"linear": linear, "ipopt_only": True, "options": numerics.ipopt}
@@ -146,16 +183,3 @@ def next_size(wanted: float) -> int:
     while (size := 5 * round(2 ** (k / 2))) < wanted:
         k += 1
     return size
-
-
-def pose_weight(x: Array) -> Array:
-    """Return the weight of each entry of x in an arc length that is the mean over the nodes of the change of pose."""
-    states = np.zeros((x.size // STATE_SIZE, STATE_SIZE))
-    states[:, :12] = 1.0 / len(states)
-    return np.concatenate([[0.0], states.ravel()])
-
-
-def pose_distance(change: Array) -> float:
-    """Return the largest change of a scaled position or of a direction cosine between two x."""
-    states = change[1:].reshape(-1, STATE_SIZE)
-    return float(np.max(np.abs(states[:, :12])))

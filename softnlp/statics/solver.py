@@ -25,7 +25,7 @@ from softnlp.statics.compiled import RodEquations, rod_equations
 from softnlp.statics.grid_size import first_intervals, most_intervals, next_intervals
 from softnlp.statics.loadcase import RodFunctions
 from softnlp.statics.pose import Mapped, between_nodes
-from softnlp.statics.pose_grid import HOPELESS, TIP, Grid, Solved, compiled_grid, dearer, iteration_cost
+from softnlp.statics.pose_grid import HOPELESS, Grid, Solved, compiled_grid, dearer, iteration_cost
 from softnlp.statics.pose_step import solved_step
 from softnlp.statics.proposed import proposed, residual
 from softnlp.statics.step import Step
@@ -101,7 +101,19 @@ class PoseSolver:
         numerics = self.numerics if transcription is None else replace(self.numerics, transcription=transcription)
         by_ipopt = numerics.engine == "ipopt"
         key = (numerics.transcription, intervals, by_ipopt, numerics.ipopt)
-        return self.equations.kept(key, lambda: compiled_grid(self.equations, numerics, intervals))
+        return self.equations.kept(key, lambda: self._compiled(numerics, intervals))
+
+    def unloaded(self, case: Any, column: Array) -> Array | None:
+        """Return x of a case without loads at every quantity in its order, None where its branch ends before."""
+        found = stretch_on_branch(self.branch, column, column[: self.model.sets])
+        return case.arc(column, found.stretch) if found.status.has_solution else None
+
+    def _compiled(self, numerics: Numerics, intervals: int) -> Grid:
+        return compiled_grid(self.equations, numerics, intervals)
+
+    def branch_at(self, values: Mapping[str, Any]) -> BranchPoint:
+        """Return where the branch of the stretch stands at values of the quantities."""
+        return stretch_on_branch(self.branch, self.column(values), np.asarray(values["pressure"]))
 
     @property
     def most_intervals(self) -> int:
@@ -130,7 +142,7 @@ class PoseSolver:
         quick = self._proposed(column, loads, warm)
         if quick is not None:
             return self._closed(pressure, loads, quick, quick.solution.iterations, began)
-        branch = stretch_on_branch(self.branch, column, pressure)
+        branch = self.branch_at(values)
         if branch.status is not Status.SOLVED:
             return Step(pressure, branch.status, branch.message, solve_time=time.perf_counter() - began), None
 
@@ -298,7 +310,7 @@ class PoseSolver:
 
     def _stretch(self, values: Mapping[str, Any]) -> float:
         """Return the stretch on the branch from zero pressure at the pressure in `values`."""
-        return stretch_on_branch(self.branch, self.column(values), values["pressure"]).stretch
+        return self.branch_at(values).stretch
 
     def arc_guess(self, grid: Grid, p: Array, stretch: float) -> Array:
         """Return x of the unloaded circular arc at this pressure."""
@@ -326,12 +338,13 @@ class PoseSolver:
         Raises `numpy.linalg.LinAlgError` where they are not numbers.
         """
         richardson = 2**grid.order / (2**grid.order - 1)
-        correction = richardson * discretisation_correction(grid.problem, solution, grid.engine.linear)
-        tip = correction[-STATE_SIZE:]
+        correction = richardson * discretisation_correction(grid.problem, solution, grid.corrector)
+        tip = grid.last_state(correction)
         nodes = grid.nodes(solution.x)
         constants = grid.constants(solution)
         if not np.all(np.isfinite(tip)):
             raise np.linalg.LinAlgError("its discretisation error is not finite")
+        off, turned = grid.tip_error(tip, solution)
         return Solved(
             compiled=lambda: grid,
             intervals=grid.intervals,
@@ -339,10 +352,13 @@ class PoseSolver:
             nodes=nodes,
             limit=grid.nodes(solution.x + correction),
             constants=constants,
-            error=float(np.linalg.norm(tip[:3])),
-            rotation_error=float(np.linalg.norm(tip[3:12]) / np.sqrt(2)),
-            stable=not loaded or self.equations.conjugate_points(nodes, constants) == 0,
+            error=off,
+            rotation_error=turned,
+            stable=not loaded or self._conjugate_points(grid, nodes, constants, solution) == 0,
         )
+
+    def _conjugate_points(self, grid: Grid, nodes: Array, constants: Array, solution: Solution) -> int:
+        return self.equations.conjugate_points(nodes, constants)
 
     def _closed(
         self, pressure: Array, loads: Loads, found: Solved, iterations: int, began: float
@@ -351,12 +367,14 @@ class PoseSolver:
         if self.numerics.engine == "auto":
             grid = found.grid
             try:
-                solution = closed(grid.reference, found.solution, self.numerics, TIP)
+                solution = closed(grid.reference, found.solution, self.numerics, grid.tip)
             except DisputedError as error:
                 seconds = time.perf_counter() - began
                 return Step(pressure, Status.DISPUTED, str(error), iterations=iterations, solve_time=seconds), None
             if solution is not found.solution:
                 nodes, constants = grid.nodes(solution.x), grid.constants(solution)
                 found = replace(found, solution=solution, nodes=nodes, constants=constants, shot=None)
-        step = solved_step(self.equations, self.model, self.numerics, pressure, loads, found, iterations, began)
-        return step, found
+        return self._step(pressure, loads, found, iterations, began), found
+
+    def _step(self, pressure: Array, loads: Loads, found: Solved, iterations: int, began: float) -> Step:
+        return solved_step(self.equations, self.model, self.numerics, pressure, loads, found, iterations, began)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +62,28 @@ def stable_flag(stable: bool | None) -> int:
 
 
 @dataclass(frozen=True, eq=False)
+class SegmentPose:
+    """One segment of a solved pose, world frame.
+
+    Attributes
+    ----------
+    tip_position
+        (3,) its end, without the connector behind it [m].
+    tip_rotation
+        (3, 3) R there [1].
+    stretch
+        lambda, of the pressure alone; the mean over the segment where its section varies [1].
+    bending_angle
+        Integral of sqrt(u_x^2 + u_y^2) over it [rad].
+    """
+
+    tip_position: Array
+    tip_rotation: Array
+    stretch: float
+    bending_angle: float
+
+
+@dataclass(frozen=True, eq=False)
 class Pose:
     """A solved static pose, world frame.
 
@@ -88,6 +112,12 @@ class Pose:
         Of the deformed section.
     shape
         The whole rod.
+    segments
+        Of several segments, or one that varies: each by itself, base first. Empty for one that is uniform.
+    outline
+        The radii along the shape, (M,) each, where they are not the same; `radii` are then those at the base [m].
+    segment
+        (M,) of each point of the shape, from 1, and 0 at the end of a connector behind the last one [1].
     """
 
     stretch: float
@@ -101,6 +131,15 @@ class Pose:
     chamber_length: Array
     radii: SectionRadii
     shape: Shape
+    segments: tuple[SegmentPose, ...] = ()
+    outline: SectionRadii | None = None
+    segment: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def parts(self) -> tuple[SegmentPose, ...]:
+        """Each segment by itself, the whole where there is one."""
+        own = SegmentPose(self.tip_position, self.tip_rotation, self.stretch, self.bending_angle)
+        return self.segments or (own,)
 
     @cached_property
     def fit(self) -> Fit:
@@ -109,7 +148,8 @@ class Pose:
         bend, v_z = np.hypot(shape.curvature[:, 0], shape.curvature[:, 1]), shape.shear_extension[:, 2]
         curvature = np.full(bend.shape, np.inf)
         np.divide(bend, v_z, out=curvature, where=v_z > 0)
-        return fit_of(shape.position, shape.rotation, self.radii.outer, curvature)
+        radii = self.radii if self.outline is None else self.outline
+        return fit_of(shape.position, shape.rotation, radii.outer, curvature)
 
 
 @dataclass(frozen=True)
@@ -215,6 +255,22 @@ class Aimed:
 
 
 @dataclass(frozen=True, eq=False)
+class Deviation:
+    """Standard deviations of the outputs of a step, to first order.
+
+    Attributes
+    ----------
+    values
+        By the name of the output, a number or an array (entries,) [SI]; NaN where there is none.
+    message
+        Why there is none of some output, else "".
+    """
+
+    values: Mapping[str, Array]
+    message: str = ""
+
+
+@dataclass(frozen=True, eq=False)
 class Step:
     """One step of a run: its input, how it ended, and the pose when it was solved.
 
@@ -248,6 +304,8 @@ class Step:
         Which engine solved it, of `Numerics`; None without a solution.
     ipopt
         What IPOPT said, None where it took no part.
+    deviation
+        Where uncertainties were given, else None.
     """
 
     pressure: Array
@@ -266,6 +324,7 @@ class Step:
     aimed: Aimed | None = None
     engine: str | None = None
     ipopt: Ipopt | None = None
+    deviation: Deviation | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,6 +345,8 @@ class Run:
         Of the robot.
     contact
         Of a blocked force, else None.
+    uncertainty
+        What scatters and how much, by the keys of a scenario and in their units; empty where nothing was said.
     """
 
     study: str
@@ -298,6 +359,7 @@ class Run:
     title: str = ""
     warnings: tuple[str, ...] = field(default=())
     contact: ContactSettings | None = None
+    uncertainty: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def failed(self) -> tuple[Step, ...]:

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from softnlp.model import rod
 from softnlp.nlp.transcription import RK4, rk_step
-from softnlp.statics.loadcase import RodFunctions, centres_of
+from softnlp.statics.loadcase import RodFunctions, centres_of, unpack_section
+from softnlp.statics.stability import transition_function
 
 Array = NDArray[np.float64]
 
@@ -34,11 +35,37 @@ class VaryingRod:
     The state is [p, R, N, M, stretch, s]; c stacks what `RodFunctions.section` takes at the part's two ends, its share
     of the segment's length, and the unit of force.
 
-    field : (x, c) -> dx/ds. lengths : (x, c) -> rates as of `RodFunctions`.
+    field : (x, c) -> dx/ds. lengths : (x, c) -> rates as of `RodFunctions`. mean : (x, c) -> rate of the stretch's
+    mean over the segment. resultants : (x, c) -> strains v, u, then n and m of the wall alone.
     """
 
     field: ca.Function
     lengths: ca.Function
+    mean: ca.Function
+    resultants: ca.Function
+
+    @cached_property
+    def shape(self) -> ca.Function:
+        """What `softnlp.statics.pose.shape_function` is of a uniform rod, and the stretch and the place (32,)."""
+        x, c, h = ca.SX.sym("x", PLACE + 1), ca.SX.sym("c", self.field.size1_in(1)), ca.SX.sym("h")
+        end = x
+        for _ in range(_SUBSTEPS):
+            end = self._step(end, c, h / _SUBSTEPS)
+        every = ca.vertcat(end[: rod.STATE_SIZE], self.resultants(end, c), end[rod.STATE_SIZE :])
+        return ca.Function("shape", [x, c, h], [every], {"cse": True})
+
+    @cached_property
+    def turning(self) -> ca.Function:
+        """The same with the curvature per unpressurised length."""
+        x, c, h = ca.SX.sym("x", PLACE + 1), ca.SX.sym("c", self.field.size1_in(1)), ca.SX.sym("h")
+        every = self.shape(x, c, h)
+        stretch = every[30]
+        return ca.Function("turning", [x, c, h], [ca.vertcat(every[:21], every[21:24] * stretch, every[24:30])])
+
+    @cached_property
+    def transition(self) -> ca.Function:
+        """As of `softnlp.statics.stability`; the stretch and the place are not moved by a pose."""
+        return transition_function(self.field)
 
     @cached_property
     def _step(self) -> ca.Function:
@@ -79,9 +106,14 @@ def varying_rod(functions: RodFunctions) -> VaryingRod:
         for k in range(0, d.numel(), 2)
     ]
     along = ca.vertcat(*chambers, L * ca.norm_2(u[:2]), L * ca.norm_2(v))
-    given = [x, ca.vertcat(a, b, part, F_0)]
+    n, m = rod.wall_resultants(local, unpack_section(c_here))
+    wall = ca.vertcat(v, u, n * F_here / F_0, m * F_here / F_0)
+    given, options = [x, ca.vertcat(a, b, part, F_0)], {"cse": True}
     return VaryingRod(
-        ca.Function("field", given, [whole], {"cse": True}), ca.Function("lengths", given, [along], {"cse": True})
+        ca.Function("field", given, [whole], options),
+        ca.Function("lengths", given, [along], options),
+        ca.Function("mean", given, [part * x[STRETCH]]),
+        ca.Function("resultants", given, [wall], options),
     )
 
 

@@ -17,6 +17,7 @@ from softnlp.model.contact_settings import CLOSURES, Closure, ContactSettings, r
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.statics.arc import unloaded_arc
+from softnlp.statics.chain_solver import ChainSolver
 from softnlp.statics.loadcase import unpack_section
 from softnlp.statics.solver import PoseSolver
 
@@ -132,7 +133,7 @@ def standing_wall(poses: PoseSolver, contact: ContactSettings, pressures: Array,
         return Wall(np.asarray(contact.wall_point, float), np.asarray(contact.wall_normal, float))
     largest = pressures[int(np.argmax(np.sum(pressures, axis=1)))]
     rest = np.array([0.0, 0.0, poses.model.length + contact.tip_cap])
-    if loads.act:
+    if loads.act or isinstance(poses, ChainSolver):
         found = poses.solve(largest, loads)
         poses.ahead, pose = (poses.column(poses.values(largest, loads)), found), found[0].pose
         if pose is not None:

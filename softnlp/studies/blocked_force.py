@@ -17,11 +17,13 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
+from softnlp.model.segments import SegmentedRobot, require_one_segment
 from softnlp.statics.blocked_grid import Blocked
 from softnlp.statics.kept import blocked_solver
 from softnlp.statics.multistart import other_equilibria
 from softnlp.statics.step import Run, Step
 from softnlp.statics.wall import Wall, checked_contact, standing_wall
+from softnlp.studies.blocked_chain import ChainWall
 from softnlp.studies.forward import checked_loads, followed, pressure_table
 from softnlp.studies.weight_sensitivity import given_weights, sensitivities
 
@@ -80,7 +82,15 @@ def blocked_force(
         raise InputError(f"expected a number that is not negative, got {branches}", key="branches")
     if weight_sensitivity:
         given_weights(contact)
-    solver = blocked_solver(Model(robot, material, coefficients, conventions), numerics, contact)
+    model = Model(robot, material, coefficients, conventions)
+    if isinstance(robot, SegmentedRobot):
+        if branches or weight_sensitivity:
+            require_one_segment(robot, "a search of other branches")
+        chain = ChainWall(model, numerics, contact, loads)
+        there = standing_wall(chain.poses, contact, P, loads)
+        steps = followed(lambda pressure, near: chain.solve(pressure, there, near), P, progress, times)
+        return Run("blocked-force", robot, material, coefficients, conventions, loads, steps, title, warnings, contact)
+    solver = blocked_solver(model, numerics, contact)
     wall = standing_wall(solver.poses, solver.contact, P, loads)
 
     def solve(pressure: Array, near: Blocked | None) -> tuple[Step, Blocked | None]:

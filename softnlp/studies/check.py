@@ -49,7 +49,8 @@ class Check:
             return ""
         low, high = self.possible if self.verdict == "failed" else self.usual
         between = f"{low:.4g} to {high:.4g}" if low < high < inf else f"{low:.4g}"
-        expected = between if isfinite(low) and isfinite(high) else f"at least {low:.4g}"
+        expected = f"at least {low:.4g}" if isfinite(low) else f"at most {high:.4g}"
+        expected = between if isfinite(low) and isfinite(high) else expected
         unit = self.unit and f" {self.unit}"
         return f"the {self.name} is {self.value:.4g}{unit}, expected {expected}{unit}: {self.likely}"
 

@@ -25,14 +25,14 @@ from softnlp.statics.wall import checked_contact, standing_wall
 from softnlp.studies.comparison import NUMBERS, Comparison, Solved
 from softnlp.studies.forward import checked_loads, followed
 from softnlp.studies.measurements import Measurements, Observed, observed
-from softnlp.studies.registered import fitted, sensor_places
-from softnlp.studies.registration import Registration
+from softnlp.studies.registered import fitted, sensor_places, sensor_turns
+from softnlp.studies.registration import Registration, across
 from softnlp.studies.variants import Variant
 
 Array = NDArray[np.float64]
 
 SHAPES = ("free", "blocked")
-_POSE, _FORCE = slice(0, 6), NUMBERS.index("blocked_force")
+_POSE, _FORCE, _ORIENTATION = slice(0, 6), NUMBERS.index("blocked_force"), NUMBERS.index("orientation")
 Tell = Callable[[int], None]
 """Called with how many rows were solved since the last call."""
 
@@ -94,6 +94,10 @@ def compare(
             raise InputError(f"expected one of {', '.join(CLOSURES)}, got {variant.closure!r}", key="closure")
     robots = tuple(observed(m, NUMBERS) for m in given)
     loads, contact = checked_loads(loads), checked_contact(contact, [o.robot for o in robots])
+    if registration is not None:
+        if "clock" in registration.fit and across(loads):
+            raise InputError("loads across the axis need it given; identify fits it", key="registration.clock")
+        loads = registration.in_sets(loads)
     done, total = 0, _solves(robots, asked, shape == "blocked")
 
     def tell(rows: int) -> None:
@@ -153,8 +157,11 @@ class _Work:
             put(at_wall, found, slice(0, len(NUMBERS)) if self._blocked else _FORCE)
         placed = self._registration
         if placed is not None:
-            placed = fitted(placed, values[:, :3], turns, o.values[:, :3])
+            placed = fitted(placed, values[:, :3], turns, o)
             values[:, :3] = sensor_places(placed, values[:, :3], turns)
+        if o.measured[:, _ORIENTATION].any():
+            left = np.linalg.norm(sensor_turns(placed or Registration(), turns, o), axis=1)
+            values[:, _ORIENTATION] = 2 * np.arcsin(np.minimum(left / 2, 1))
         values[~np.isfinite(o.values)] = np.nan
         return Solved(values, tuple(status), tuple(message), frozenset(through), registration=placed)
 
@@ -169,7 +176,8 @@ def _rows(o: Observed, blocked: bool) -> tuple[NDArray[np.intp], NDArray[np.intp
     """Return which rows are solved free and which against the wall."""
     if blocked:
         return np.zeros(0, np.intp), np.arange(len(o.pressure))
-    return np.flatnonzero(o.measured[:, _POSE].any(axis=1)), np.flatnonzero(o.measured[:, _FORCE])
+    posed = o.measured[:, _POSE].any(axis=1) | o.measured[:, _ORIENTATION]
+    return np.flatnonzero(posed), np.flatnonzero(o.measured[:, _FORCE])
 
 
 def _free_key(variant: Variant, o: Observed) -> tuple[int, ...]:
@@ -209,7 +217,7 @@ def _numbers(step: Step, length: float) -> list[float]:
     if pose is None or not step.status.has_solution:
         return [np.nan] * len(NUMBERS)
     force = np.nan if step.contact is None else step.contact.force
-    return [*pose.tip_position, pose.bending_angle, pose.backbone_length - length, pose.tilt, force]
+    return [*pose.tip_position, pose.bending_angle, pose.backbone_length - length, pose.tilt, force, np.nan]
 
 
 def _solved_together(
@@ -234,7 +242,7 @@ def _solved_together(
         pose = (rows["bending_angle"], rows["backbone_length"] - float(model.robot.length), tilt)
         values[members, 3:6] = np.column_stack(pose)
         if contact is not None:
-            values[members, 6] = rows["blocked_force"]
+            values[members, _FORCE] = rows["blocked_force"]
         for k, number in enumerate(members.tolist()):
             status[number] = STATUSES[rows["status"][k]]
             message[number] = status[number].advice

@@ -19,8 +19,10 @@ from softnlp.studies.variants import Variant, labels
 
 Array = NDArray[np.float64]
 
-NUMBERS = ("tip_x", "tip_y", "tip_z", "bending_angle", "elongation", "tilt", "blocked_force")
-"""What is measured, one number each; m, rad, N. A row of a table holds them in this order."""
+NUMBERS = ("tip_x", "tip_y", "tip_z", "bending_angle", "elongation", "tilt", "blocked_force", "orientation")
+"""What is measured, one number each; m, rad, N, in the order of a row of a table.
+
+An orientation is the angle from the one measured."""
 
 _TIP = "tip_position"
 
@@ -43,7 +45,7 @@ class Solved:
     Attributes
     ----------
     values
-        (rows, 7) as `NUMBERS` [m, rad, N]; nan where there is no solution, the force also
+        (rows, 8) as `NUMBERS` [m, rad, N]; nan where there is no solution, the force also
         where there is no wall.
     status
         Of each row; None of one that nothing was asked of.
@@ -171,7 +173,7 @@ class Comparison:
             Of the errors of `errors` [m, rad or N].
         """
         found = statistics(*self.errors(variant, name, robot))
-        return replace(found, bias=float("nan")) if name == "tip_position" else found
+        return replace(found, bias=float("nan")) if name in (_TIP, "orientation") else found
 
     def lost(self, variant: int) -> int:
         """Return how many rows of a variant have no solution.
@@ -242,6 +244,8 @@ class Comparison:
         if name in OF_LENGTH:
             sizes = [np.full(self.measured(name, k), float(o.robot.length)) for k, o in enumerate(self.observed)]
         else:
+            if name == "orientation":  # measured as none: as large as a right angle
+                return np.pi / 2
             sizes = [o.values[np.isfinite(self._measured(name, o)), NUMBERS.index(name)] for o in self.observed]
         return float(np.sqrt(np.mean(np.concatenate(sizes) ** 2))) or 1.0
 
@@ -264,7 +268,7 @@ class Comparison:
 def differences(name: str, simulated: Array, measured: Array, length: float) -> tuple[Array, Array]:
     """Return the errors (rows,) of an observable and what each is compared with; nan where one of both is missing.
 
-    simulated, measured : (rows, 7). length : L_0 [m].
+    simulated, measured : (rows, 8). length : L_0 [m].
     """
     if name == _TIP:
         distance = np.linalg.norm(simulated[:, :3] - measured[:, :3], axis=1)

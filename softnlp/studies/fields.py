@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.columns import Output, outputs
+from softnlp.model.segments import SegmentedRobot
 from softnlp.nlp.solver import EquationResidual
 from softnlp.statics.step import SELF_INTERSECTING_FLAGS, STABLE_FLAGS, Pose, Run, Step, stable_flag
 
@@ -54,21 +55,40 @@ def series(output: Output, steps: Sequence[Step], sizes: Mapping[str, int], of: 
 
 
 def document_outputs(run: Run) -> tuple[Output, ...]:
-    """Return what JSON and CSV hold of a step, in order."""
+    """Return what JSON holds of a step, in order, beside its segments."""
     weights = any(step.contact is not None and step.contact.sensitivity for step in run.steps)
     return (
         *(outputs("target") if run.study == INVERSE else ()),
         *outputs("pose"),
         *(outputs("wall") if run.study == BLOCKED_FORCE else ()),
         *(outputs("weights") if weights else ()),
+        *deviation_outputs(run),
         *outputs("solve"),
     )
+
+
+def deviation_outputs(run: Run) -> tuple[Output, ...]:
+    """Return the standard deviations that a run has."""
+    known = outputs("std") if run.uncertainty else ()
+    return tuple(o for o in known if run.study == BLOCKED_FORCE or o.name != "std_blocked_force")
+
+
+def table_outputs(run: Run) -> tuple[Output, ...]:
+    """Return what CSV holds of a step: the same, and each of several segments."""
+    return (*document_outputs(run), *(outputs("segments") if isinstance(run.robot, SegmentedRobot) else ()))
+
+
+def sizes_of(run: Run) -> dict[str, int]:
+    """Return the sizes of the dimensions of outputs that depend on the robot."""
+    robot = run.robot
+    return {"chamber": robot.chambers, "segment": len(robot.segments) if isinstance(robot, SegmentedRobot) else 1}
 
 
 def dataset_outputs(run: Run) -> tuple[Output, ...]:
     """Return what netCDF holds of a step: the same, the section, and shapes along the rod."""
     free = outputs("free") if run.study == BLOCKED_FORCE else ()
-    return (*document_outputs(run), *outputs("certificate", "section", "shape"), *free)
+    outline = outputs("outline") if isinstance(run.robot, SegmentedRobot) else ()
+    return (*table_outputs(run), *outputs("certificate", "section", "shape"), *outline, *free)
 
 
 def closure_of(run: Run, step: Step) -> str | None:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+Further = Callable[[Sequence[str]], str]
+"""Which measurements would tell some constants apart."""
 
 CLOSE = 0.99  # two constants whose estimates are correlated more than this are hardly told apart
 POORLY_CONDITIONED = 1e4  # of the Jacobian with columns of length one
@@ -78,6 +81,7 @@ def uncertainty(
     held: Sequence[bool] | None = None,
     groups: NDArray[np.intp] | None = None,
     serial: bool = False,
+    further: Further = lambda names: "measurements of another kind",
 ) -> Uncertainty:
     """Return the uncertainty of constants at a least-squares solution.
 
@@ -87,6 +91,7 @@ def uncertainty(
     also where errors grow with the value. groups : (m,) numbers of `repeats`; a value that is there again tells nothing
     more. serial : whether neighbours may err alike, as of one curve; errors then grow by the correlation of neighbours
     (as of an autoregressive process of first order, Bartlett 1946).
+    further : says which measurements a warning advises.
     """
     if groups is not None:
         J, residuals = (_once(groups, values) for values in (J, residuals))
@@ -104,13 +109,13 @@ def uncertainty(
         weak = _weak_directions(Vt, s)
         opened = np.flatnonzero(np.max(np.abs(weak), axis=0) > 1e-3)
         errors[free[opened]] = np.inf
-        return Uncertainty(errors, correlation, condition, (_undetermined(freed, weak[-1]),))
+        return Uncertainty(errors, correlation, condition, (_undetermined(freed, weak[-1], further),))
     covariance = (Vt.T / s**2) @ Vt
     sizes = np.sqrt(np.diag(covariance))
     correlation[np.ix_(free, free)] = covariance / np.outer(sizes, sizes)
-    warnings = list(_close_pairs(freed, correlation[np.ix_(free, free)]))
+    warnings = list(_close_pairs(freed, correlation[np.ix_(free, free)], further))
     if condition > POORLY_CONDITIONED and not warnings:
-        warnings.append(_undetermined(freed, Vt[-1], f"hardly determine (condition number {condition:.2g})"))
+        warnings.append(_undetermined(freed, Vt[-1], further, f"hardly determine (condition number {condition:.2g})"))
     if m > free.size:
         spread = np.sqrt(float(residuals @ residuals) / (m - free.size))
         unused = np.maximum(1 - np.sum(U**2, axis=1), _LEAST_UNUSED)  # of a value, by the fit: 1 - leverage
@@ -144,23 +149,26 @@ def _weak_directions(Vt: Array, s: Array) -> Array:
     return weak if len(weak) else Vt[-1:]
 
 
-def _close_pairs(names: Sequence[str], correlation: Array) -> list[str]:
+def _close_pairs(names: Sequence[str], correlation: Array, further: Further) -> list[str]:
     """Say in one line which pairs of constants the data hardly tell apart."""
     pairs = [
-        f"{names[j]} and {names[i]} (correlation {correlation[i, j]:.4f})"
+        (names[j], names[i], f"{names[j]} and {names[i]} (correlation {correlation[i, j]:.4f})")
         for i in range(len(names))
         for j in range(i)
         if abs(correlation[i, j]) > CLOSE
     ]
     if not pairs:
         return []
-    return [f"the data hardly tell apart {', '.join(pairs)}: fix one of each pair, or add measurements of another kind"]
+    more = further([name for pair in pairs for name in pair[:2]])
+    return [
+        f"the data hardly tell apart {', '.join(words for *_, words in pairs)}: fix one of each pair, or add {more}"
+    ]
 
 
-def _undetermined(names: Sequence[str], direction: Array, how: str = "do not determine") -> str:
+def _undetermined(names: Sequence[str], direction: Array, further: Further, how: str = "do not determine") -> str:
     """Say which constants have most part in a direction that the data leave open."""
     order = np.argsort(-np.abs(direction))[:2]
     chosen = [names[int(k)] for k in order if abs(direction[k]) > 1e-3]
     if len(chosen) < 2:
         return f"the data {how} {chosen[0]}: fix it, or add measurements that depend on it"
-    return f"the data {how} {chosen[0]} and {chosen[1]} apart: fix one of them, or add measurements of another kind"
+    return f"the data {how} {chosen[0]} and {chosen[1]} apart: fix one of them, or add {further(chosen)}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -76,7 +76,7 @@ class FreeConstants:
         values = self.values(x)
         own = {fields[name]: value for name, value in values.items() if name in fields}
         constants = {n.removeprefix("material."): v for n, v in values.items() if n.startswith("material.")}
-        made = replace(material, constants={**material.constants, **constants}) if constants else material
+        made = replace(material, constants={**material.constants, **constants}, set="") if constants else material
         return made, replace(coefficients, **own)
 
 
@@ -265,6 +265,23 @@ def without_constants(found: Identified, status: Status, message: str) -> Identi
         after=tuple(np.full_like(values, np.nan) for values in found.before),
         warnings=(),
     )
+
+
+def further_measurements(names: Collection[str]) -> str:
+    """Return which measurements would tell constants apart."""
+    if any(name in REGISTRATION_NAMES for name in names):
+        if any(name.startswith(("tip_sensor", "clock")) for name in names):
+            return "rows in which the robot bends in another plane"
+        return "rows in which the robot bends in another plane and further, or quaternions of the sensor"
+    advice = (
+        ("k_c", "blocked forces at other pressures and offsets, beside free poses"),
+        ("k_e", "rows with all sets at one pressure, which only lengthen the robot, beside rows that bend it"),
+        ("k_b", "rows that bend the robot by other sets and pressures, beside rows that only lengthen it"),
+        ("phi", "blocked forces, or rows at other pressures beside a tensile test of the silicone"),
+    )
+    if any(name not in COEFFICIENTS for name in names):
+        return "a tensile test of the silicone, which settles its constants"
+    return next((words for name, words in advice if name in names), "blocked forces, or a robot of other dimensions")
 
 
 def constant_checks(found: Identified) -> tuple[Check, ...]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -20,7 +21,7 @@ from softnlp.base.status import Status
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import Conventions
 from softnlp.model.numerics import Numerics
-from softnlp.model.quantities import Model
+from softnlp.model.quantities import LOADS, Model
 from softnlp.model.rod import Loads
 from softnlp.nlp.constraint import Constraint
 from softnlp.nlp.problem import CompiledProblem, compile_problem
@@ -34,9 +35,9 @@ from softnlp.statics.pose_grid import Solved
 from softnlp.statics.unloaded import unloaded_case
 from softnlp.statics.wall import standing_wall
 from softnlp.studies.identified import FreeConstants, Identified, constants_text, file_name
-from softnlp.studies.measurements import COLUMNS, POSE_COLUMNS, RELATIVE_NOISE, Data
+from softnlp.studies.measurements import COLUMNS, POSE_COLUMNS, RELATIVE_NOISE, Data, column_slice
 from softnlp.studies.predicted import STRAIGHT
-from softnlp.studies.registration import Registration
+from softnlp.studies.registration import CLOCK, Registration, across, turned
 
 Array = NDArray[np.float64]
 
@@ -45,23 +46,38 @@ MOST_RODS = 200
 
 TOLERANCE = 1e-10
 _ANGLE = POSE_COLUMNS.index("bending_angle")  # which has no derivative where a shape is straight
+_TURNS = range(*column_slice("orientation").indices(len(COLUMNS)))
 _OF_ERROR = 1e-3  # of a constant's standard error: what IPOPT may move it by
 _MISFITS = "misfits"  # residuals times the noise that is assumed, so that they are about as large as the equations
 
 
 class AtOnce:
-    """Load cases, values and first guesses, gathered measurement by measurement."""
+    """Load cases, values and first guesses, gathered measurement by measurement.
 
-    def __init__(self, free: FreeConstants, numerics: Numerics, registration: Registration | None = None) -> None:
+    loads : in the frame of the base, where a clock that is fitted turns them.
+    """
+
+    def __init__(
+        self,
+        free: FreeConstants,
+        numerics: Numerics,
+        registration: Registration | None = None,
+        loads: Loads = Loads(),
+    ) -> None:
         self.free = free
         self.numerics = numerics.without_ipopt()
         self.declared: dict[str, Quantity] = {}
+        self.loads = loads
+        self.clock: ca.MX | None = None  # which turns the loads, where it is fitted and they act across the axis
         self.sensor: Callable[[LoadCase], list[ca.MX]] | None = None
+        self.turn: Callable[[LoadCase, Data, int], list[ca.MX]] | None = None
         if registration is not None:
             self.declared = {q.name: q for q in registration.quantities()}
-            self.sensor = partial(
-                _sensor, registration.function(), ca.vertcat(*(q.symbol for q in self.declared.values()))
-            )
+            g = ca.vertcat(*(q.symbol for q in self.declared.values()))
+            self.sensor = partial(_sensor, registration.function(), g)
+            self.turn = partial(_turn, registration.orientation(), g)
+            if CLOCK in self.declared and across(loads):
+                self.clock = self.declared[CLOCK].symbol
         self.cases: list[LoadCase] = []
         self.values: dict[str, Array] = {}
         self.guesses: list[Array] = []
@@ -112,6 +128,8 @@ class AtOnce:
             if self.sensor is not None:
                 observed[:3] = self.sensor(free)
             self._add_squares([observed[k] for k in columns], data, row, columns)
+            if self.turn is not None:
+                self._add_squares(self.turn(free, data, row), data, row, _TURNS)
             if not mask[-1]:
                 continue
             assert wall is not None
@@ -150,14 +168,21 @@ class AtOnce:
             declared[name] = replace(declared[name], lower=float(lower), upper=float(upper), scale=float(scale))
         # As unknowns of their own: the square of an angle, an integral along the rod, would couple all of its states.
         misfits = quantity(_MISFITS, "1", np.zeros(len(self.misfits)))
-        given = Constraint(_MISFITS, ca.vertcat(*self.misfits) - misfits.symbol)
+        given = [] if self.clock is None else [self._turned_with(declared[name], self.clock) for name in LOADS]
+        given.append(Constraint(_MISFITS, ca.vertcat(*self.misfits) - misfits.symbol))
         return compile_problem(
             [*declared.values(), misfits],
             self.cases,
-            free=[*free.quantities, _MISFITS],
-            constraints=[given],
+            free=[*free.quantities, *(() if self.clock is None else LOADS), _MISFITS],
+            constraints=given,
             objective=ca.sumsqr(misfits.symbol) / 2,
         )
+
+    def _turned_with(self, load: Quantity, clock: ca.MX) -> Constraint:
+        """Return that a load of the sets' frame is that of the base's, which the clock turns the other way."""
+        x, y, z = (float(v) for v in getattr(self.loads, load.name))
+        c, s = ca.cos(clock), ca.sin(clock)
+        return Constraint(f"turned {load.name}", load.symbol - ca.vertcat(c * x + s * y, c * y - s * x, z))
 
     def packed(self, problem: CompiledProblem) -> Array:
         """Return the fixed values of the compiled problem."""
@@ -166,7 +191,10 @@ class AtOnce:
 
     def start(self, problem: CompiledProblem, constants: Array) -> Array:
         """Return the first guess of the compiled problem."""
-        values, count = self.free.values(constants), len(self.misfits)
+        values: dict[str, Any] = dict(self.free.values(constants))
+        count = len(self.misfits)
+        if self.clock is not None:
+            values |= {name: self.values[name] for name in LOADS}
         x = np.concatenate([problem.pack_free(values), *self.guesses])
         rows = np.asarray(problem.residual(x, self.packed(problem))).ravel()[-count:]
         return np.concatenate([problem.pack_free({**values, _MISFITS: rows}), *self.guesses])
@@ -182,6 +210,13 @@ def _sensor(function: ca.Function, g: ca.MX, case: LoadCase) -> list[ca.MX]:
     """Return the position of the sensor of a load case; g : numbers of the registration."""
     place = function(case.outputs["tip_position"], ca.vec(case.outputs["tip_rotation"]), g)[0]
     return [place[0], place[1], place[2]]
+
+
+def _turn(function: ca.Function, g: ca.MX, case: LoadCase, data: Data, row: int) -> list[ca.MX]:
+    """Return the turn of the sensor of a load case from the one measured in a row."""
+    whole = float(np.nan_to_num(data.whole[row]))
+    turn = function(ca.vec(case.outputs["tip_rotation"]), data.axes[row], whole, g)[0]
+    return [turn[0], turn[1], turn[2]]
 
 
 def closed_fit(
@@ -207,7 +242,9 @@ def closed_fit(
     if rods > MOST_RODS:
         note = f"IPOPT did not close the constants: {rods} rods would be its unknowns, and it takes at most {MOST_RODS}"
         return replace(found, engine=numerics.engine, warnings=(*found.warnings, note))
-    nlp = AtOnce(found.free, numerics, registration)
+    nlp = AtOnce(found.free, numerics, registration, loads)
+    if nlp.clock is not None:
+        loads = turned(loads, -found.free.values(found.constants)[CLOCK])
     for k, data in enumerate(every):
         model = Model(data.robot, found.material, found.coefficients, conventions)
         try:

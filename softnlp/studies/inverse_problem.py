@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.errors import InputError
 from softnlp.base.quantity import quantity
 from softnlp.base.units import BAR
 from softnlp.model.numerics import Numerics
@@ -25,6 +27,8 @@ from softnlp.nlp.reduced import Point, Reduced
 from softnlp.nlp.solver import Engine, Solution
 from softnlp.statics.branch import BranchPoint, stretch_on_branch
 from softnlp.statics.case import alone
+from softnlp.statics.chain import Chain
+from softnlp.statics.chain_solver import ChainSolver
 from softnlp.statics.condensed import case_solver
 from softnlp.statics.loadcase import LoadCase
 from softnlp.statics.pose_grid import Solved
@@ -42,13 +46,13 @@ _FOLD_MARGIN = 1e-6  # of the last pressure with an equilibrium
 _LEAST_STRETCH = 0.5  # of the branch from zero pressure, which begins at 1 and rises
 
 
-def inverse_problem(case: LoadCase, aim: Aim, limits: Limits, *, meets: bool) -> Problem:
+def inverse_problem(case: LoadCase | Chain, aim: Aim, limits: Limits, *, meets: bool) -> Problem:
     """Pose what targets of the kind of `aim` ask of a case.
 
     meets : the target is met, which takes as many sets that may move as it has conditions, with the smallest sum of
     squares of the pressures where there are more sets. Otherwise the weighed misfit is made smallest.
     """
-    L_0, axis = case.length_unit, case.outputs["tip_rotation"][:, 2]
+    L_0, axis = case.whole_length, case.outputs["tip_rotation"][:, 2]
     axis = axis / ca.norm_2(axis)  # a grid leaves R e3 a little off unit
     pressure = replace(case.given["pressure"], lower=limits.lower * BAR, upper=limits.upper * BAR)
     z = pressure.symbol / BAR
@@ -152,17 +156,13 @@ class Tips:
         return Program(posed, reduced, self, meets, posed.compiled.pack({**values, **aim.values()}))
 
     def _posed(self, aim: Aim, *, meets: bool) -> tuple[Problem, Reduced]:
-        (case, held), branch, sets = self._cases(), self.poses.branch, self.limits.lower.size
-
-        def arc(column: Array) -> Array | None:
-            found = stretch_on_branch(branch, column, column[:sets])
-            return case.arc(column, found.stretch) if found.status.has_solution else None
-
+        case, held = self._cases()
+        places = [0] if self.intervals is None else self.poses.grid(self.intervals).stretch_places
         posed = inverse_problem(case, aim, self.limits, meets=meets)
-        sound = lambda states: states[0] >= _LEAST_STRETCH  # noqa: E731
-        return posed, Reduced(posed.compiled, held, posed.residuals, begin=arc, sound=sound)
+        begin, sound = partial(self.poses.unloaded, case), lambda x: bool(np.all(x[places] >= _LEAST_STRETCH))
+        return posed, Reduced(posed.compiled, held, posed.residuals, begin=begin, sound=sound)
 
-    def _cases(self) -> tuple[LoadCase, ImplicitDerivatives]:
+    def _cases(self) -> tuple[LoadCase | Chain, ImplicitDerivatives]:
         """Return the case, and what solves it with the pressures fixed, with its derivatives by them."""
         equations = self.poses.equations
         if self.intervals is not None:
@@ -209,8 +209,13 @@ def pressure_limits(poses: PoseSolver, lower: Array, upper: Array) -> tuple[Limi
     """Return bounds [bar] with the largest sum of pressures that has an equilibrium, and what ends the branch there.
 
     The stretch balance holds the pressures by their sum alone; the stiffnesses may tell sets apart, so the least sum
-    of the bounds' corners is taken. lower, upper : (sets,) [Pa].
+    of the bounds' corners is taken. lower, upper : (sets,) [Pa]. Of several segments each holds its own; bounds beyond
+    the last pressure of one raise `InputError`.
     """
+    if isinstance(poses, ChainSolver):
+        if (ended := poses.ends_below(upper)) is not None:
+            raise InputError(f"expected lower ones: {ended.message}", table="bounds", key="pressure_bar")
+        return Limits(lower / BAR, upper / BAR, np.inf), None
     largest, ends = float(np.sum(upper)), None
     for corner in [upper, *(upper.sum() * np.eye(upper.size))]:
         branch = stretch_on_branch(poses.branch, poses.column({"pressure": corner}), corner)
@@ -226,5 +231,6 @@ def coarse_intervals(poses: PoseSolver, limits: Limits) -> int:
     for corner in np.diag(np.minimum(limits.upper, limits.largest_sum)):
         pressure = limits.clip(corner) * BAR
         column = poses.column({"pressure": pressure})
-        most = max(most, poses.first_intervals(column, stretch_on_branch(poses.branch, column, pressure).stretch))
+        stretch = poses.branch_at({"pressure": pressure}).stretch
+        most = max(most, poses.first_intervals(column, stretch))
     return most

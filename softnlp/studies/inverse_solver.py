@@ -27,9 +27,10 @@ from softnlp.nlp.optimality import OPTIMAL, not_optimal
 from softnlp.nlp.places import best_first, in_rounds, pattern_search
 from softnlp.nlp.reduced import Point
 from softnlp.nlp.solver import FROM_SOLUTION
+from softnlp.statics.chain_solver import ChainSolver
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.kept import pose_solver
-from softnlp.statics.pose_grid import TIP, Solved
+from softnlp.statics.pose_grid import Solved
 from softnlp.statics.step import Aimed, Step
 from softnlp.studies.inverse_problem import Tips, coarse_intervals, pressure_limits
 from softnlp.studies.targets import Aim, InverseTask, Target, aim_of
@@ -92,10 +93,13 @@ class InverseKinematics:
         self.limits, self._ended = pressure_limits(self.poses, task.lower, task.upper)
         self._method = "nlp" if numerics.engine == "ipopt" else method
         self._intervals: int | None = None
-        self._arcs = self._tips(None)
-        self._coarse = self._arcs
-        if loads.act:
+        # Several segments have no closed form that the search could move in; their arcs only begin it.
+        chained = isinstance(self.poses, ChainSolver)
+        self._arcs = None if chained else self._tips(None)
+        if self._arcs is None or loads.act:
             self._coarse = self._tips(numerics.intervals or coarse_intervals(self.poses, self.limits))
+        else:
+            self._coarse = self._arcs
 
     def nearest(self, target: Target, near: Reached | None) -> tuple[Step, Reached | None]:
         """Find the pressure for one target, from the last one where there is one. Never raises for a hard target."""
@@ -158,7 +162,7 @@ class InverseKinematics:
         """Yield where to begin: at the last pressure, then at places of the table."""
         if near is not None:
             yield near.pressure / BAR, self._coarse.moved(near.solved), True
-        if self._coarse is not self._arcs:
+        if self._arcs is not None and self._coarse is not self._arcs:
             # an arc is near enough to begin with, and costs nothing; most targets need no other start
             yield from ((arc.theta, None, False) for arc in self._arcs.nearest(self._arcs.program(aim), 1))
         yield from ((tip.theta, tip, False) for tip in self._coarse.nearest(self._coarse.program(aim), _STARTS))
@@ -297,7 +301,7 @@ class InverseKinematics:
             start = replace(pose, x=np.concatenate([step.pressure / BAR, pose.x]), p=program.p)
             whole = program.engine(**FROM_SOLUTION), start
         try:
-            found = closed(solved.grid.reference, pose, self._numerics, TIP, whole)
+            found = closed(solved.grid.reference, pose, self._numerics, solved.grid.tip, whole)
         except DisputedError as error:
             return Step(step.pressure, Status.DISPUTED, str(error), iterations=step.iterations, aimed=aim.aimed(None))
         return replace(step, engine=self._numerics.engine, ipopt=found.ipopt)

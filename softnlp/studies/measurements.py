@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.errors import InputError, nearest
+from softnlp.base.units import DEGREE
 from softnlp.model.laws import Law
 from softnlp.model.materials import Material
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
+from softnlp.model.segments import require_one_segment
 from softnlp.studies.check import Check
 from softnlp.studies.fit_statistics import repeats
 from softnlp.studies.forward import pressure_table
@@ -21,16 +23,20 @@ from softnlp.studies.registration import Registration
 Array = NDArray[np.float64]
 
 POSE_COLUMNS = ("tip_x", "tip_y", "tip_z", "bending_angle", "elongation")
-COLUMNS = (*POSE_COLUMNS, "blocked_force")
-"""What can be measured, one number each; m, rad, N."""
+ORIENTATION = tuple(f"orientation_{axis}" for axis in "xyz")
+COLUMNS = (*POSE_COLUMNS, *ORIENTATION, "blocked_force")
+"""What can be measured, one number each; m, rad, N. An orientation is the turn from the one measured, so 0 of that."""
 
 OBSERVABLES: Mapping[str, tuple[str, ...]] = {
     "tip_position": ("tip_x", "tip_y", "tip_z"),
     "bending_angle": ("bending_angle",),
     "elongation": ("elongation",),
+    "orientation": ORIENTATION,
     "blocked_force": ("blocked_force",),
 }
 RELATIVE_NOISE = 0.01  # of what is measured, where nothing is said of its noise
+ORIENTATION_NOISE = DEGREE  # where nothing is said of that of orientations
+_NO_QUATERNION = 0.1  # away from a length of 1
 _FLOOR = 0.1  # of an observable's root mean square: smaller numbers count as if they were this large
 
 
@@ -61,6 +67,9 @@ class Measurements:
         Of the robot in results.
     tilt
         (rows,) angle between the tip's axis and +z [rad]; it can be compared, not fitted.
+    orientation
+        Of the sensor of the tip in the frame of the positions: (rows, 4) quaternions x, y, z, w, or (rows, 3) the
+        directions of its z axis [1]. Its sigma is that of the turn about each axis, 1 deg by default.
     """
 
     robot: Robot
@@ -73,6 +82,7 @@ class Measurements:
     weight: Any = None
     label: str = ""
     tilt: Any = None
+    orientation: Any = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +99,18 @@ class Observed:
         (rows, sets) gauge [Pa].
     values
         (rows, numbers) in the order that they were asked for in [m, rad, N]; nan where nothing was measured.
+    axes
+        (rows, 9) the sensor's rotation by columns [1], any about a direction; that of none where nothing was measured.
+    whole
+        (rows,) whether the rotation was measured, 1, or the direction alone, 0; nan for neither.
     """
 
     robot: Robot
     label: str
     pressure: Array
     values: Array
+    axes: Array
+    whole: Array
 
     @property
     def measured(self) -> NDArray[np.bool_]:
@@ -113,7 +129,9 @@ class Data(Observed):
     pressure
         (rows, sets) gauge [Pa].
     values, sigma
-        (rows, 6) in the order of `COLUMNS` [m, rad or N]; nan where not measured.
+        (rows, 9) in the order of `COLUMNS` [m, rad or N]; nan where not measured.
+    axes, whole
+        (rows, 9) and (rows,) as of `Observed` [1].
     root_weight
         (rows,) what a residual is multiplied by [1].
     """
@@ -123,7 +141,7 @@ class Data(Observed):
 
     @property
     def fitted(self) -> NDArray[np.bool_]:
-        """Which entries of `values` count in a fit, (rows, 6) [1]."""
+        """Which entries of `values` count in a fit, (rows, 9) [1]."""
         return self.measured & (self.root_weight[:, None] > 0)
 
     def of(self, observable: str) -> Array:
@@ -164,17 +182,44 @@ def checked_measurements(given: Measurements) -> Data:
 
 def observed(given: Measurements, columns: Sequence[str]) -> Observed:
     """Return what was measured, a tip's three columns first, or raise `InputError` naming what is not right."""
+    require_one_segment(given.robot, "what takes measurements")
     check(given.robot, allow=LOWERABLE_RULES)
     P = pressure_table(given.pressure, given.robot.chamber_sets)
     values = np.full((len(P), len(columns)), np.nan)
-    names = ("tip_position", *columns[3:])
+    names = ("tip_position", *(name for name in columns[3:] if not name.startswith("orientation")))
     for k, name in enumerate(names):
         if (value := getattr(given, name)) is not None:
-            shape, place = ((len(P),), k + 2) if k else ((len(P), 3), slice(3))
+            shape, place = ((len(P),), columns.index(name)) if k else ((len(P), 3), slice(3))
             values[:, place] = number_array(value, shape, name)
+    axes, whole = _oriented(given.orientation, len(P))
+    for k, name in enumerate(columns):
+        if name.startswith("orientation"):  # about the axis of a direction nothing was measured
+            values[:, k] = np.where(whole == 1, 0.0, np.nan) if name == ORIENTATION[-1] else 0.0 * whole
     if not np.any(np.isfinite(values)):
         raise InputError(f"expected at least one number of {', '.join(names)}", key="measurements")
-    return Observed(given.robot, given.label or given.robot.name, P, values)
+    return Observed(given.robot, given.label or given.robot.name, P, values, axes, whole)
+
+
+def _oriented(given: Any, rows: int) -> tuple[Array, Array]:
+    """Return `Observed.axes` and `Observed.whole` of quaternions (rows, 4), directions (rows, 3), or None."""
+    from scipy.spatial.transform import Rotation
+
+    axes, whole = np.tile(np.eye(3).ravel(), (rows, 1)), np.full(rows, np.nan)
+    if given is None:
+        return axes, whole
+    columns = np.shape(given)[1] if np.ndim(given) == 2 else 4
+    found = number_array(given, (rows, 3 if columns == 3 else 4), "orientation")
+    known = np.isfinite(found).all(axis=1)
+    size = np.linalg.norm(found[known], axis=1)
+    if not np.all(size > 0) or (columns == 4 and np.any(np.abs(size - 1) > _NO_QUATERNION)):
+        raise InputError("expected quaternions x, y, z, w of length 1, or directions", key="orientation")
+    if columns == 4:
+        turns = Rotation.from_quat(found[known]).as_matrix() if np.any(known) else np.zeros((0, 3, 3))
+    else:
+        turns = np.array([Rotation.align_vectors([d], [[0, 0, 1]])[0].as_matrix() for d in found[known]])
+    axes[known] = turns.reshape(-1, 3, 3).transpose(0, 2, 1).reshape(-1, 9)
+    whole[known] = columns == 4
+    return axes, whole
 
 
 def _sigmas(data: Data, given: Mapping[str, Any]) -> Array:
@@ -190,6 +235,8 @@ def _sigmas(data: Data, given: Mapping[str, Any]) -> Array:
         squares = np.nansum(values**2, axis=1)
         where = np.any(np.isfinite(values), axis=1)
         column = RELATIVE_NOISE * np.sqrt(squares + _FLOOR**2 * np.mean(squares[where]))
+        if observable == "orientation":
+            column = np.full_like(column, ORIENTATION_NOISE)
         if observable in given:
             stated = np.asarray(given[observable], float)
             if stated.shape not in ((), (len(values),)):
@@ -207,7 +254,7 @@ def repeated_numbers(data: Sequence[Data]) -> NDArray[np.intp]:
     """Return a number for each number that is fitted, in order, the same for one that was measured again exactly."""
     found = []
     for k, d in enumerate(data):
-        rows = repeats(d.pressure, d.values, d.sigma, d.root_weight)
+        rows = repeats(d.pressure, d.values, d.axes, d.sigma, d.root_weight)
         each = np.column_stack([np.full(d.values.size, k), np.repeat(rows, d.values.shape[1])])
         columns = np.tile(np.arange(d.values.shape[1]), len(rows))
         found.append(np.column_stack([each, columns])[d.fitted.ravel()])

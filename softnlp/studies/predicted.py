@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.status import Status
+from softnlp.model.quantities import LOADS
 from softnlp.model.rod import Loads
 from softnlp.nlp.implicit import ImplicitDerivatives
 from softnlp.statics.blocked import BlockedSolver
@@ -26,13 +27,15 @@ from softnlp.statics.blocked_grid import Blocked
 from softnlp.statics.body import Fit
 from softnlp.statics.branch import stretch_on_branch
 from softnlp.statics.loadcase import stretch_imbalance, stretch_near
-from softnlp.statics.pose_grid import Solved, pose_distance
+from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
 from softnlp.statics.wall import Wall, standing_wall
 from softnlp.studies.derivatives import PoseDerivatives
+from softnlp.studies.forward import followed
 from softnlp.studies.identified import FreeConstants
 from softnlp.studies.measurements import COLUMNS, POSE_COLUMNS, Data
+from softnlp.studies.registration import CLOCK, turned
 
 Array = NDArray[np.float64]
 Found = TypeVar("Found")
@@ -117,9 +120,17 @@ class ArcPoses:
         return found if np.all(near) else None
 
 
-def unloaded_tips(solver: PoseSolver, pressure: Array, constants: Mapping[str, float] | None = None) -> Array:
-    """Return the tips (rows, 3) [m] without loads at pressures (rows, sets) [Pa], nan where there is none."""
-    return ArcPoses(solver, pressure, ()).evaluate(constants or {}).values[:, :3]
+def free_tips(solver: PoseSolver, loads: Loads, pressure: Array) -> tuple[Array, Array]:
+    """Return tips (rows, 3) [m] at pressures (rows, sets) [Pa] and their rotations by columns (rows, 9), else nan."""
+    if not loads.act:
+        found = ArcPoses(solver, pressure, ()).evaluate({})
+        assert found.turns is not None
+        return found.values[:, :3], found.turns
+    tips, turns = np.full((len(pressure), 3), np.nan), np.full((len(pressure), 9), np.nan)
+    for row, step in enumerate(followed(lambda P, near: solver.solve(P, loads, near), pressure, None)):
+        if step.pose is not None:
+            tips[row], turns[row] = step.pose.tip_position, np.asarray(step.pose.tip_rotation).ravel(order="F")
+    return tips, turns
 
 
 def _split(values: Array, slopes: Array, failures: tuple[Failure, ...]) -> Prediction:
@@ -149,13 +160,17 @@ def _arc_function(solver: PoseSolver, names: Sequence[str]) -> ca.Function:
 
 
 class LoadedPoses:
-    """Free poses under dead loads: each followed from the last at first, then from itself at other constants."""
+    """Free poses under dead loads: each followed from the last at first, then from itself at other constants.
+
+    Where `CLOCK` is among the names the loads turn with it, the other way than the sets do.
+    """
 
     def __init__(self, solver: PoseSolver, pressure: Array, loads: Loads, names: Sequence[str]) -> None:
         self._solver = solver
         self._pressure = pressure
-        self._loads = loads
+        self._loads = self._given = loads
         self._names = tuple(names)
+        self._clock: float | None = None
         self._derivatives = PoseDerivatives(solver)
         self._known: dict[int, Solved] = {}
 
@@ -163,6 +178,9 @@ class LoadedPoses:
         """See `FreePoses`."""
         solver = self._solver.with_values(constants)
         failures: tuple[Failure, ...] = ()
+        if CLOCK in self._names:
+            self._clock = constants[CLOCK]
+            self._loads = turned(self._given, -self._clock)
         if anew or not self._moved(solver):
             pressed = enumerate(self._pressure)
             self._known, failures = _followed(pressed, lambda P, near: solver.solve(P, self._loads, near))
@@ -182,7 +200,7 @@ class LoadedPoses:
             grid, x = found.grid, found.solution.x
             p = grid.problem.pack(solver.values(self._pressure[row], self._loads))
             solution = grid.engine.solve(p, x)
-            if not solution.holds(solver.numerics.tolerance) or pose_distance(solution.x - x) > _LARGEST_JUMP:
+            if not solution.holds(solver.numerics.tolerance) or grid.distance(solution.x - x) > _LARGEST_JUMP:
                 return False
             moved[row] = replace(found, solution=solution)
         self._known = moved
@@ -191,11 +209,15 @@ class LoadedPoses:
     def _observed(self, found: Solved) -> tuple[Array, Array]:
         """Return the observables of a pose and their derivatives."""
         own = [name for name in self._names if name in self._solver.quantities]
-        point = self._derivatives.at(found, own)
+        point = self._derivatives.at(found, own if self._clock is None else [*own, *LOADS])
         turn, turn_slopes = point.rotation
         values = np.concatenate([*(point.value(name) for name in _SEEN), turn])
         moved = np.vstack([*(point.derivative(name) for name in _SEEN), turn_slopes])
-        slopes = _by_name(moved, own, self._names)
+        slopes = _by_name(moved[:, : len(own)], own, self._names)
+        if self._clock is not None:
+            rate = turned(self._given, -self._clock, rate=-1.0)
+            by_loads = np.concatenate([np.asarray(getattr(rate, name)) for name in LOADS])
+            slopes[:, self._names.index(CLOCK)] = moved[:, len(own) :] @ by_loads
         if values[3] < STRAIGHT:
             slopes[3] = 0.0
         return values, slopes
@@ -308,15 +330,25 @@ def _by_name(slopes: Array, own: Sequence[str], names: Sequence[str]) -> Array:
 
 
 class Predicted:
-    """Everything measured of one robot, as the model predicts it."""
+    """Everything measured of one robot, as the model predicts it.
+
+    clocked : whether the clock of a registration turns the loads; the slopes by it then come last.
+    """
 
     def __init__(
-        self, data: Data, poses: PoseSolver, blocked: BlockedSolver | None, free: FreeConstants, loads: Loads
+        self,
+        data: Data,
+        poses: PoseSolver,
+        blocked: BlockedSolver | None,
+        free: FreeConstants,
+        loads: Loads,
+        clocked: bool = False,
     ) -> None:
         self._data = data
-        self._solver, self._loads = poses, loads
+        self._solver, self._loads, self._clocked = poses, loads, clocked
+        names = (*free.quantities, CLOCK) if clocked else free.quantities
         self._poses: FreePoses = (
-            LoadedPoses(poses, data.pressure, loads, free.quantities)
+            LoadedPoses(poses, data.pressure, loads, names)
             if loads.act
             else ArcPoses(poses, data.pressure, free.quantities)
         )
@@ -327,12 +359,13 @@ class Predicted:
 
     def fit(self, constants: Mapping[str, float], row: int) -> Fit | None:
         """Return how the free shape of a row suits a body, None where it has none."""
-        pose = self._solver.with_values(constants).solve(self._data.pressure[row], self._loads)[0].pose
+        loads = turned(self._loads, -constants[CLOCK]) if self._clocked else self._loads
+        pose = self._solver.with_values(constants).solve(self._data.pressure[row], loads)[0].pose
         return None if pose is None else pose.fit
 
-    def tips(self, constants: Mapping[str, float], pressure: Array) -> Array:
-        """Return the tips (rows, 3) [m] without loads at other pressures (rows, sets) [Pa]."""
-        return unloaded_tips(self._solver, pressure, constants)
+    def tips(self, constants: Mapping[str, float], pressure: Array, loads: Loads) -> tuple[Array, Array]:
+        """Return `free_tips` at other pressures (rows, sets) [Pa] and loads."""
+        return free_tips(self._solver.with_values(constants), loads, pressure)
 
     def evaluate(self, constants: Mapping[str, float], anew: bool) -> Prediction:
         """Return the values in the order of `COLUMNS`, and their derivatives."""

@@ -1,8 +1,10 @@
 """Registration: from the tip of the model to the sensor that was measured, in one problem with the constants.
 
 measured = t + R Rz(clock) (p + R_tip o), with the frame (t, R) of the robot's base in that of the tracker, the clock by
-which the chamber sets are turned about the base's axis, and the place o of the sensor in the tip's frame. Rotations are
-a reference times the Cayley transform of half the rotation vector (Gibbs-Rodrigues), which is smooth where it is 0.
+which the chamber sets are turned about the base's axis, and the place o of the sensor in the tip's frame. The sensor's
+orientation is R Rz(clock) R_tip S, with its axes S in the tip's frame; what is left of it is twice the sine of half the
+angle from the one measured, about the axis of that turn. Rotations are a reference times the Cayley transform of half
+the rotation vector (Gibbs-Rodrigues), which is smooth where it is 0.
 """
 
 from __future__ import annotations
@@ -18,19 +20,25 @@ from numpy.typing import NDArray
 
 from softnlp.base.quantity import Quantity, quantity
 from softnlp.base.units import DEGREE, MILLIMETRE
+from softnlp.model.quantities import LOADS
+from softnlp.model.rod import Loads
 
 Array = NDArray[np.float64]
 
 PREFIX = "registration."
+_HALF_TURN = 1e-6  # squared cosine of half an angle, below which it is half a turn
 _TURN, _MOVE = 0.1, 0.01  # typical sizes [rad], [m]
 _AXES = "xyz"
 _GROUPS = {
     "frame": tuple(f"frame_{kind}{axis}" for kind in ("rotation_", "") for axis in _AXES),
     "tip_offset": tuple(f"tip_offset_{axis}" for axis in _AXES),
     "clock": ("clock",),
+    "tip_sensor": tuple(f"tip_sensor_rotation_{axis}" for axis in _AXES),
 }
 NAMES = tuple(name for names in _GROUPS.values() for name in names)
 """Of the numbers that may be fitted."""
+CLOCK = f"{PREFIX}clock"
+"""The quantity of the clock."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +56,12 @@ class Registration:
     clock
         By which the sets are turned about the base's z axis [rad].
     fit
-        What is fitted: of "frame", "tip_offset" and "clock"; the values given are then where the search begins.
+        What is fitted: of "frame", "tip_offset", "clock" and "tip_sensor"; the values given are then where the search
+        begins.
     set_order
         Which set of the robot each column of pressures is of, from 1; none where they stand in order.
+    tip_sensor
+        (3, 3) S: from the sensor's frame to that of the tip [1].
     """
 
     rotation: Any = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -59,6 +70,7 @@ class Registration:
     clock: float = 0.0
     fit: tuple[str, ...] = ()
     set_order: tuple[int, ...] = ()
+    tip_sensor: Any = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
     def ordered(self, pressure: Array) -> Array:
         """Return measured pressures (rows, sets) in the order of the robot's sets.
@@ -90,6 +102,8 @@ class Registration:
             "tip_offset_mm": [float(v) / MILLIMETRE for v in self.tip_offset],
             "clock_deg": float(self.clock) / DEGREE,
         }
+        if not np.array_equal(self.tip_sensor, np.eye(3)):
+            found["tip_sensor_quat_xyzw"] = [round(v, 12) for v in quaternion_of(self.tip_sensor)]
         return found | ({"set_order": list(self.set_order)} if self.set_order else {})
 
     def lines(self) -> list[str]:
@@ -115,9 +129,25 @@ class Registration:
         array
             (rows, 3) with the clock taken off too [m].
         """
-        c, s = np.cos(self.clock), np.sin(self.clock)
-        turn = np.asarray(self.rotation) @ [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
+        turn = np.asarray(self.rotation) @ _about_z(self.clock)
         return np.asarray((place - np.asarray(self.translation)) @ turn)
+
+    def in_sets(self, loads: Loads, clock: float | None = None) -> Loads:
+        """Return loads of the base's frame in that of the model, whose sets the clock turns.
+
+        Parameters
+        ----------
+        loads
+            In the frame of the base [N, N m, m/s^2].
+        clock
+            In place of that of the registration [rad].
+
+        Returns
+        -------
+        Loads
+            Turned by the clock about z, the other way [N, N m, m/s^2].
+        """
+        return turned(loads, -(self.clock if clock is None else clock))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -128,6 +158,7 @@ class Registration:
     def acts(self) -> bool:
         """Whether it is more than none at all."""
         still = np.array_equal(self.rotation, np.eye(3)) and not np.any(self.translation)
+        still = still and np.array_equal(self.tip_sensor, np.eye(3))
         return bool(self.fit) or not still or bool(np.any(self.tip_offset)) or self.clock != 0
 
     def found(self, values: Iterable[float]) -> Registration:
@@ -149,6 +180,9 @@ class Registration:
             turn = np.array([given[f"frame_rotation_{a}"] for a in _AXES])
             rotation = np.asarray(self.rotation) @ np.asarray(_cayley(ca.DM(turn)))
             made = replace(made, rotation=rotation, translation=np.array([given[f"frame_{a}"] for a in _AXES]))
+        if "tip_sensor" in self.fit:
+            turn = np.array([given[name] for name in _GROUPS["tip_sensor"]])
+            made = replace(made, tip_sensor=np.asarray(self.tip_sensor) @ np.asarray(_cayley(ca.DM(turn))))
         if "tip_offset" in self.fit:
             made = replace(made, tip_offset=np.array([given[f"tip_offset_{a}"] for a in _AXES]))
         return replace(made, clock=given["clock"]) if "clock" in self.fit else made
@@ -180,6 +214,35 @@ class Registration:
         sensor = t + R @ ca.vertcat(c * body[0] - s * body[1], s * body[0] + c * body[1], body[2])
         slopes = [ca.densify(ca.jacobian(sensor, by)) for by in (p, turned, g)]
         return ca.Function("sensor", [p, turned, g], [sensor, *slopes])
+
+    def orientation(self) -> ca.Function:
+        """Return how the sensor is turned from where it was measured, and its derivatives.
+
+        Returns
+        -------
+        casadi.Function
+            Of the rotation of the tip (9, by columns), the sensor's as measured (9), whether it was measured as a whole
+            or its z axis alone, 1 or 0, and the fitted numbers: the turn (3) in the sensor's frame [rad], about z only
+            where the whole is known; its derivatives by the first and the last.
+        """
+        turned, measured, whole = ca.SX.sym("rotation", 9), ca.SX.sym("measured", 9), ca.SX.sym("whole")
+        g = ca.SX.sym("registration", len(self.names))
+        at = dict(zip(self.names, ca.vertsplit(g), strict=True)) if self.names else {}
+        R, S = (ca.DM(np.asarray(part, float)) for part in (self.rotation, self.tip_sensor))
+        if "frame" in self.fit:
+            R = R @ _cayley(ca.vertcat(*(at[name] for name in _GROUPS["frame"][:3])))
+        if "tip_sensor" in self.fit:
+            S = S @ _cayley(ca.vertcat(*(at[name] for name in _GROUPS["tip_sensor"])))
+        phi = at.get("clock", self.clock)
+        c, s = ca.cos(phi), ca.sin(phi)
+        about = ca.vertcat(ca.horzcat(c, -s, 0), ca.horzcat(s, c, 0), ca.horzcat(0, 0, 1))
+        E = ca.reshape(measured, 3, 3).T @ R @ about @ ca.reshape(turned, 3, 3) @ S
+        of_whole = ca.vertcat(E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]) / 2
+        of_axis = ca.vertcat(-E[1, 2], E[0, 2], 0)
+        cosine = whole * (ca.trace(E) - 1) / 2 + (1 - whole) * E[2, 2]
+        turn = (whole * of_whole + (1 - whole) * of_axis) / ca.sqrt(ca.fmax((1 + cosine) / 2, _HALF_TURN))
+        slopes = [ca.densify(ca.jacobian(turn, by)) for by in (turned, g)]
+        return ca.Function("orientation", [turned, measured, whole, g], [turn, *slopes])
 
     def quantities(self) -> list[Quantity]:
         """Return the fitted numbers as quantities of a problem.
@@ -232,8 +295,24 @@ def quaternion_of(rotation: Array) -> list[float]:
 
 def unit_of(name: str) -> tuple[str, float]:
     """Return the key that files have for a fitted number, and its unit there in SI."""
-    turns = name == "clock" or name.startswith("frame_rotation")
+    turns = name == "clock" or "rotation" in name
     return (f"{name}_deg", DEGREE) if turns else (f"{name}_mm", MILLIMETRE)
+
+
+def across(loads: Loads) -> bool:
+    """Whether loads are other ones where the sets are turned about z."""
+    return any(bool(np.any(np.asarray(getattr(loads, name), float)[:2])) for name in LOADS)
+
+
+def turned(loads: Loads, angle: float, rate: float | None = None) -> Loads:
+    """Return loads turned about z by an angle [rad], or how they change while it does so at a rate."""
+    R = _about_z(angle) if rate is None else rate * _about_z(angle + np.pi / 2) @ np.diag([1.0, 1.0, 0.0])
+    return Loads(*(R @ np.asarray(getattr(loads, name), float) for name in LOADS))
+
+
+def _about_z(angle: float) -> Array:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _cayley(turn: Any) -> Any:

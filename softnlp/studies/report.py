@@ -142,6 +142,23 @@ def sensitivity_report(
     )
 
 
+def tolerance_keys(model: Model) -> dict[str, tuple[str, float]]:
+    """Return the quantity of each key that may have a tolerance, and the size of the key's unit."""
+    declared = quantities(model)
+    keys: dict[str, tuple[str, float]] = {
+        d.file_key: (f"robot.{d.field}", d.scale) for d in DIMENSIONS if d.scale is not None
+    }
+    keys |= {c.file_key: (f"material.{c.name}", c.scale) for c in model.material.law.constants}
+    keys |= {name.partition(".")[2]: (name, 1.0) for name in declared if name.startswith(("stiff", "corr"))}
+    keys |= {
+        "density_kg_m3": ("material.density", 1.0),
+        "pressure_bar": ("pressure", BAR),
+        "force_N": ("tip_force", 1.0),
+        "moment_Nmm": ("tip_moment", NEWTON_MILLIMETRE),
+    }
+    return {key: found for key, found in keys.items() if found[0] in declared}
+
+
 def named_tolerances(
     given: Sequence[str], robot: Robot, material: Material, coefficients: Coefficients, pressure: Array
 ) -> dict[str, float]:
@@ -152,18 +169,8 @@ def named_tolerances(
     InputError
         For a name that is not known, a value that is not a number, or a percentage of what is 0.
     """
-    declared = quantities(Model(robot, material, coefficients))
-    keys: dict[str, tuple[str, float]] = {
-        d.file_key: (f"robot.{d.field}", d.scale) for d in DIMENSIONS if d.scale is not None
-    }
-    keys |= {c.file_key: (f"material.{c.name}", c.scale) for c in material.law.constants}
-    keys |= {name.partition(".")[2]: (name, 1.0) for name in declared if name.startswith(("stiff", "corr"))}
-    keys |= {
-        "density_kg_m3": ("material.density", 1.0),
-        "pressure_bar": ("pressure", BAR),
-        "force_N": ("tip_force", 1.0),
-        "moment_Nmm": ("tip_moment", NEWTON_MILLIMETRE),
-    }
+    model = Model(robot, material, coefficients)
+    declared, keys = quantities(model), tolerance_keys(model)
     found: dict[str, float] = {}
     for text in given:
         key, equals, value = (part.strip() for part in text.partition("="))

@@ -18,8 +18,11 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
+from softnlp.model.segments import require_one_segment
 from softnlp.statics.blocked import BlockedSolver
+from softnlp.statics.blocked_grid import Blocked
 from softnlp.statics.kept import blocked_solver, pose_solver
+from softnlp.statics.pose_grid import Solved
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
 from softnlp.statics.wall import checked_contact, standing_wall
@@ -167,6 +170,7 @@ def sensitivities(
     RobotError
         For a robot that is geometrically impossible.
     """
+    require_one_segment(robot, "a sensitivity")
     check(robot, allow=LOWERABLE_RULES)
     P = pressure_table(pressure, robot.chamber_sets)
     if len(P) != 1:
@@ -192,7 +196,13 @@ def pose_sensitivities(
     known = quantities_of(derivatives.poses)
     rows = checked_names(outputs, [name for name in UNITS if name != "blocked_force"], "outputs")
     columns = checked_names(by, list(known), "by")
-    step, solved = derivatives.poses.solve(pressure, loads)
+    return solved_sensitivities(derivatives, *derivatives.poses.solve(pressure, loads), rows, columns)
+
+
+def solved_sensitivities(
+    derivatives: PoseDerivatives, step: Step, solved: Solved | None, rows: tuple[str, ...], columns: tuple[str, ...]
+) -> Sensitivities:
+    """Return the sensitivities of a pose that is solved. rows, columns : names that are known."""
     if solved is None:
         return _empty(derivatives.poses, step, rows, columns, step.message)
     try:
@@ -226,7 +236,18 @@ def _blocked_sensitivities(
     rows = checked_names(outputs, list(UNITS), "outputs")
     columns = checked_names(by, list(quantities_of(solver)), "by")
     wall = standing_wall(solver.poses, contact, pressure[None, :], loads)
-    step, found = solver.solve(pressure, loads, wall)
+    return pressed_sensitivities(solver, loads, *solver.solve(pressure, loads, wall), rows, columns)
+
+
+def pressed_sensitivities(
+    solver: BlockedSolver,
+    loads: Loads,
+    step: Step,
+    found: Blocked | None,
+    rows: tuple[str, ...],
+    columns: tuple[str, ...],
+) -> Sensitivities:
+    """Return the sensitivities of a blocked pose that is solved. rows, columns : names that are known."""
     why = _SINGULAR
     if found is None and step.status is Status.SOLVED:
         why = "the tip only touches the wall: pressed further it has a force, moved away it has none"

@@ -315,7 +315,8 @@ def _fit(
         made = Material(name, law, constants, density, fitted)
     except MaterialError as error:
         return replace(fit, problem=error.message)
-    fit = replace(fit, status="implausible", checks=law_checks(float(made.tangent_modulus(1.0)), r_squared, x, y))
+    checks = law_checks(float(made.tangent_modulus(1.0)), r_squared, x, y)
+    fit = replace(fit, status="implausible", checks=checks, warnings=(*fit.warnings, *messages(checks, "warned")))
     lost = _unstable_from(made)
     if lost is not None and lost <= fitted[1]:
         note = f"the tangent modulus is not positive from a stretch of {lost:.3f} on, within the fitted range"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,9 +17,29 @@ Array = NDArray[np.float64]
 _FEWEST = 2
 
 
+@dataclass(frozen=True)
+class Scatter:
+    """What scatters by itself, and moves one or several quantities together.
+
+    Attributes
+    ----------
+    name
+        Of the source.
+    moves
+        Standard deviation of quantities by name, or of one entry ("pressure.1"), all of which move at once [SI]; it may
+        be negative.
+    """
+
+    name: str
+    moves: Mapping[str, float]
+
+
+Tolerances = Mapping[str, float] | Sequence[Scatter]
+
+
 @dataclass(frozen=True, eq=False)
 class ErrorBars:
-    """Standard deviations of outputs whose quantities scatter independently, to first order.
+    """Standard deviations of outputs by sources that scatter independently, to first order.
 
     Attributes
     ----------
@@ -28,9 +48,9 @@ class ErrorBars:
     values
         (outputs,) in their units [SI].
     quantities
-        Those with a tolerance, one name an entry.
+        Those with a tolerance, one name an entry; or the sources by name.
     tolerance
-        (quantities,) their standard deviations [SI].
+        (quantities,) their standard deviations [SI], 1 of a source.
     total
         (outputs,) the root of the sum of squares of the contributions [SI].
     contribution
@@ -69,7 +89,7 @@ class Sampled:
     asked: int
 
 
-def error_bars(sensitivities: Sensitivities, tolerances: Mapping[str, float]) -> ErrorBars:
+def error_bars(sensitivities: Sensitivities, tolerances: Tolerances) -> ErrorBars:
     """Return first-order error bars.
 
     Parameters
@@ -78,7 +98,7 @@ def error_bars(sensitivities: Sensitivities, tolerances: Mapping[str, float]) ->
         Of the outputs by the quantities that have a tolerance, and others.
     tolerances
         Standard deviation by name [SI]: of a quantity, for each of its entries ("pressure"), or of one entry
-        ("pressure.1").
+        ("pressure.1"); or sources, each of which may move several quantities at once.
 
     Returns
     -------
@@ -90,13 +110,14 @@ def error_bars(sensitivities: Sensitivities, tolerances: Mapping[str, float]) ->
     InputError
         For a name that is not among the quantities, a tolerance that is negative or not finite, or none.
     """
-    columns, sizes = _columns(sensitivities, tolerances)
-    contribution = sensitivities.matrix[:, columns] * sizes
+    names, sizes, directions = _directions(sensitivities, tolerances)
+    moved = np.flatnonzero(directions.any(axis=1))  # a quantity that does not scatter may have no derivative
+    contribution = sensitivities.matrix[:, moved] @ directions[moved]
     return ErrorBars(
         outputs=sensitivities.outputs,
         output_units=sensitivities.output_units,
         values=sensitivities.values,
-        quantities=tuple(sensitivities.quantities[k] for k in columns),
+        quantities=names,
         tolerance=sizes,
         total=np.sqrt(np.sum(contribution**2, axis=1)),
         contribution=contribution,
@@ -105,7 +126,7 @@ def error_bars(sensitivities: Sensitivities, tolerances: Mapping[str, float]) ->
 
 def monte_carlo(
     sensitivities: Sensitivities,
-    tolerances: Mapping[str, float],
+    tolerances: Tolerances,
     samples: int = 1000,
     *,
     seed: int = 0,
@@ -137,21 +158,19 @@ def monte_carlo(
     InputError
         As `error_bars`; where there is nothing to solve again; for fewer than 2 samples.
     """
-    columns, sizes = _columns(sensitivities, tolerances)
+    sources, _, directions = _directions(sensitivities, tolerances)
     point = sensitivities.point
     if point is None:
         raise InputError("expected a step with a solution to draw about", key="sensitivities")
     if samples < _FEWEST:
         raise InputError(f"expected at least {_FEWEST} samples, got {samples}", key="samples")
     names = [name for name in UNITS if entries_of(sensitivities.outputs, name)]
-    half = np.random.default_rng(seed).standard_normal(((samples + 1) // 2, len(columns)))
-    draws = np.concatenate([half, -half])[:samples] * sizes
+    half = np.random.default_rng(seed).standard_normal(((samples + 1) // 2, len(sources)))
+    draws = np.concatenate([half, -half])[:samples] @ directions.T
     lower = np.concatenate([np.full(q.size, q.lower) for q in point.quantities])
     found = []
     for k, draw in enumerate(draws):
-        theta = point.theta.copy()
-        theta[columns] += draw
-        solution = point.solved_at(np.maximum(theta, lower))
+        solution = point.solved_at(np.maximum(point.theta + draw, lower))
         if point.is_solution(solution, 1e-8):
             row = np.full(len(sensitivities.outputs), np.nan)
             for name in names:
@@ -167,8 +186,17 @@ def monte_carlo(
     return Sampled(deviation, np.mean(table, axis=0), deviation / np.sqrt(2 * (len(table) - 1)), len(table), samples)
 
 
-def _columns(sensitivities: Sensitivities, tolerances: Mapping[str, float]) -> tuple[list[int], Array]:
-    """Return the columns that have a tolerance, and their tolerances."""
+def _directions(sensitivities: Sensitivities, tolerances: Tolerances) -> tuple[tuple[str, ...], Array, Array]:
+    """Return the sources by name, their sizes, and what one deviation of each does to the quantities, a column each."""
+    if not isinstance(tolerances, Mapping):
+        known = sensitivities.quantities
+        directions = np.zeros((len(known), len(tolerances)))
+        for k, source in enumerate(tolerances):
+            for name, size in source.moves.items():
+                if not (entries := entries_of(known, name)) or not np.isfinite(size):
+                    raise InputError(f"no such quantity here{nearest(name, known)}", key=name)
+                directions[entries, k] += size
+        return tuple(source.name for source in tolerances), np.ones(len(tolerances)), directions
     if not tolerances:
         raise InputError("expected at least one tolerance", key="tolerances")
     sizes: dict[int, float] = {}
@@ -179,4 +207,6 @@ def _columns(sensitivities: Sensitivities, tolerances: Mapping[str, float]) -> t
         if not entries:
             raise InputError(f"no such quantity here{nearest(name, sensitivities.quantities)}", key=name)
         sizes |= dict.fromkeys(entries, float(size))
-    return list(sizes), np.array(list(sizes.values()))
+    directions = np.zeros((len(sensitivities.quantities), len(sizes)))
+    directions[list(sizes), np.arange(len(sizes))] = list(sizes.values())
+    return tuple(sensitivities.quantities[k] for k in sizes), np.array(list(sizes.values())), directions

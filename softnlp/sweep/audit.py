@@ -13,6 +13,7 @@ from softnlp.batch.alone import Alone
 from softnlp.batch.plan import Plan
 from softnlp.batch.pose_lane import entries
 from softnlp.batch.poses import STATUSES, Lane
+from softnlp.model.segments import SegmentedRobot
 from softnlp.sweep.journal import Journal
 
 EVERY = 1000
@@ -47,11 +48,12 @@ def audit(plan: Plan, journal: Journal, stop: Callable[[], bool] | None = None) 
     """Audit the poses that were solved together, or return None where it was stopped. Only with the engine "auto"."""
     if plan.numerics.engine != "auto":
         return Audit()
+    chained = isinstance(plan.model.robot, SegmentedRobot)  # whose poses are all solved one by one
     solver: Alone | None = None
     solved = STATUSES.index(Status.SOLVED)
     audited, largest, disputed, ahead = 0, 0.0, [], 0  # ahead : how many solved poses come before the next audited one
     for block in journal.blocks():
-        rows = block.rows[(block.rows["lane"] == Lane.BATCH) & (block.rows["status"] == solved)]
+        rows = block.rows[(chained | (block.rows["lane"] == Lane.BATCH)) & (block.rows["status"] == solved)]
         chosen = rows[ahead::EVERY]
         ahead += EVERY * chosen.size - rows.size
         for row in chosen:
@@ -63,7 +65,8 @@ def audit(plan: Plan, journal: Journal, stop: Callable[[], bool] | None = None) 
             step, _ = solver.solve(column)
             audited += 1
             away = np.inf if step.pose is None else float(np.linalg.norm(step.pose.tip_position - row["tip_position"]))
-            if not away <= plan.numerics.accuracy * float(column[entries(plan, "robot.length")][0]):
+            length = plan.model.length if chained else float(column[entries(plan, "robot.length")][0])
+            if not away <= plan.numerics.accuracy * length:
                 disputed.append(number + 1)
             largest = max(largest, away)
     return Audit(audited, largest, tuple(disputed))

@@ -6,7 +6,7 @@ Poses that the workspace does not hold are solved for this, from the tables that
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -190,7 +190,7 @@ def model_of(workspace: Workspace) -> tuple[Model, Loads]:
         raise InputError("expected a sweep of free poses; this one stands at a wall", source=source)
     try:
         tables = workspace.attributes
-        made = material_from_table(tables["material"])
+        made = replace(material_from_table(tables["material"]), set=tables.get("material_set", ""))
         known = {f.name for f in fields(Coefficients)}
         coefficients = Coefficients(**{k: float(v) for k, v in tables["coefficients"].items() if k in known})
         conventions = conventions_of_table(tables["conventions_in_full"])

@@ -20,7 +20,7 @@ from softnlp.base.errors import InputError, nearest
 from softnlp.base.files import placed_whole
 from softnlp.base.reading import one_line
 from softnlp.base.status import Status
-from softnlp.model.inputs import robot_of_table
+from softnlp.model.inputs import robot_of_attributes, silicone_of_attributes
 from softnlp.model.robot import Robot
 
 WORKSPACE_FILE = "workspace.nc"
@@ -110,7 +110,7 @@ def load_workspace(path: str | PathLike[str]) -> Workspace:
         solved = np.array([s.has_solution for s in STATUSES])[status]
         pressure = _numbers(data, _PRESSURE.key, (N, -1)) * _PRESSURE.scale
         attributes = _attributes(data)
-        robot = robot_of_table(attributes["robot"])
+        robot = robot_of_attributes(attributes)
         if pressure.shape[1] != robot.chamber_sets:
             raise ValueError(f"pressures of {pressure.shape[1]} sets for a robot of {robot.chamber_sets}")
         tip = _numbers(data, _TIP.key, (N, 3)) * _TIP.scale
@@ -130,12 +130,11 @@ def load_workspace(path: str | PathLike[str]) -> Workspace:
     arrays = (pressure, status, tip, axis, bending, stable, through, residual, *(() if time is None else (time,)))
     for array in arrays:
         array.setflags(write=False)
-    material = attributes["material"]
     return Workspace(
         file=file,
         title=str(attributes.get("title") or file.parent.name),
         robot=robot,
-        material=f"{material['name']}, {material['model']}",
+        material=", ".join(silicone_of_attributes(attributes)),
         attributes=attributes,
         pressure=pressure,
         status=status,

@@ -61,6 +61,8 @@ class _MaterialPanel:
         names = list(self.entries)
         self.silicone = controls.select(names, "material.name", "Silicone", test="material-name")
         self.silicone.on_value_change(self._silicone_chosen)
+        self.sets = controls.select([], "material.set", "Set of constants", test="material-set")
+        self.sets.on_value_change(self._set_chosen)
         self.own_name = self._text_box(ui.input, "Silicone", "name", "own_name", "maxlength=200")
         self.law = controls.select(dict(silicone.LAW_NAMES), "material.model", "Law", test="material-model")
         self.law.on_value_change(self._law_chosen)
@@ -123,8 +125,7 @@ class _MaterialPanel:
         self.left[before] = table
         kept, entry, model = self.left.get(wanted), self._entry(), table.get("model")
         if kept is None and wanted == "library":
-            name = entry.name if entry is not None else next(iter(self.entries))
-            kept = silicone.library_form(table, name, silicone.law_or_default(model, self.entries[name].models))
+            kept = silicone.library_form(table, entry if entry is not None else next(iter(self.entries.values())))
         elif kept is None and wanted == "constants":
             kept = silicone.constants_form(table, silicone.law_or_default(model, LAWS), entry)
         elif kept is None:
@@ -136,8 +137,13 @@ class _MaterialPanel:
     def _silicone_chosen(self, event: Any) -> None:
         if event.value is None or event.value == self._table.get("name"):
             return
-        model = silicone.law_or_default(self._table.get("model"), self.entries[event.value].models)
-        self.session.change_all("material", silicone.library_form(self._table, event.value, model))
+        self.session.change_all("material", silicone.library_form(self._table, self.entries[event.value]))
+
+    def _set_chosen(self, event: Any) -> None:
+        entry = self._entry()
+        if event.value is None or entry is None or event.value == silicone.set_of(self._table, entry).name:
+            return
+        self.session.change_all("material", silicone.library_form({**self._table, "set": event.value}, entry))
 
     def _law_chosen(self, event: Any) -> None:
         if event.value is None or event.value == self._table.get("model"):
@@ -227,6 +233,8 @@ class _MaterialPanel:
             (self.fitted_box, form != "library"),
         ):
             element.set_visibility(shown)
+        entry = self._entry()
+        self.sets.set_visibility(form == "library" and entry is not None and len(entry.sets) > 1)
         self._show_names(table, form)
         self._show_constants(table, form)
         if form == "formula":
@@ -247,7 +255,11 @@ class _MaterialPanel:
             self.own_law.set_value(model or "")
             return
         entry = self._entry()
-        laws = list(entry.models) if form == "library" and entry is not None else list(LAWS)
+        laws = list(LAWS)
+        if form == "library" and entry is not None:
+            chosen = silicone.set_of(table, entry)
+            laws = list(chosen.models)
+            self.sets.set_options(list(entry.sets), value=chosen.name)
         self.law.set_options({law: silicone.law_name(law) for law in laws}, value=model if model in laws else None)
 
     def _show_constants(self, table: Mapping[str, Any], form: silicone.Form) -> None:
@@ -276,6 +288,7 @@ class _MaterialPanel:
         own = self.state.form != "library"
         beside: tuple[tuple[ui.element, str], ...] = (
             (self.own_name if own else self.silicone, "name"),
+            (self.sets, "set"),
             (self.own_law if self.state.form == "formula" else self.law, "model"),
             (self.formula, "formula"),
             (self.density, "density_kg_m3"),

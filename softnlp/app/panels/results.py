@@ -215,14 +215,23 @@ def _lines(step: dict[str, Any], names: Sequence[str], run: Run) -> list[Line]:
     for output in (OUTPUTS[name] for name in names if OUTPUTS[name].key in step):
         found, title = step[output.key], output.title or output.label.capitalize()
         if not output.dims:
-            lines.append(Line(output.key, title, written(found, output.page, NOTHING), output.unit.sign))
+            text = written(found, output.page, NOTHING) + _spread(step, output)
+            lines.append(Line(output.key, title, text, output.unit.sign))
             continue
         indices = list("xyz") if output.dims == ("axis",) else [str(n + 1) for n in range(run.robot.chambers)]
         for k, index in enumerate(indices):
             entry = None if found is None or k >= len(found) else found[k]
-            text = written(entry, output.page, NOTHING)
+            text = written(entry, output.page, NOTHING) + _spread(step, output, k)
             lines.append(Line(f"{output.key}.{k}", title.format(index), text, output.unit.sign))
     return lines
+
+
+def _spread(step: dict[str, Any], output: Output, entry: int | None = None) -> str:
+    """Return one standard deviation of an output, or of an entry of it, in words, where the document has it."""
+    found = step.get("std", {}).get(output.key)
+    if entry is not None:
+        found = found[entry] if found is not None and entry < len(found) else None
+    return "" if found is None else f" ± {written(found, output.page)}"
 
 
 def certificate_words(run: Run) -> str:

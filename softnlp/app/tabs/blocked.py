@@ -13,6 +13,7 @@ from softnlp.app import controls
 from softnlp.app.asking import Progress, bars, run_steps, said, scenario_with
 from softnlp.app.parts import Chart, NumberTable, line, study_row
 from softnlp.app.session import Session, Stage
+from softnlp.app.tabs.sequence import deviations
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR
@@ -183,7 +184,10 @@ class _Curves:
 
     def _draw(self) -> None:
         curves = [*self._kept, *([self._last] if self._last and self._last[1] else [])]
-        lines = [line(*force_points(list(steps)), colour(k), name) for k, (name, steps) in enumerate(curves)]
+        lines = [
+            line(*force_points(list(steps)), colour(k), name, *deviations(list(steps), OUTPUTS["blocked_force"]))
+            for k, (name, steps) in enumerate(curves)
+        ]
         self._chart.show(lines)
         self._buttons.set_visibility(bool(curves))
 

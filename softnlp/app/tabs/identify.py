@@ -46,10 +46,10 @@ _SIGMAS = {
     for name in OBSERVABLES
     for key, unit in (
         (OUTPUTS[name].key, OUTPUTS[name].unit.label),
-        *([(f"{name}_percent", "%")] if name != "tip_position" else []),
+        *([(f"{name}_percent", "%")] if name not in ("tip_position", "orientation") else []),
     )
 }
-_MEASURED = [OUTPUTS[entry].measured for entries in OBSERVABLES.values() for entry in entries]
+_MEASURED = [OUTPUTS[e].measured for name, entries in OBSERVABLES.items() for e in entries if name != "orientation"]
 
 
 def identify_tab(stage: Stage) -> None:
@@ -112,7 +112,8 @@ class _Measurements:
         self._file = ui.label("").classes("text-sm").mark("measurements.file")
         csv_drop("measurements.drop", "Drop a CSV of measurements", self.take)
         ui.label(
-            f"Columns p1_bar, p2_bar, … and any of {', '.join(_MEASURED)}; robot, weight and sigma_… if there are."
+            f"Columns p1_bar, p2_bar, … and any of {', '.join(_MEASURED)}; qx, qy, qz, qw of the tip's sensor, robot, "
+            "weight and sigma_… if there are."
         ).classes(controls.HINT)
         with ui.column().classes("w-full gap-2") as self._more:
             self._free = controls.select({}, "measurements.free", "Free constants", multiple=True, look="use-chips")

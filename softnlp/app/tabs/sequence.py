@@ -246,7 +246,11 @@ class _Results:
         x, x_label = against(steps, str(self._along.value))
         found, output = series(steps, [what]), QUANTITIES[what]
         names = {name: name.removesuffix(f" [{MM}]") for name in found}
-        traces = [line(x, found[name], colour(k), words) for k, (name, words) in enumerate(names.items())]
+        spreads: Sequence[list[float] | None] = deviations(steps, output) or [None] * len(names)
+        traces = [
+            line(x, found[name], colour(k), words, spread)
+            for k, ((name, words), spread) in enumerate(zip(names.items(), spreads, strict=True))
+        ]
         self._chart.show(traces if steps else [], x_label=x_label, y_label=output.axis)
 
     def _show_step(self, row: int) -> None:
@@ -308,6 +312,15 @@ def series(steps: Sequence[Step], quantities: Iterable[str] = tuple(QUANTITIES))
         values = fields.series(output, steps, {"axis": 3}).reshape(-1, len(labels))
         found |= dict(zip(labels, values.T.tolist(), strict=True))
     return found
+
+
+def deviations(steps: Sequence[Step], output: Output) -> list[list[float]]:
+    """Return the standard deviations of each entry of an output, nan where there is none; nothing without any."""
+    scatter = OUTPUTS.get(f"std_{output.name}")
+    if scatter is None or not any(step.deviation for step in steps):
+        return []
+    values = fields.series(scatter, steps, {"axis": 3}).reshape(len(steps), -1)
+    return [list(map(float, column)) for column in values.T]
 
 
 def against(steps: Sequence[Step], axis: str) -> tuple[list[float], str]:

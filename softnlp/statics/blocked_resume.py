@@ -1,0 +1,93 @@
+"""Going on with a branch on another grid, from a point before the place where one lost it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softnlp.nlp.solver import Solution
+from softnlp.statics.blocked_grid import Blocked, BlockedGrid, transferred, unjudged
+from softnlp.statics.free_shape import Free
+from softnlp.statics.pose import Mapped
+from softnlp.statics.wall import Situation
+
+Array = NDArray[np.float64]
+Trace = list[tuple[float, tuple[float, float]]]
+"""Fractions of the way, and the determinants in and out of the plane there."""
+
+LARGEST_JUMP = 0.3
+"""Between points of a branch, in scaled positions and direction cosines."""
+MOST_STEPS = 5
+"""To a point of a path; what takes more leads off it."""
+_BACK = 0.9  # of where a grid lost the branch: the next one goes on from there
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """A point of a branch: the fraction of the way, its solution, the determinants up to there and the last step."""
+
+    fraction: float
+    solution: Blocked
+    trace: Trace
+    step: float
+
+
+@dataclass(frozen=True, eq=False)
+class Ended:
+    """Where a branch was lost, whether it had turned, the iterations, the error there and whether work ran out.
+
+    before : a point well before that, from which a finer grid may go on.
+    """
+
+    situation: Situation
+    folded: bool
+    iterations: int
+    error: float = 0.0
+    stopped: bool = False
+    before: Reached | None = None
+
+
+def point_before(
+    grid: BlockedGrid,
+    trace: Trace,
+    points: list[Solution | None],
+    lost: float,
+    way: tuple[Situation, Situation],
+    pressed: Array,
+    free: Free,
+) -> Reached | None:
+    """Return the last point of a branch that is well before a fraction where it is lost; None where there is none.
+
+    points : of the trace, None where they are of another grid. way : from where to where.
+    """
+    known = [k for k, (u, _) in enumerate(trace) if k and u <= _BACK * lost and points[k - 1] is not None]
+    if not known or grid.is_minimum:
+        return None
+    k = known[-1]
+    (u, determinants), solution = trace[k], points[k]
+    assert solution is not None
+    there = way[0].towards(way[1], u)
+    point = unjudged(grid, solution, there, pressed, (None, determinants), free)
+    return Reached(u, point, trace[: k + 1], u - trace[k - 1][0])
+
+
+def resumed(
+    grid: BlockedGrid, shape: Mapped, path: Callable[[float], Array], plane: Array | None, before: Reached | None
+) -> Solution | None:
+    """Return the point of a branch that another grid came to; None where this grid has it not, or elsewhere.
+
+    shape : between nodes. path : the values at a fraction of the way.
+    """
+    if before is None or grid.is_minimum:
+        return None
+    for u, _ in before.trace:  # each free shape is found from the last
+        path(u)
+    x = transferred(before.solution, grid.case, shape)
+    begun = grid.stepper.solve(path(before.fraction), x, MOST_STEPS)
+    if not begun.holds(10 * grid.stepper.tolerance) or not grid.distance(begun.x - x) <= LARGEST_JUMP:
+        return None
+    same = grid.determinants(begun, plane)[0] * before.solution.determinants[0] > 0
+    return begun if same else None

@@ -1,0 +1,94 @@
+"""Studies of several segments: inverse kinematics with sets to spare, and sweeps of pressures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from segment_files import scenario, segment, solved
+
+from softnlp import BAR, InputError, load_scenario, run_scenario
+from softnlp.sweep.read import load_workspace
+
+BASE = segment(own="connector_mm = 3.0")
+TOP = segment('name = "D20L40"\nlength_mm = 30.0', own="turn_deg = 60.0")
+HANGING = '[gravity]\ndirection = "hanging"\n'
+
+
+def test_a_pose_that_six_sets_reach_takes_the_least_pressures(tmp_path: Path) -> None:
+    """Position and direction are five conditions: the pressures are across the sixth direction, which moves nothing."""
+    target = "[target]\ntip_position_mm = [[4.0, 3.0, 65.0]]\ntip_direction = [[0.1, 0.1, 1.0]]\n"
+    (found,) = solved(tmp_path, scenario([BASE, TOP], "", HANGING + target, study="inverse"))
+    assert (found["status"], found["optimal"]) == ("solved", True)
+    np.testing.assert_allclose(found["tip_position_mm"], [4, 3, 65], atol=1e-6 * 63)
+    axis = np.array(found["tip_rotation"])[:, 2]
+    np.testing.assert_allclose(axis, np.array([0.1, 0.1, 1]) / np.sqrt(1.02), atol=1e-6)
+    P = np.array(found["pressure_bar"])
+    assert np.all((P > 0) & (P < 1.5))
+    h = 1e-3
+    rows = [P, *(P + h * e for e in np.eye(6))]
+    steps = solved(tmp_path, scenario([BASE, TOP], ", ".join(str(row.tolist()) for row in rows), HANGING))
+    np.testing.assert_allclose(steps[0]["tip_position_mm"], [4, 3, 65], atol=1e-6 * 63)  # as a forward run has it
+    reached = np.array([[*s["tip_position_mm"], *(60 * np.array(s["tip_rotation"])[:, 2])] for s in steps])
+    J = (reached[1:] - reached[0]).T / h
+    still = np.linalg.svd(J)[2][-1]
+    assert np.linalg.norm(J @ still) < 2e-2 * np.linalg.norm(J, 2)
+    assert abs(still @ P) < 2e-3 * np.linalg.norm(P)
+
+
+def test_bounds_beyond_the_last_pressure_of_a_segment_are_refused(tmp_path: Path) -> None:
+    bounds = "[stiffening]\nelongation = 0.0\n[bounds]\npressure_bar = [0, 50]\n"
+    more = "[target]\ntip_position_mm = [[4.0, 3.0, 65.0]]\n" + bounds
+    file = tmp_path / "scenario.toml"
+    file.write_text(scenario([BASE, TOP], "", more, study="inverse"))
+    with pytest.raises(InputError, match=r"\[bounds\] pressure_bar: expected lower ones: segment 1: "):
+        run_scenario(load_scenario(file))
+
+
+def test_a_sweep_has_the_poses_of_single_runs_and_is_audited(tmp_path: Path) -> None:
+    file = tmp_path / "scenario.toml"
+    text = scenario([BASE, TOP], "", HANGING + "[workspace]\nsamples = 3\nto_bar = 0.5\n", study="workspace")
+    file.write_text(text)
+    found = run_scenario(load_scenario(file), folder=tmp_path / "out")
+    again = load_workspace(tmp_path / "out")
+    assert again.robot.chamber_sets == 6
+    assert again.attributes["audited"] >= 1
+    rows = ", ".join(str(row.tolist()) for row in found.pressure / BAR)  # type: ignore[union-attr]
+    steps = solved(tmp_path, scenario([BASE, TOP], rows, HANGING))
+    for tip, step in zip(again.tip_position, steps, strict=True):
+        np.testing.assert_allclose(1e3 * tip, step["tip_position_mm"], atol=1e-6 * 63)
+    for table in ("[workspace.vary]\nlength_mm = [30.0, 40.0]\n", "[contact]\noffset_mm = 0.0\n"):
+        file.write_text(text + table)
+        with pytest.raises(InputError, match="takes a robot of one uniform segment so far"):
+            load_scenario(file)
+
+
+def test_the_blocked_force_of_two_halves_is_that_of_the_whole(tmp_path: Path) -> None:
+    wall = "[contact]\nclosure = \"free\"\ntip_cap_mm = 2.0\noffset_mm = {}\n[solver]\naccuracy = 1e-8\n"  # fmt: skip
+    half = segment()
+    for offset, load in ((0.0, ""), (-4.0, '[gravity]\ndirection = "-z"\n')):
+        more = load + wall.format(offset)
+        rows = "[0.1, 0, 0, 0.1, 0, 0], [0.5, 0, 0, 0.5, 0, 0]"
+        two = solved(tmp_path, scenario([half, half], rows, more, "blocked-force"))
+        whole = [segment('name = "D25L60"')]
+        one = solved(tmp_path, scenario(whole, "[0.1, 0, 0], [0.5, 0, 0]", more, "blocked-force"))
+        for a, b in zip(two, one, strict=True):
+            assert a["status"] == b["status"]
+            assert a["blocked_force_N"] == pytest.approx(b["blocked_force_N"], abs=1e-6)
+            np.testing.assert_allclose(a["tip_position_mm"], b["tip_position_mm"], atol=1e-5)
+            assert a["gap_mm"] == pytest.approx(b["gap_mm"], abs=1e-5)
+            assert a["length_error_mm"] == pytest.approx(b["length_error_mm"], abs=1e-5)
+        assert two[1]["blocked_force_N"] > 0.1
+        assert two[1]["stable"] is None
+
+
+def test_a_wall_takes_closure_free_with_segments(tmp_path: Path) -> None:
+    file = tmp_path / "scenario.toml"
+    file.write_text(scenario([BASE, TOP], "[0.1, 0, 0, 0, 0, 0]", "[contact]\n", study="blocked-force"))
+    with pytest.raises(InputError, match=r"\[contact\] closure: expected 'free' with several segments"):
+        load_scenario(file)
+    curve = '[contact]\nclosure = "free"\noffsets_mm = [0.0]\n'
+    file.write_text(scenario([BASE, TOP], "[0.1, 0, 0, 0, 0, 0]", curve, "blocked-force"))
+    with pytest.raises(InputError, match="offsets_mm: expected only with one uniform segment so far"):
+        load_scenario(file)
