@@ -12,6 +12,8 @@ and then warm, each pose from the last. Ours, "compiled": by a solver that has m
 exist; "as run": by a new one each time. "auto" refines the grid until the estimated error is met (1e-6 of the length
 with loads, 5e-9 without); "20 intervals" fixes it, as the paper's is. The error is the tip's distance to one with
 320 intervals.
+
+Two segments in series, by the general solver, are timed beside one robot of their length, in machine code.
 """
 
 from __future__ import annotations
@@ -34,7 +36,7 @@ from benchmarks import paper_method
 from benchmarks.numpy_field import numpy_field
 from benchmarks.paper_method import Array, Rod, solve_pose
 from benchmarks.rods import Rods
-from softnlp import BAR, Loads, Numerics, material, robot
+from softnlp import BAR, Loads, Numerics, Segment, forward, material, robot, segmented_robot
 from softnlp.base.units import STANDARD_GRAVITY
 from softnlp.model.quantities import Model
 from softnlp.statics.solver import PoseSolver
@@ -65,6 +67,9 @@ def main() -> None:
     for case, loads in CASES.items():
         print(f"\n{MODEL.robot.name}, {MODEL.material.name}, set 1 to 1.5 bar, {case}\n")
         print_poses(poses(loads))
+    print("\nTwo segments of half the length beside one, a loaded pose of a sequence, processor time, this run\n")
+    one, two = segments()
+    print(f"  one segment {1e3 * one:7.1f} ms   two segments {1e3 * two:7.1f} ms   ratio {two / one:5.2f}")
     print(f"\nWhole processes, median of 5, on {os.cpu_count()} processors\n")
     for what, seconds in processes().items():
         print(f"  {what:45s} {seconds:7.3f} s")
@@ -91,6 +96,27 @@ def poses(loads: Loads) -> list[Line]:
             add(what, f"ours, {name}, compiled", partial(our_sequence, PoseSolver(MODEL, numerics), loads, P))
             add(what, f"ours, {name}, as run", partial(our_new_sequence, numerics, loads, P))
     return lines
+
+
+def segments() -> tuple[float, float]:
+    """Return the processor time of a loaded pose of one robot, and of two halves of it in series: the least of some."""
+    whole, silicone, loads = MODEL.robot, MODEL.material, CASES["tip force and gravity"]
+    half = robot("D25L60", length=float(whole.length) / 2)
+    halves = segmented_robot([Segment(half, silicone)] * 2)
+    P = np.linspace(0, 0.8 * BAR, 30)[:, None] * np.array([1.0, 0.1, 0.0])
+    works = (
+        lambda: forward(whole, silicone, P, loads=loads),
+        lambda: forward(halves, halves.material, np.hstack([P, P]), loads=loads),
+    )
+    found = []
+    for work in works:
+        taken = []
+        for _ in range(REPEATS + 1):
+            began = time.process_time()
+            work()
+            taken.append((time.process_time() - began) / len(P))
+        found.append(min(taken))
+    return found[0], found[1]
 
 
 def print_poses(lines: list[Line]) -> None:

@@ -47,7 +47,7 @@ from softnlp.studies import predicted
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.fit_statistics import uncertainty
 from softnlp.studies.identified import Identified
-from softnlp.studies.identify import _Fit
+from softnlp.studies.identify_fit import Fit
 from softnlp.studies.measurements import RobotTask, checked_measurements
 from softnlp.studies.predicted import ArcPoses, BlockedForces, FreePoses, LoadedPoses, Prediction
 
@@ -289,7 +289,7 @@ def test_a_force_beyond_a_fold_is_lost_and_the_one_before_it_stands() -> None:
 def test_a_search_that_is_stopped_says_that_it_is_not_at_a_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
     data = seen(robot("D25L60"), POSES)
     free = ("k_e", "k_b")
-    monkeypatch.setattr(sys.modules["softnlp.studies.identify"], "_MOST_EVALUATIONS", 1)
+    monkeypatch.setattr(sys.modules["softnlp.studies.identify_fit"], "_MOST_EVALUATIONS", 1)
     found = identify(data, SILICONE, free, coefficients=started(free))
     assert found.status is Status.NOT_OPTIMAL
     assert found.message.startswith("feasible, not optimal: the KKT error is ")
@@ -368,13 +368,13 @@ def test_a_constant_next_to_its_bound_is_not_taken_for_one_at_it(lost: bool, mon
     """The rough search ends so near to 0 that 0 is tried; the sum of squares, or the model there, says otherwise."""
     data = seen(robot("D25L60"), POSES, bending=0.005)
     if lost:
-        named = _Fit._lost
+        named = Fit._lost
 
-        def none_at_zero(self: _Fit, found: Sequence[Prediction]) -> tuple[Status, str] | None:
+        def none_at_zero(self: Fit, found: Sequence[Prediction]) -> tuple[Status, str] | None:
             at_zero = self._last is not None and self._last[0][0] == 0.0
             return (Status.DIVERGED, "lost") if at_zero else named(self, found)
 
-        monkeypatch.setattr(_Fit, "_lost", none_at_zero)
+        monkeypatch.setattr(Fit, "_lost", none_at_zero)
     found = identify(data, SILICONE, ["k_b", "k_e"], coefficients=started(["k_b", "k_e"]))
     assert found.status is Status.SOLVED
     assert found.at_bound == ()
@@ -386,7 +386,7 @@ def test_poses_that_are_lost_at_the_end_leave_no_constants(monkeypatch: pytest.M
     soft = material("Ecoflex 00-20", "yeoh")
     data = Measurements(robot("D25L60"), [[0.1 * BAR, 0, 0], [1.2 * BAR] * 3], bending_angle=[0.1, 0.0])
     ends = iter([[1.0], [0.0]])
-    monkeypatch.setattr(_Fit, "_minimise", lambda self, start: np.array(next(ends)))
+    monkeypatch.setattr(Fit, "_minimise", lambda self, start: np.array(next(ends)))
     found = identify(data, soft, ["k_e"])
     assert found.status in (Status.NO_EQUILIBRIUM, Status.UNSTABLE_MATERIAL)
     assert "D25L60, measurement 2: " in found.message
@@ -630,7 +630,7 @@ def test_columns_that_differ_by_case_unit_or_a_letter_are_told(tmp_path: Path) -
     assert pairs == [
         "'Tip_X_mm' is not read; did you mean 'x_mm'?",
         "'tip_y_mn' is not read; did you mean 'y_mm'?",
-        "'elongation_m' is not read; did you mean 'elongation_mm'?",
+        "'elongation_m' is not read; write elongation_mm = 1000?",
         "'Weight' is not read; did you mean 'weight'?",
     ]
     assert task.measurements[0].tip_position[0][2] == pytest.approx(0.055)  # as results spell it
@@ -688,7 +688,7 @@ def test_open_constants_and_grown_errors_are_said_everywhere(
 
 
 def test_an_end_that_is_worse_than_the_start_is_no_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_Fit, "_minimise", lambda self, start: start + 5.0)
+    monkeypatch.setattr(Fit, "_minimise", lambda self, start: start + 5.0)
     found = identify(seen(robot("D25L60"), POSES), SILICONE, ["k_b"], coefficients=TRUE)
     assert found.status is Status.DIVERGED
     assert "ended at k_b = 12, further from the measurements than its start" in found.message
@@ -697,16 +697,16 @@ def test_an_end_that_is_worse_than_the_start_is_no_minimum(monkeypatch: pytest.M
 
 def test_the_start_is_never_left_for_a_worse_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     """A point at the bound that the sum of squares is pushed against is taken only where it is not larger there."""
-    search = _Fit._search
+    search = Fit._search
 
-    def worse(self: _Fit, start: Any, moving: Any, tolerance: float) -> Any:
+    def worse(self: Fit, start: Any, moving: Any, tolerance: float) -> Any:
         found = search(self, start, moving, tolerance)
         self._cost *= 1.0 if np.all(moving) else 2.0
         return found
 
     data = seen(robot("D25L60"), POSES, bending=0.0)
     off = replace(data, bending_angle=np.array(data.bending_angle) * 1.1, tip_position=None)
-    monkeypatch.setattr(_Fit, "_search", worse)
+    monkeypatch.setattr(Fit, "_search", worse)
     found = identify(off, SILICONE, ["k_b", "k_e"], coefficients=started(["k_b", "k_e"]))
     assert 0 <= found.constants[0] < 1e-4
 

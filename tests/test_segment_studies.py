@@ -88,10 +88,7 @@ def test_a_wall_takes_closure_free_with_segments(tmp_path: Path) -> None:
     file.write_text(scenario([BASE, TOP], "[0.1, 0, 0, 0, 0, 0]", "[contact]\n", study="blocked-force"))
     with pytest.raises(InputError, match=r"\[contact\] closure: expected 'free' with several segments"):
         load_scenario(file)
-    file.write_text(
-        scenario(
-            [BASE, TOP], "[0.1, 0, 0, 0, 0, 0]", '[contact]\nclosure = "free"\noffsets_mm = [0.0]\n', "blocked-force"
-        )
-    )
+    curve = '[contact]\nclosure = "free"\noffsets_mm = [0.0]\n'
+    file.write_text(scenario([BASE, TOP], "[0.1, 0, 0, 0, 0, 0]", curve, "blocked-force"))
     with pytest.raises(InputError, match="offsets_mm: expected only with one uniform segment so far"):
         load_scenario(file)

@@ -69,6 +69,17 @@ def test_collocation_gives_the_same_pose() -> None:
     assert one["tip_position_mm"] == pytest.approx(other["tip_position_mm"], abs=1e-6 * 60)
 
 
+def test_a_turned_segment_bends_where_its_set_points() -> None:
+    """Set 5 is 120 degrees from set 4, and the second segment turned by 60: it bends away from 180 degrees."""
+    before, after = steps_of("two_segments")[1:3]
+    first, second = (np.array(step["tip_position_mm"])[:2] for step in (before, after))
+    assert (second - first)[0] > 5
+    assert abs((second - first)[1]) < 1e-6
+    assert len(after["segments"]) == 2
+    angles = [step["segments"][0]["bending_angle_deg"] for step in (before, after)]
+    assert angles[0] == pytest.approx(angles[1], rel=0.2)
+
+
 def test_the_tip_goes_around_once() -> None:
     steps = steps_of("D25L60_circling")
     x, y, z = np.array([step["tip_position_mm"] for step in steps]).T

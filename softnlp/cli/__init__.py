@@ -74,7 +74,8 @@ def _app() -> App:
     add(app, "run check workspace sweep inverse sensitivity identify compare design gui mesh example new convert")
     add(app, "robots materials", "library")
     app.command(import_module("softnlp.cli.importing").import_, name="import")
-    plot = App(name="plot", help="Draw a cross-section, silicones, or the results of a run.")
+    plot = App(name="plot", help="Draw the figures of a results folder again; or a cross-section, silicones, one run.")
+    plot.default(import_module("softnlp.cli.plot").plot_folder)
     add(plot, "section material run", "plot", "plot_")
     app.command(plot)
     return app

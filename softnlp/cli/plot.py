@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, say
 from softnlp.cli.figures import draw
@@ -88,6 +88,29 @@ def plot_run(results: Path, /, *, out: Path | None = None) -> int:
     folder = results if results.is_dir() else results.parent
     view = load_run(results)
     return _save(lambda: run_figure(view), out or folder / "figure.png")
+
+
+def plot_folder(results: Path, /, *, out: Path | None = None, format: Literal["png", "pdf", "svg"] = "png") -> int:
+    """Draw the figures of a results folder again, from its files: of any study, a sweep, a comparison, sensitivities.
+
+    Parameters
+    ----------
+    results
+        Folder of a run, sweep, identify, design, compare or sensitivity.
+    out
+        Folder for the figures; that of the results by default.
+    format
+        png, pdf or svg.
+    """
+    from softnlp.base.files import make_folder
+    from softnlp.figures.again import folder_figures
+
+    makers = folder_figures(results)
+    to = results if out is None else make_folder(out)
+    written = draw({to / f"{name}.{format}": figure for name, figure in makers.items()}, results)
+    for drawn in written:
+        say(f"drawn in {drawn}")
+    return SOLVED if len(written) == len(makers) else SOME_UNSOLVED
 
 
 def _save(figure: Callable[[], Figure], path: Path) -> int:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from softnlp.base.columns import BAR_, DEG, MM, NMM, N
-from softnlp.model.inputs import loads_table, package_version, pressure_bar
+from softnlp.model.inputs import loads_table, package_version, pressure_bar, robot_table
 from softnlp.results.document import plain
 from softnlp.studies.derivatives import entries_of
 from softnlp.studies.ellipsoids import Ellipsoid
@@ -70,6 +71,11 @@ def sensitivity_document(report: SensitivityReport, title: str, step: int, notes
             "solved": report.sampled.solved,
             "asked": report.sampled.asked,
         }
+    if report.pose is not None:
+        pose = report.pose
+        radii = {field.name: getattr(pose.radii, field.name) for field in fields(pose.radii)}
+        body = {"position_m": pose.shape.position, "rotation": pose.shape.rotation, "radii_m": radii}
+        document |= {"robot": robot_table(report.robot), "material": report.material.name, "body": body}
     found: dict[str, Any] = plain(document)
     return found
 

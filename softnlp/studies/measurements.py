@@ -102,7 +102,7 @@ class Observed:
     axes
         (rows, 9) the sensor's rotation by columns [1], any about a direction; that of none where nothing was measured.
     whole
-        (rows,) whether the rotation was measured, 1, or the direction alone, 0; nan for neither.
+        (rows,) whether the rotation was measured, 1, or the direction alone, 0; nan for neither [1].
     """
 
     robot: Robot
@@ -128,10 +128,12 @@ class Data(Observed):
         Whose they are, and what results call it.
     pressure
         (rows, sets) gauge [Pa].
-    values, sigma
+    values
         (rows, 9) in the order of `COLUMNS` [m, rad or N]; nan where not measured.
     axes, whole
         (rows, 9) and (rows,) as of `Observed` [1].
+    sigma
+        (rows, 9) as `values`, their standard deviations [m, rad or N].
     root_weight
         (rows,) what a residual is multiplied by [1].
     """
