@@ -294,3 +294,27 @@ def test_the_document_s_examples_run(
     assert {"bent.stl", "cast.stl", "mould.glb"} <= {path.name for path in (tmp_path / "results").iterdir()}
     shown = document.read_text().split("```text\n")[1].split("```")[0]
     assert shown in capsys.readouterr().out
+
+
+def test_each_segment_is_a_watertight_solid_of_its_own() -> None:
+    """At rest a cone has the volume of its frusta, and a piece behind a connector begins where that ends."""
+    from softnlp import Segment, forward, material, segmented_robot
+    from softnlp.figures.mesh.solid import segment_solids
+    from softnlp.results import view_of_run
+
+    base = robot("D25L60", length=30e-3)
+    along = {"robot.outer_diameter": (25e-3, 23.8e-3)}
+    made = segmented_robot([Segment(base, material("Ecoflex 00-50"), connector=3e-3),
+                            Segment(base, material("Ecoflex 00-50"), along=along)])  # fmt: skip
+    body = view_of_run(forward(made, made.material, np.zeros(6))).bodies[0]
+    assert body is not None
+    first, second = segment_solids(made, body, 96)
+    polygon = 96 / (2 * np.pi) * np.sin(2 * np.pi / 96)  # area of one over that of its circle
+    holes = np.pi * (4.5**2 + 6 * 2.25**2)
+    assert first.volume == pytest.approx(30 * polygon * (np.pi * 12.5**2 - holes), rel=1e-6)
+    frustum = np.pi / 3 * 30 * (12.5**2 + 12.5 * 11.9 + 11.9**2)
+    assert second.volume == pytest.approx(polygon * (frustum - 30 * holes), rel=1e-6)
+    assert second.vertices[:, 2].min() - first.vertices[:, 2].max() == pytest.approx(3, abs=1e-6)
+    for solid in (first, second):
+        edges = np.sort(solid.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        assert np.all(np.unique(edges, axis=0, return_counts=True)[1] == 2)

@@ -29,7 +29,8 @@ def mesh(
 ) -> int:
     """Write the body of one step as a watertight solid in mm; --undeformed writes the body to cast, without a solve.
 
-    Lumen and chambers are holes, open at both ends. The exit status is 3 when the step did not solve.
+    Lumen and chambers are holes, open at both ends. Of several segments each is a solid of its own. The exit status is
+    3 when the step did not solve.
 
     Parameters
     ----------
@@ -50,7 +51,8 @@ def mesh(
     """
     from softnlp.figures.mesh import FACETS, HOLES, body_solid, format_of, mould_body, require
     from softnlp.figures.mesh import cores as core_solids
-    from softnlp.model.segments import require_one_segment
+    from softnlp.figures.mesh.solid import segment_solids
+    from softnlp.model.segments import SegmentedRobot, require_one_segment
 
     target = out or Path(f"{_stem(scenario)}.stl")
     format_of(target)
@@ -62,14 +64,14 @@ def mesh(
             raise InputError("expected no step together with --undeformed", key="--step")
         robot = _robot(scenario, all_errors)
         chosen = holes or HOLES[0]
-        solid = mould_body(robot, sides, chosen)
+        solids: tuple[Solid, ...] = (mould_body(robot, sides, chosen),)
         inside = core_solids(robot, None, sides, chosen) if cores else ()
     else:
         if holes is not None:
             raise InputError("expected only together with --undeformed", key="--holes")
         view, number = _view_of(scenario, step, all_errors)
-        if view is not None:
-            require_one_segment(view.robot, "softnlp mesh")
+        if view is not None and cores:
+            require_one_segment(view.robot, "softnlp mesh --cores")
         if view is None:
             complain(f"stopped before step {number}; nothing was written")
             return STOPPED
@@ -78,24 +80,26 @@ def mesh(
             complain(f"step {number} has no body to write, its status is {view.status[number - 1].value!r}")
             return SOME_UNSOLVED
         robot = view.robot
-        solid = body_solid(robot, body, sides)
+        several = isinstance(robot, SegmentedRobot)
+        solids = segment_solids(robot, body, sides) if several else (body_solid(robot, body, sides),)
         inside = core_solids(robot, body, sides) if cores else ()
-    _write(solid, inside, robot, target)
+    _write(solids, inside, robot, target)
     return SOLVED
 
 
-def _write(solid: Solid, inside: tuple[Solid, ...], robot: Robot, target: Path) -> None:
+def _write(solids: tuple[Solid, ...], inside: tuple[Solid, ...], robot: Robot, target: Path) -> None:
     """Write the files and say what is in them."""
     from softnlp.base.files import make_folder
     from softnlp.figures.mesh import format_of, write_solids
 
     make_folder(target.parent)
-    for warning in solid.warnings:
+    for warning in (warning for solid in solids for warning in solid.warnings):
         complain(f"warning: {warning}")
     apart = bool(inside) and format_of(target) == ".stl"
     say(
-        f"{robot.name}: {solid.volume:.6g} mm^3 of silicone, {len(solid.faces)} triangles in "
-        f"{write_solids([solid] if apart else [solid, *inside], robot, target)}"
+        f"{robot.name}: {sum(solid.volume for solid in solids):.6g} mm^3 of silicone, "
+        f"{sum(len(solid.faces) for solid in solids)} triangles in "
+        f"{write_solids(solids if apart else [*solids, *inside], robot, target)}"
     )
     if apart:
         second = write_solids(inside, robot, target.with_name(f"{target.stem}-cores{target.suffix}"))
@@ -119,7 +123,7 @@ def _robot(path: Path, all_errors: bool) -> Robot:
     from softnlp.results import load_run
 
     found = load_run(path).robot if _is_run(path) else scenario_at(path, all_errors).robot
-    require_one_segment(found, "softnlp mesh")
+    require_one_segment(found, "softnlp mesh --undeformed")
     return found
 
 

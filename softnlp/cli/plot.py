@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, say
 from softnlp.cli.figures import draw
 
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def plot_section(robot: str, /, *, stretch: float = 1.0, out: Path | None = None) -> int:
+def plot_section(robot: str, /, *, stretch: float = 1.0, segment: int | None = None, out: Path | None = None) -> int:
     """Draw a cross-section to scale, its sets coloured and the rules that it breaks marked.
 
     Parameters
@@ -22,6 +23,8 @@ def plot_section(robot: str, /, *, stretch: float = 1.0, out: Path | None = None
         A name of the library, or a scenario file (one whose robot cannot be made is drawn too).
     stretch
         Draw the section at this stretch as well.
+    segment
+        Of a scenario with several, from 1, the first by default; of one that varies along s the section at the base.
     out
         PNG, PDF or SVG file; section-ROBOT.png by default.
     """
@@ -31,8 +34,10 @@ def plot_section(robot: str, /, *, stretch: float = 1.0, out: Path | None = None
     from softnlp.scenario.read import robot_of_scenario
 
     if robot.endswith(".toml"):
-        made, broken = robot_of_scenario(robot)
+        made, broken = robot_of_scenario(robot, segment)
     else:
+        if segment is not None:
+            raise InputError("expected only with a scenario", key="--segment")
         made = library_robot(robot)
         broken = violations(made)
     name = "".join(c if c.isalnum() or c in "-_." else "-" for c in made.name)

@@ -15,9 +15,8 @@ from softnlp.figures.mesh.rings import circle, placed
 from softnlp.figures.space import axes_3d, draw_faces, draw_lines, plain_3d
 from softnlp.figures.style import GREY, INK, SMALL, TEXT, colour, step_colours
 from softnlp.model.gravity import gravity_lines, is_hanging
-from softnlp.model.robot import Robot
 from softnlp.model.section import SectionRadii
-from softnlp.model.segments import SegmentedRobot
+from softnlp.model.segments import segments_of
 from softnlp.results import Body, RunView
 
 if TYPE_CHECKING:
@@ -210,17 +209,6 @@ def draw_cut_open(axes: Any, view: RunView, k: int, eye: Array, light: Array, *,
 def tip_radius(body: Body) -> float:
     """Return the outer radius at the tip of a body [m]."""
     return float(np.ravel(body.radii.outer)[-1])
-
-
-def segments_of(robot: Robot) -> list[tuple[Robot, int]]:
-    """Return the robot of each segment at its base, with the number of sets before it; itself where it is one."""
-    if not isinstance(robot, SegmentedRobot):
-        return [(robot, 0)]
-    found, sets = [], 0
-    for segment in robot.segments:
-        found.append((segment.robot, sets))
-        sets += segment.robot.chamber_sets
-    return found
 
 
 def _connectors(body: Body) -> list[Body]:

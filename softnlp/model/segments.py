@@ -161,6 +161,17 @@ def body_of(model: Model) -> Body:
     return Body(robot.segments, model.coefficients, model.conventions)
 
 
+def segments_of(robot: Robot) -> list[tuple[Robot, int]]:
+    """Return the robot of each segment at its base, with the number of sets before it; itself where it is one."""
+    if not isinstance(robot, SegmentedRobot):
+        return [(robot, 0)]
+    found, sets = [], 0
+    for segment in robot.segments:
+        found.append((segment.robot, sets))
+        sets += segment.robot.chamber_sets
+    return found
+
+
 def declared(model: Model) -> dict[str, Quantity]:
     """Return every quantity of a model by name: those of its body where it has several segments."""
     return body_of(model).quantities if isinstance(model.robot, SegmentedRobot) else quantities(model)

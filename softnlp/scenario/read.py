@@ -85,20 +85,24 @@ def scenario_from_text(text: str, path: str | PathLike[str]) -> Scenario:
         raise placed(error, fspath(path)) from None
 
 
-def robot_of_scenario(path: str | PathLike[str]) -> tuple[Robot, tuple[Violation, ...]]:
+def robot_of_scenario(path: str | PathLike[str], segment: int | None = None) -> tuple[Robot, tuple[Violation, ...]]:
     """Return the robot of a scenario file and the rules of manufacture that it breaks, whether allowed or not.
+
+    segment : of several, from 1, the first by default. Of one that varies along s it is the robot at the base.
 
     Raises
     ------
     InputError
-        As `load_scenario`, for everything but those rules.
+        As `load_scenario`, for everything but those rules, and for a segment that there is not.
     """
     try:
         file = parse(parse_toml(read_text(Path(path), LARGEST_TOML)))
-        if getattr(file, "segment", None) is not None or file.robot.along:
-            raise InputError("the cross-section of a robot of one uniform segment is drawn so far", table="segment")
-        robot = file.robot.described()
-        return robot, violations(robot, file.robot.minimum_wall_mm * MILLIMETRE)
+        tables = [table.robot for table in getattr(file, "segment", None) or [file]]
+        if segment is not None and not 1 <= segment <= len(tables):
+            raise InputError(f"expected a segment from 1 to {len(tables)}, got {segment}", table="segment")
+        chosen = tables[(segment or 1) - 1]
+        robot = chosen.described()
+        return robot, violations(robot, chosen.minimum_wall_mm * MILLIMETRE)
     except InputError as error:
         raise placed(error.located(table="robot"), fspath(path)) from None
 

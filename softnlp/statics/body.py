@@ -87,7 +87,7 @@ def fit_of(position: Array, rotation: Array, radius: float | Array, curvature: A
 
     position : (M, 3) of the axis [m]. rotation : (M, 3, 3), columns are the body axes. radius : outer, deformed, one
     or (M,) [m]. curvature : (M,) of the axis per its deformed length [1/m], inf where v_z <= 0; by default that of the
-    screws between stations.
+    screws between stations, with one radius.
     """
     if curvature is None:
         chord = np.linalg.norm(np.diff(position, axis=0), axis=1)

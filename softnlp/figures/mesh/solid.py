@@ -9,7 +9,7 @@ Files hold millimetres. STL has no unit; a GLB's is the metre with y up, so its 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from importlib import import_module
 from os import PathLike
 from pathlib import Path
@@ -24,6 +24,8 @@ from softnlp.base.palette import colour
 from softnlp.base.units import MILLIMETRE
 from softnlp.figures.mesh.rings import circle, natural_body, placed, resampled
 from softnlp.model.robot import Robot
+from softnlp.model.section import SectionRadii
+from softnlp.model.segments import segments_of
 from softnlp.results import Body, write_whole
 from softnlp.statics.body import advances, fit_of, turns
 
@@ -168,14 +170,54 @@ def _swept(name: str, body: Body, section: CrossSection, facets: int, chamber: i
     if np.min(advances(body.position, body.rotation)) <= 0:
         raise InputError("a part of this shape has negative length (v_z <= 0), so it is no solid")
     loops = [np.asarray(loop, dtype=float) for loop in section.to_polygons()]
-    flat = np.concatenate(loops)
-    cap = np.asarray(_library("manifold3d").triangulate(loops), dtype=np.int64)
+    axis = resampled(body, _stations(body, facets))
+    return _solid(name, axis, loops, np.concatenate(loops)[None] * MILLIMETRE, chamber)
+
+
+def _stations(body: Body, facets: int) -> int:
+    """Return how many stations there are for the axis to turn by at most one facet's angle between two."""
     turned = float(np.sqrt((turns(body.rotation) ** 2).sum(axis=1)).sum())
-    stations = 1 + max(1, int(np.ceil(turned * facets / (2 * np.pi))))
-    axis = resampled(body, stations)
-    local = flat * MILLIMETRE
-    points = placed(axis.position[:, None], axis.rotation[:, None], local[None]) / MILLIMETRE
-    n = len(flat)
+    return 1 + max(1, int(np.ceil(turned * facets / (2 * np.pi))))
+
+
+def segment_solids(robot: Robot, body: Body, facets: int = FACETS) -> tuple[Solid, ...]:
+    """Return the silicone of each segment of a shape, base first, a solid each; connectors are none.
+
+    Raises
+    ------
+    InputError
+        As `body_solid`.
+    """
+    made = []
+    for k, (piece, (own, _)) in enumerate(zip(body.pieces, segments_of(robot), strict=True)):
+        radii = {field.name: np.ravel(getattr(piece.radii, field.name)) for field in fields(piece.radii)}
+        for j in range(len(piece.position)):  # for its errors
+            there = SectionRadii(**{name: float(values[j]) for name, values in radii.items()})
+            _silicone(own, replace(piece, radii=there), there.bore, facets)
+        if np.min(advances(piece.position, piece.rotation)) <= 0:
+            raise InputError("a part of this shape has negative length (v_z <= 0), so it is no solid")
+        stations = max(_stations(piece, facets), len(piece.position))
+        axis = resampled(piece, stations)
+        chord = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(piece.position, axis=0), axis=1)))
+        along = {name: np.interp(np.linspace(0, chord[-1], stations), chord, v) for name, v in radii.items()}
+        unit, theta = circle(facets), np.array(own.chamber_angles(), dtype=float)
+        towards = np.column_stack([np.cos(theta), np.sin(theta)])
+        rings = [along["outer"][:, None, None] * unit, along["lumen"][:, None, None] * unit[::-1]]
+        for way in towards:
+            rings.append(along["chamber_circle"][:, None, None] * way + along["bore"][:, None, None] * unit[::-1])
+        loops = [ring[0] / MILLIMETRE for ring in rings]
+        made.append(_solid(f"segment {k + 1}", axis, loops, np.concatenate(rings, axis=1)))
+    fits = [fit_of(piece.position, piece.rotation, float(np.max(piece.radii.outer))) for piece in body.pieces]
+    fits.append(fit_of(body.position, body.rotation, body.radii.outer, np.zeros(len(body.position))))
+    warnings = tuple(dict.fromkeys(warning for fit in fits for warning in fit.warnings))
+    return (replace(made[0], warnings=warnings), *made[1:])
+
+
+def _solid(name: str, axis: Body, loops: list[Array], local: Array, chamber: int | None = None) -> Solid:
+    """Return the solid of a section along an axis. loops : at the base [mm]. local : (stations or 1, n, 2) [m]."""
+    cap = np.asarray(_library("manifold3d").triangulate(loops), dtype=np.int64)
+    points = placed(axis.position[:, None], axis.rotation[:, None], local) / MILLIMETRE
+    n, stations = local.shape[1], len(axis.position)
     starts = [0, *np.cumsum([len(loop) for loop in loops])[:-1]]
     following = np.concatenate([np.roll(np.arange(len(c)), -1) + k for c, k in zip(loops, starts, strict=True)])
     here = np.arange(n) + n * np.arange(stations - 1)[:, None]
@@ -244,7 +286,7 @@ def _glb(solids: Sequence[Solid], robot: Robot) -> bytes:
 
 def _colour(solid: Solid, robot: Robot) -> tuple[float, float, float, float]:
     if solid.chamber is None:
-        return _SILICONE if solid.name == "body" else _LUMEN
+        return _LUMEN if solid.name == "lumen" else _SILICONE
     word = colour(robot.set_of_chamber[solid.chamber])
     r, g, b = (int(word[k : k + 2], 16) / 255 for k in (1, 3, 5))
     return r, g, b, 1.0
