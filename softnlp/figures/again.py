@@ -156,7 +156,9 @@ def _identified_figure(folder: Path, told: Any) -> Figure:
                 for columns, numbers in _observed(row[when]):
                     array[k, columns] = numbers
         pressure = np.array([row["pressure_bar"] for row in rows]) * BAR
-        data.append(Data(robots[label], label, pressure, values["measured"], np.ones(shape), np.ones(len(rows))))
+        of_sensor = np.zeros((len(rows), 9)), np.full(len(rows), nan)  # which is not drawn
+        ones = np.ones(shape), np.ones(len(rows))
+        data.append(Data(robots[label], label, pressure, values["measured"], *of_sensor, *ones))
         for when in models:
             models[when].append(values[when])
     named = [_constant(one["name"]) for one in told["constants"]]

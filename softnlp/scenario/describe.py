@@ -113,7 +113,7 @@ def _registered(name: str) -> str:
     """Return what a key is that several tables have: a dimension, an output, an option of IPOPT."""
     if name in IPOPT_OPTIONS:
         option = IPOPT_OPTIONS[name]
-        tried = (*option.words, 100, 1, 1e-3, option.least)
+        tried = (*option.words, *((100, 1) if option.whole else (1e-8, 60.0, 0.5, 1.5)))
         example = toml_text(next(value for value in tried if option.takes(value)))
         return f"{option.meaning}, {option.expected}; as in {example}"
     if name in RobotTable.model_fields:
