@@ -50,6 +50,18 @@ def test_every_study_becomes_every_other(
         assert f"# [{name}] was not in {source.name}" in target.read_text()
 
 
+@pytest.mark.parametrize(
+    "to", ["blocked-force", "inverse", "workspace", pytest.param("design", marks=pytest.mark.thorough)]
+)
+def test_segments_stay_where_the_study_takes_them(to: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source, target = SHIPPED / "two_segments.toml", tmp_path / "new.toml"
+    assert main(["convert", str(source), "--study", to, "--out", str(target)]) == 0
+    after, told = load_scenario(target), capsys.readouterr().out
+    kept = to != "design"
+    assert ("dropped: [segment]" in told) is not kept
+    assert (after.robot.chamber_sets == load_scenario(source).robot.chamber_sets) is kept
+
+
 def test_comments_and_keys_of_shared_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tmp_path / "x.toml"
     text = (SHIPPED / "blocked/D25L60_weighted.toml").read_text().replace("[robot]", "# mine\n[robot] # here")

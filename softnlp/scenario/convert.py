@@ -8,13 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import tomlkit
-from tomlkit.items import InlineTable, Table
+from tomlkit.items import AoT, InlineTable, Table
 
 from softnlp.base.errors import InputError
-from softnlp.scenario.check import SCHEMAS
+from softnlp.model.robot import robot as library_robot
+from softnlp.model.segments import SegmentedRobot
+from softnlp.scenario.check import SCHEMAS, schema_of
 from softnlp.scenario.read import load_scenario, scenario_from_text
 from softnlp.scenario.schema import ForwardFile
-from softnlp.scenario.template import begun, example_table
+from softnlp.scenario.segments import OF_SEGMENTS
+from softnlp.scenario.template import ROBOT, begun, example_table
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,11 @@ def converted(source: Path, study: str, target: Path, data: str) -> Converted:
     if asked.study == study:
         raise InputError(f"it is of study {study!r} already", source=str(source), key="study")
     document = tomlkit.parse(asked.text)
-    fields, values = SCHEMAS[study].model_fields, begun(study, asked.robot, data)
+    segments = study in OF_SEGMENTS
+    fields = (schema_of(document, study) if segments else SCHEMAS[study]).model_fields
+    made = asked.robot if segments or not isinstance(asked.robot, SegmentedRobot) else library_robot(ROBOT)
+    silicone = asked.material if made is asked.robot else None
+    values = begun(study, made, data, silicone)
     dropped = [name for name in document if name not in fields]
     for name in dropped:
         document.remove(name)
@@ -50,7 +57,8 @@ def converted(source: Path, study: str, target: Path, data: str) -> Converted:
 
     def needed() -> list[str]:
         absent = (name for name in values if name not in document)
-        return [name for name in absent if name not in ForwardFile.model_fields or fields[name].is_required()]
+        known = (name for name in absent if name in fields)
+        return [name for name in known if name not in ForwardFile.model_fields or fields[name].is_required()]
 
     missing = needed() if any(f.is_required() and name not in document for name, f in fields.items()) else []
 
@@ -58,7 +66,7 @@ def converted(source: Path, study: str, target: Path, data: str) -> Converted:
         parts = [tomlkit.dumps(document).rstrip()]
         for name in missing:
             note = f"# [{name}] was not in {source.name}: this is an example, put your own in its place."
-            parts.append(f"{note}\n{example_table(study, name, asked.robot, data)}")
+            parts.append(f"{note}\n{example_table(study, name, values, made)}")
         return "\n\n".join(parts) + "\n"
 
     while (error := _mistake(text(), source, missing)) is not None:
@@ -67,8 +75,8 @@ def converted(source: Path, study: str, target: Path, data: str) -> Converted:
         if isinstance(found, Table | InlineTable) and key in found:
             found.remove(key)
             dropped.append(f"[{table}] {key}")
-        elif table in values and table not in document and not missing:
-            missing = needed()
+        elif table in values and table not in document and table not in missing:
+            missing = [name for name in values if name in (*missing, *needed(), table)]
         else:
             raise error
     _move_files(document, source.parent, target.parent)
@@ -80,21 +88,25 @@ def _mistake(text: str, path: Path, filled: list[str]) -> InputError | None:
     try:
         scenario_from_text(text, path)
     except InputError as error:
-        return next((one for one in error.every or (error,) if one.table not in filled), None)
+        every = error.every or (error,)
+        return next((one for one in every if one.table not in filled or "no such file" not in one.message), None)
     return None
 
 
-def _move_files(document: Any, source: Path, target: Path) -> None:
-    """Name the files of a scenario from another folder."""
+def _move_files(table: Any, source: Path, target: Path) -> None:
+    """Name the files of a scenario, in any of its tables, from another folder."""
     if source.resolve() == target.resolve():
         return
 
     def moved(name: Any) -> Any:
         return Path(os.path.relpath(source / name, target)).as_posix() if isinstance(name, str) else name
 
-    for table in document.values():
-        if isinstance(table, Table | InlineTable):
-            if "file" in table:
-                table["file"] = moved(table["file"])
-            if isinstance(table.get("files"), list):
-                table["files"] = [moved(name) for name in table["files"]]
+    for key, value in table.items():
+        if key == "file":
+            table[key] = moved(value)
+        elif key == "files" and isinstance(value, list):
+            table[key] = [moved(name) for name in value]
+        else:
+            for inner in value if isinstance(value, AoT) else (value,):
+                if isinstance(inner, Table | InlineTable):
+                    _move_files(inner, source, target)

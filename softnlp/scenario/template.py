@@ -8,11 +8,13 @@ from typing import Any
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.files import toml_key, toml_text
 from softnlp.base.units import BAR, MILLIMETRE
+from softnlp.model.materials import Material, material
 from softnlp.model.robot import DIMENSIONS, Robot, robot
+from softnlp.model.segments import SegmentedRobot
 from softnlp.scenario.check import SCHEMAS
 from softnlp.scenario.describe import Key, about, keys_of
 
-SILICONE, LAW = "Ecoflex 00-50", "mooney-rivlin"
+ROBOT, SILICONE, LAW = "D25L60", "Ecoflex 00-50", "mooney-rivlin"
 MEASURED = "measured_angles.csv"
 """The data that a scenario of `identify` begins with: those of the package."""
 
@@ -20,7 +22,7 @@ _WIDTH = 36  # of a key and its value, before the comment
 _POSE = (0.3, 0.1, 0.2)  # whose tip is the target of an example [bar]
 
 
-def template(study: str, name: str = "D25L60", data: str = MEASURED) -> str:
+def template(study: str, name: str = ROBOT, data: str = MEASURED) -> str:
     """Return a scenario of a study that runs as it is; what is optional is commented out.
 
     name : of a robot of the library. data : the file that `identify` reads.
@@ -46,10 +48,10 @@ def template(study: str, name: str = "D25L60", data: str = MEASURED) -> str:
     return "\n".join(lines) + "\n"
 
 
-def example_table(study: str, table: str, made: Robot, data: str) -> str:
-    """Return one table of `template`."""
+def example_table(study: str, table: str, values: Mapping[str, Any], made: Robot) -> str:
+    """Return one table of `template`; values : of `begun`."""
     key = next(key for key in keys_of(SCHEMAS[study]) if key.name == table)
-    return "\n".join(table_lines(key, begun(study, made, data)[table], examples(made)))
+    return "\n".join(table_lines(key, values[table], examples(made)))
 
 
 def examples(made: Robot) -> dict[str, str]:
@@ -95,28 +97,33 @@ def _line(text: str, comment: str) -> str:
     return f"{text.ljust(_WIDTH)}  # {comment}" if comment else text
 
 
-def begun(study: str, made: Robot, data: str) -> dict[str, Any]:
-    """Return the values of the tables that a scenario of a study begins with."""
-    return {"robot": {"name": made.name}, "material": {"name": SILICONE, "model": LAW}, **_BEGUN[study](made, data)}
+def begun(study: str, made: Robot, data: str, silicone: Material | None = None) -> dict[str, Any]:
+    """Return the values of the tables that a scenario of a study begins with; silicone : None is that of `template`."""
+    own = {"robot": {"name": made.name}, "material": {"name": SILICONE, "model": LAW}}
+    return {**own, **_BEGUN[study](made, data, silicone or material(SILICONE, LAW))}
 
 
-def _forward(made: Robot, data: str) -> dict[str, Any]:
+def _forward(made: Robot, data: str, silicone: Material) -> dict[str, Any]:
     return {"pressure": {"ramp": {"sets": [1], "to_bar": 0.5, "steps": 6}}}
 
 
-def _inverse(made: Robot, data: str) -> dict[str, Any]:
+def _blocked(made: Robot, data: str, silicone: Material) -> dict[str, Any]:
+    contact = {"offset_mm": 0.0} | ({"closure": "free"} if isinstance(made, SegmentedRobot) else {})
+    return {**_forward(made, data, silicone), "contact": contact}
+
+
+def _inverse(made: Robot, data: str, silicone: Material) -> dict[str, Any]:
     """Take for the target where the tip of this robot goes, so that it is within reach."""
-    from softnlp.model.materials import material
     from softnlp.studies.forward import forward
 
     pressure = [(_POSE * made.chamber_sets)[k] * BAR for k in range(made.chamber_sets)]
-    pose = forward(made, material(SILICONE, LAW), [pressure]).steps[0].pose
+    pose = forward(made, silicone, [pressure]).steps[0].pose
     assert pose is not None
     tip = [round(float(x) / MILLIMETRE, 1) + 0.0 for x in pose.tip_position]
     return {"target": {"tip_position_mm": [tip]}, "bounds": {"pressure_bar": [0.0, 1.5]}}
 
 
-def _identify(made: Robot, data: str) -> dict[str, Any]:
+def _identify(made: Robot, data: str, silicone: Material) -> dict[str, Any]:
     return {
         "stiffening": {"set": "calibrated"},
         "measurements": {"file": data, "free": ["k_e", "k_b", "phi"]},
@@ -124,7 +131,7 @@ def _identify(made: Robot, data: str) -> dict[str, Any]:
     }
 
 
-def _design(made: Robot, data: str) -> dict[str, Any]:
+def _design(made: Robot, data: str, silicone: Material) -> dict[str, Any]:
     length = round(made.length / MILLIMETRE, 6)
     return {
         "choices": {"robot": {"length_mm": [0.8 * length, length]}, "material": {"name": [SILICONE, "Ecoflex 00-30"]}},
@@ -134,10 +141,10 @@ def _design(made: Robot, data: str) -> dict[str, Any]:
     }
 
 
-_BEGUN: Mapping[str, Callable[[Robot, str], dict[str, Any]]] = {
+_BEGUN: Mapping[str, Callable[[Robot, str, Material], dict[str, Any]]] = {
     "forward": _forward,
-    "blocked-force": lambda made, data: {**_forward(made, data), "contact": {"offset_mm": 0.0}},
-    "workspace": lambda made, data: {"workspace": {"levels": 4, "to_bar": 0.5}},
+    "blocked-force": _blocked,
+    "workspace": lambda made, data, silicone: {"workspace": {"levels": 4, "to_bar": 0.5}},
     "inverse": _inverse,
     "identify": _identify,
     "design": _design,
