@@ -156,7 +156,9 @@ def _identified_figure(folder: Path, told: Any) -> Figure:
                 for columns, numbers in _observed(row[when]):
                     array[k, columns] = numbers
         pressure = np.array([row["pressure_bar"] for row in rows]) * BAR
-        data.append(Data(robots[label], label, pressure, values["measured"], np.ones(shape), np.ones(len(rows))))
+        nothing = {"axes": np.full((len(rows), 9), nan), "whole": np.full(len(rows), nan)}  # what is drawn needs none
+        given = {"sigma": np.ones(shape), "root_weight": np.ones(len(rows))}
+        data.append(Data(robots[label], label, pressure, values["measured"], **nothing, **given))
         for when in models:
             models[when].append(values[when])
     named = [_constant(one["name"]) for one in told["constants"]]
