@@ -29,6 +29,7 @@ from softnlp.model.laws import LAWS
 from softnlp.scenario.check import SCHEMAS
 from softnlp.scenario.read import scenario_from_text
 from softnlp.scenario.schema import BlockedForceFile, OffsetRampTable, RampTable
+from softnlp.scenario.segments import SegmentTable
 
 ROOT = Path(__file__).parents[1]
 README, SCENARIO, MODEL = ROOT / "README.md", ROOT / "docs" / "scenario.md", ROOT / "docs" / "model.md"
@@ -104,7 +105,7 @@ def test_an_example_of_the_documents_runs(example: Example, capsys: pytest.Captu
 def test_every_kind_of_example_was_found() -> None:
     text = README.read_text() + SCENARIO.read_text()
     kinds = re.findall(r"^```(\w+)$", text, re.MULTILINE)
-    assert {kind: kinds.count(kind) for kind in set(kinds)} == {"bash": 3, "python": 1, "toml": 4, "csv": 1, "json": 1}
+    assert {kind: kinds.count(kind) for kind in set(kinds)} == {"bash": 3, "python": 1, "toml": 6, "csv": 1, "json": 1}
     assert len(EXAMPLES) == len(kinds)
 
 
@@ -134,6 +135,7 @@ def tables(model: type[BaseModel]) -> Iterator[tuple[str, type[BaseModel]]]:
 
 def keys_of_tables() -> set[str]:
     found = {key for _, table in tables(BlockedForceFile) for key in table.model_fields}
+    found |= set(SegmentTable.model_fields) - {"robot", "material"}
     return found | set(IPOPT_OPTIONS) | set(RampTable.model_fields) | set(OffsetRampTable.model_fields)
 
 

@@ -103,7 +103,7 @@ def test_every_option_is_documented(capsys: pytest.CaptureFixture[str]) -> None:
     from softnlp.cli import main
 
     assert main(["sweep", "--help"]) == 0
-    options = set(re.findall(r"--[a-z]+", capsys.readouterr().out)) - {"--help", "--version"}
+    options = set(re.findall(r"--[a-z][a-z-]+", capsys.readouterr().out)) - {"--help", "--version"}
     assert options >= {"--out", "--workers", "--cluster", "--resume", "--csv"}
     assert options <= CODE
 

@@ -7,11 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from softnlp.base.errors import InputError
+from softnlp.base.reading import did_you_mean
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, say
 from softnlp.cli.figures import draw
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+_DRAWN = ("section", "material", "run")  # in place of a folder
 
 
 def plot_section(robot: str, /, *, stretch: float = 1.0, segment: int | None = None, out: Path | None = None) -> int:
@@ -110,6 +113,8 @@ def plot_folder(results: Path, /, *, out: Path | None = None, format: Literal["p
     from softnlp.base.files import make_folder
     from softnlp.figures.again import folder_figures
 
+    if not results.exists() and (meant := did_you_mean(str(results), _DRAWN)):
+        raise InputError(f"nothing to draw: there is no such folder{meant}", source=str(results))
     makers = folder_figures(results)
     to = results if out is None else make_folder(out)
     written = draw({to / f"{name}.{format}": figure for name, figure in makers.items()}, results)
