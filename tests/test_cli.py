@@ -385,7 +385,7 @@ def test_an_output_without_these_letters_gets_question_marks() -> None:
 def interrupt_after(steps: int, monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Press Ctrl-C when so many steps are done; return the counts that the progress bar was told."""
     seen: list[int] = []
-    bar = console._bar
+    bar = console.progress_bar
 
     @contextmanager
     def pressing(total: int, title: str) -> Any:
@@ -399,7 +399,7 @@ def interrupt_after(steps: int, monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
             yield press, describe
 
-    monkeypatch.setattr(console, "_bar", pressing)
+    monkeypatch.setattr(console, "progress_bar", pressing)
     return seen
 
 
