@@ -630,7 +630,7 @@ def test_columns_that_differ_by_case_unit_or_a_letter_are_told(tmp_path: Path) -
     assert pairs == [
         "'Tip_X_mm' is not read; did you mean 'x_mm'?",
         "'tip_y_mn' is not read; did you mean 'y_mm'?",
-        "'elongation_m' is not read; write elongation_mm = 1000?",
+        "'elongation_m' is not read; did you mean 'elongation_mm'?",
         "'Weight' is not read; did you mean 'weight'?",
     ]
     assert task.measurements[0].tip_position[0][2] == pytest.approx(0.055)  # as results spell it
