@@ -228,6 +228,35 @@ class Contact:
 
 
 @dataclass(frozen=True, eq=False)
+class ObstacleContact:
+    """One obstacle and what it does to the robot in one step, world frame.
+
+    Attributes
+    ----------
+    obstacle
+        Its name.
+    force
+        (3,) on the robot, of all points where it touches [N].
+    start, end
+        The first and the last of these points, fractions of the length, None where it does not touch [1].
+    gap
+        Least distance to the body, negative where they overlap between nodes [m].
+    arc
+        (n,) where it touches, fractions of the length [1].
+    forces
+        (n, 3) on the robot there [N].
+    """
+
+    obstacle: str
+    force: Array
+    start: float | None
+    end: float | None
+    gap: float
+    arc: Array
+    forces: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Aimed:
     """A target of inverse kinematics and how near the tip comes to it at the step's pressure, world frame.
 
@@ -306,6 +335,10 @@ class Step:
         What IPOPT said, None where it took no part.
     deviation
         Where uncertainties were given, else None.
+    contacts
+        Of obstacles, one each.
+    complementarity
+        Sum of what each contact pushes with times its gap, None without obstacles [N m].
     """
 
     pressure: Array
@@ -325,6 +358,8 @@ class Step:
     engine: str | None = None
     ipopt: Ipopt | None = None
     deviation: Deviation | None = None
+    contacts: tuple[ObstacleContact, ...] = ()
+    complementarity: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
