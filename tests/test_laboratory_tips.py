@@ -11,6 +11,7 @@ from laboratory_files import FOLDER, TRUTH, check_of, imported
 from scipy.spatial.transform import Rotation
 
 from softnlp.laboratory.choices import AskError
+from softnlp.laboratory.poses import motion_axis
 from softnlp.laboratory.signals import lag_between, plateaus
 
 EM = TRUTH["tracker_em_two_sensors.csv"]
@@ -231,6 +232,10 @@ def test_a_robot_that_is_not_along_z_is_named(tip: np.ndarray, up: str, turn: fl
         again = imported(str(tmp_path / "tips.csv"), up=up)
         assert [check_of(again, name).verdict for name in names] == ["passed"] * 2
         np.testing.assert_allclose(tips(again), tip, atol=0.2)
+
+
+def test_two_tips_tell_no_axis() -> None:
+    assert motion_axis(np.array([[0.0, 0.0, 0.06], [0.02, 0.0, 0.05]]), np.array([0.0, 0.0, 0.06])) is None
 
 
 def test_a_robot_that_only_grows_longer_is_not_turned_round(tmp_path: Path) -> None:

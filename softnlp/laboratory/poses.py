@@ -305,6 +305,8 @@ def motion_axis(position: Array, rest: Array) -> tuple[Array, bool] | None:
     Tips that bend all around lie on a cap, thin along the robot, which rises towards the rest tip; those of one plane
     tell its normal, which the robot is across. None where they tell neither.
     """
+    if len(position) < 3:
+        return None
     centred = position - position.mean(axis=0)
     _, size, axes = np.linalg.svd(centred, full_matrices=False)
     size = size / max(size[0], 1e-30)

@@ -13,7 +13,7 @@ from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.clock import day_start
 from softnlp.laboratory.imported import ANY, require_possible
 from softnlp.laboratory.pressure import lag_check, pressures_of
-from softnlp.laboratory.signals import changes, explained, lag_between, plateaus
+from softnlp.laboratory.signals import Commands, changes, explained, lag_between, plateaus
 from softnlp.laboratory.table import RawTable
 from softnlp.studies.check import Check
 
@@ -41,7 +41,7 @@ def with_pressures(
     time = columns["t_s"]
     lag, error = choices.number("lag_s", -1e9), 0.0
     if lag is not None:
-        quality = explained(time, response, command_time - lag, pressures)
+        quality = explained(time, response, Commands(command_time, pressures), lag)
     else:
         lag, error, quality = lag_between(time, response, command_time, pressures)
         if quality < _SURE:

@@ -40,6 +40,7 @@ _NOTHING = 1e-30  # [Pa], in place of a stress of 0
 _STIFF = 2.0  # times the stiffest silicone of the library
 _SAME = 0.02  # relative, of areas
 _SLACKEST, _TRIED, _CLEARLY = 0.6, 61, 20.0  # of the extension; how many are tried; F of one that is seen
+_MOST = 2000  # points by which slack is looked for
 _TURN, _RESTART = 0.2, 0.1  # of the range of the stretch: the least fall; how near to its end another test starts
 _READINGS = (
     (1e6, "stress in Pa (name its column stress_Pa), or a specimen's width and thickness in m"),
@@ -279,7 +280,8 @@ def _slack(stretch: Array, stress: Array) -> list[Check]:
     low = (stretch > 0.8) & (stretch <= 2)
     if np.sum(low) < _FEWEST or not _from_1(stretch):
         return []
-    x, y = stretch[low], stress[low]
+    thin = slice(None, None, 1 + int(np.sum(low)) // _MOST)
+    x, y = stretch[low][thin], stress[low][thin]
     extension = float(np.max(x)) - 1
 
     def misfit(slack: float) -> float:
