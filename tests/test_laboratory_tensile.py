@@ -138,6 +138,22 @@ def test_a_setting_against_the_file_is_not_silent(tmp_path: Path) -> None:
     assert imported(file, unit__Load="mN", accept="shear-modulus-of-the-data").columns["stress_MPa"][-1] < 1e-4
 
 
+def test_a_crosshead_is_not_taken_before_an_extensometer(tmp_path: Path) -> None:
+    rows = np.column_stack([26 * (STRETCH - 1), STRETCH - 1, 8 * STRESS])
+    assert modulus(file=machine(tmp_path, "Crosshead,Extensometer,Load\nmm,mm/mm,N", rows), **SPECIMEN) == (
+        pytest.approx(0.03, rel=1e-3)
+    )
+
+
+@pytest.mark.parametrize(
+    ("moved", "message"), [(25 * (1 - STRETCH), "the stretch only falls"), (25 * STRETCH + 80, "looks like a slack")]
+)
+def test_a_position_that_is_no_extension_is_named(moved: np.ndarray, message: str, tmp_path: Path) -> None:
+    file = machine(tmp_path, "Position (mm),Load (N)", np.column_stack([moved, 8 * STRESS]))
+    with pytest.raises(InputError, match=message):
+        imported(file, **SPECIMEN)
+
+
 def test_two_lengths_are_asked_for(tmp_path: Path) -> None:
     preamble = "Grip to grip separation (mm),50\nGauge length (mm),25\n"
     rows = np.column_stack([50 * (STRETCH - 1), 8 * STRESS])
@@ -296,6 +312,12 @@ def test_legs_and_breaks() -> None:
         ("Strain (%),Stress (kgf/cm2)", (100, 1 / 8 / 0.0980665), {}),
         ("Hencky strain (1),Stress (true) (MPa)", (None, None), {}),
         ("Stretch (%),Stress (kPa)", (0, 1e3 / 8), {}),
+        ("Extensometer (%),Load (N)", (100, 1), {}),
+        ("Nominelle Dehnung,Kraft\nmm,N", (25, 1), {"gauge_length_mm": 25}),
+        ("Distance (mm),Force (gf)", (25, 1e3 / 9.80665), {"gauge_length_mm": 25}),
+        ("Déplacement (mm),Force (N)", (25, 1), {"gauge_length_mm": 25}),
+        ("Desplazamiento (mm),Fuerza (N)", (25, 1), {"gauge_length_mm": 25}),
+        ("Allungamento [mm],Carico [N]", (25, 1), {"gauge_length_mm": 25}),
     ],
 )
 def test_units_of_machines(
@@ -341,6 +363,7 @@ def test_columns_that_are_not_used_are_named(tmp_path: Path) -> None:
         ("eps,sig (MPa)", "do not tell what it is; say --as tensile, pressure, tips, force"),
         ("Extension (mm),Load (N),p1 (bar)", "could be tensile or pressure; say --as"),
         ("x_mm,y_mm,z_mm,Fx (N),Fy (N),Fz (N)", "could be tips or force; say --as"),
+        ("lambda,P (MPa)", "could be tensile or pressure; say --as"),
     ],
 )
 def test_kinds_that_are_both_possible_are_asked_for(header: str, message: str, tmp_path: Path) -> None:

@@ -238,6 +238,21 @@ def test_two_tips_tell_no_axis() -> None:
     assert motion_axis(np.array([[0.0, 0.0, 0.06], [0.02, 0.0, 0.05]]), np.array([0.0, 0.0, 0.06])) is None
 
 
+@pytest.mark.parametrize(
+    ("name", "first", "step"),
+    [("ms", 0.0, 50.0), ("Unix Time", 1.74e9, 0.05), ("Time", 45720.0, 0.05 / 86400), ("Temps (s)", 0.0, 0.05)],
+)
+def test_clocks_have_many_names_and_counts(name: str, first: float, step: float, tmp_path: Path) -> None:
+    file = log_file(tmp_path, [f"{first + k * step:.15g}" for k in range(100)], name, LOG + 373)
+    time = np.genfromtxt(imported(file).csv().splitlines(), delimiter=",", names=True)["t_s"]
+    np.testing.assert_allclose(time - time[0], 0.05 * np.arange(100), atol=2e-4)
+
+
+def test_a_small_level_at_rest_is_warned_of(tmp_path: Path) -> None:
+    found = imported(log_file(tmp_path, [f"{k / 10}" for k in range(100)], "Time (s)", LOG - 580))
+    assert check_of(found, "level at which all sets rest").verdict == "warned"
+
+
 def test_a_robot_that_only_grows_longer_is_not_turned_round(tmp_path: Path) -> None:
     p = np.random.default_rng(0).uniform(0, 1, (300, 3)) * (np.arange(300) > 0)[:, None]
     rows = np.column_stack([20 * p[:, 0] - 10 * (p[:, 1] + p[:, 2]), 17 * (p[:, 1] - p[:, 2]), 60 + p.sum(axis=1)])

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 _POSITION = re.compile(r"^(?:tip[ _.]?|pos(?:ition)?[ _.]?|t|p)?([xyz])(?:[ _.]?(\w{1,12}))?$", re.IGNORECASE)
 _TURN = r"q(?:uat(?:ernion)?)?|rotation|orientation"
-_QUATERNION = re.compile(rf"^(?:{_TURN})[ _.]?([ow0-4xyzrs])(?:[ _.]?(\w{{1,12}}))?$", re.IGNORECASE)
+_QUATERNION = re.compile(rf"^(?:{_TURN})[ _.:/]?([ow0-4xyzrs])(?:[ _.]?(\w{{1,12}}))?$", re.IGNORECASE)
 _PREFIXED = re.compile(
     rf"^(.+?)[ _.:/]+(?:pos(?:ition)?[ _.:/]+)?(t?[xyz]|q[ow0-4xyz]|(?:{_TURN})[ _.:/][wxyz])$", re.IGNORECASE
 )

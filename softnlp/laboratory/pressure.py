@@ -26,7 +26,7 @@ _NAMES = r"^(p|pressure|press|druck|ch|chamber|valve|actuator|sensor)[ _#-]?\(?(
 _WORDS = r"(?<!com)press|(?<![a-z])druck|chamber|valve|actuator|supply|regulator|^p\b|^p_|^ch"
 _COMMAND = r"set ?point|set|command|cmd|soll|target|desired|ref"
 _ATMOSPHERE = (0.85, 1.08)  # [bar]: of the air where people live
-_AT_REST = 0.1  # [bar]: sets that rest at more than this, all of them, are hardly at 0
+_AT_REST = (0.05, 0.1)  # [bar]: sets that rest at more, all of them, are hardly at 0; are not
 _HIGHEST = 6.0  # [bar]: what drives no silicone robot
 _UNITS = ("mbar", "kPa", "bar", "psi", "Pa")
 
@@ -221,16 +221,15 @@ def _gauge(values: Array, choices: Choices) -> Array:
 def _rest_check(gauge: Array, choices: Choices) -> Check:
     """Return the check of the level at which all sets rest [bar], which is that of the air, so 0 where it is gauge."""
     level = float(np.min(np.nanpercentile(gauge, 5, axis=0)))
-    usual = (-_AT_REST, _AT_REST)
-    asked = choices.used.get("zero")
-    if asked == "gauge":  # a person knows that none of them goes to 0
-        usual = (-_AT_REST, max(_AT_REST, level))
+    usual, most = _AT_REST
+    if choices.used.get("zero") == "gauge":  # a person knows that none of them goes to 0
+        usual = most = max(usual, level)
     likely = (
         "neither 0, as a gauge shows at rest, nor the pressure of the air: --set zero=absolute where the air has so "
         f"little, high up; zero=tare, or zero={level:.4g}, where a sensor or regulator rests there; zero=gauge where "
         "no set goes to 0"
     )
-    return Check("level at which all sets rest", level, usual, (-np.inf, usual[1]), likely, "bar")
+    return Check("level at which all sets rest", level, (-usual, usual), (-np.inf, most), likely, "bar")
 
 
 def lag_check(lag: float) -> Check:

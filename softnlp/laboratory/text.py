@@ -14,6 +14,7 @@ from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
+from sys import intern
 from typing import Any
 
 import numpy as np
@@ -287,7 +288,7 @@ def _columns(
                 pieces[k].append(values)
                 wrong += bad
             else:
-                pieces[k].append([cell.strip() for cell in column])
+                pieces[k].append([intern(cell.strip()) for cell in column])  # each word of a state once
     choices.drop(notes, "rows of text between the numbers")
     choices.drop(wrong, "cells that are no number")
     return pieces, later
