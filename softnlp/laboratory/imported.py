@@ -48,7 +48,7 @@ class Imported:
         return tuple(told(check) for check in self.checks if check.verdict == "warned")
 
     def csv(self) -> str:
-        """Return the columns as the project's CSV; a number has ten digits, one of a clock of seconds since 1970 more."""
+        """Return the columns as the project's CSV; a number has ten digits, seconds since 1970 have more."""
         table = np.column_stack(list(self.columns.values()))
         form = ",".join("%.15g" if size > 1e6 else "%.10g" for size in np.nanmax(np.abs(table), axis=0))
         parts = [",".join(self.columns)]
