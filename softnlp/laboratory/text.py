@@ -31,6 +31,7 @@ _LONGEST_LINE = 1_000_000
 _SAMPLE_LINES, _SAMPLE = 600, 400_000
 _CHUNK = 20_000
 _PREAMBLE = 200  # lines above a repeated header
+_MOST_ROWS = 10_000_000
 _NEARLY = 0.9  # of the best score: another reading that is as likely
 _WHITE = 0.9  # of the score of a reading by spaces, which text has too
 
@@ -113,6 +114,8 @@ def text_table(label: str, content: bytes, choices: Choices) -> RawTable:
         For binary data, a line or a row that is too long, or no rows of numbers.
     """
     encoding = encoding_of(content, choices)
+    if max(content.count(b"\n"), content.count(b"\r")) > _MOST_ROWS:
+        raise InputError(f"expected at most {_MOST_ROWS} rows, got more; thin them, or cut the file")
     lines = _sample(content, encoding)
     block = _decided(lines, choices)
     choices.note("separator", SEPARATORS[block.dialect.separator])
@@ -212,8 +215,7 @@ def _blocks(lines: Sequence[Sequence[str]], dialect: Dialect) -> Iterator[Block]
     run: list[tuple[int, tuple[str, ...]]] = []
     best: list[tuple[int, tuple[str, ...]]] = []
     for k, row in enumerate([*map(tuple, lines), ("end",)]):
-        while row and not row[-1]:
-            row = row[:-1]
+        row = row[: len(row) - next((j for j, cell in enumerate(reversed(row)) if cell), len(row))]
         if not row:
             continue
         if len(row) > MOST_COLUMNS:
@@ -345,7 +347,10 @@ def _rows(file: io.TextIOWrapper, block: Block) -> Iterator[list[str]]:
         return
     reader = csv.reader(lines, delimiter=block.dialect.separator, skipinitialspace=True)
     try:
-        yield from reader
+        for row in reader:
+            if len(row) > MOST_COLUMNS + 1:
+                raise InputError(f"expected at most {MOST_COLUMNS} columns, got a row of {len(row)}")
+            yield row
     except csv.Error as error:
         raise InputError(f"line {block.first + reader.line_num}: {one_line(str(error))}") from None
 
