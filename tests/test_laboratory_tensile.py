@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 from laboratory_files import FOLDER, SPECIMEN, check_of, imported
 
+from softnlp import material, run_scenario
 from softnlp.base.errors import InputError
 from softnlp.cli import main
+from softnlp.cli.example import shipped_folder
 from softnlp.laboratory.choices import AskError, settings_from_words
 from softnlp.laboratory.signals import break_row, legs
+from softnlp.scenario.read import load_scenario
 
 
 def modulus(**settings: object) -> float:
@@ -370,6 +373,15 @@ def test_kinds_that_are_both_possible_are_asked_for(header: str, message: str, t
     rows = np.column_stack([STRETCH] * len(header.split(",")))
     with pytest.raises(AskError, match=message):
         imported(machine(tmp_path, header, rows))
+
+
+def test_the_shipped_file_of_a_machine_gives_the_silicone_that_it_was_made_with() -> None:
+    fit = run_scenario(load_scenario(shipped_folder() / "identify" / "machine_test.toml"))
+    assert len(fit.stretch) == 33  # the first of three cycles
+    assert fit.fits["mooney-rivlin"].misfit.rmse == pytest.approx(200, rel=0.3)  # the noise [Pa]
+    stretch = np.linspace(1, 1.8, 9)
+    found, true = fit.fits["mooney-rivlin"].material, material("Ecoflex 00-50")
+    np.testing.assert_allclose(found.engineering_stress(stretch), true.engineering_stress(stretch), atol=200)
 
 
 def test_a_law_that_does_not_follow_the_data_is_warned_of(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -13,8 +13,11 @@ import pytest
 from laboratory_files import FOLDER, TRUTH
 from scipy.spatial.transform import Rotation
 
+from benchmarks.identify_data import BASE, OFFSET
 from softnlp import BAR, Coefficients, Loads, Measurements, Numerics, compare, forward, identify, material, robot
+from softnlp import run_scenario as run
 from softnlp.base.errors import InputError
+from softnlp.cli.example import shipped_folder
 from softnlp.results.comparison import comparison_document, rows_text
 from softnlp.scenario.compare import compare_task, run_compare
 from softnlp.scenario.read import load_scenario
@@ -131,6 +134,13 @@ def test_frame_place_and_constants_are_found_together() -> None:
     R = Rotation.from_euler("ZYX", truth["euler_ZYX_deg"], degrees=True)
     assert (R.inv() * Rotation.from_matrix(fit.registration.rotation)).magnitude() < np.deg2rad(1)
     assert fit.ipopt is not None  # it closed the joint problem
+
+
+def test_the_shipped_files_of_a_tracker_and_a_logger_give_what_they_were_made_with() -> None:
+    fit = run(load_scenario(shipped_folder() / "identify" / "tracked_tips.toml"))
+    errors = fit.uncertainty.standard_errors
+    assert np.all(np.abs(fit.constants[:2] - [0.55, 2.2]) < 2 * errors[:2])
+    assert np.all(np.abs(1e3 * (fit.constants[5:11]) - [*BASE[1], *OFFSET]) < 2 * 1e3 * errors[5:11])
 
 
 def test_the_same_rows_ten_times_change_nothing() -> None:
