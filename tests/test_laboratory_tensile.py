@@ -13,8 +13,9 @@ from softnlp.base.errors import InputError
 from softnlp.cli import main
 from softnlp.cli.example import shipped_folder
 from softnlp.laboratory.choices import AskError, settings_from_words
-from softnlp.laboratory.signals import break_row, legs
+from softnlp.laboratory.signals import break_row
 from softnlp.scenario.read import load_scenario
+from softnlp.studies.cycles import legs
 
 
 def modulus(**settings: object) -> float:

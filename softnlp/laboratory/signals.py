@@ -1,10 +1,9 @@
-"""Signals of any kind: load cycles, the break, static plateaus, and the lag between two clocks."""
+"""Signals of any kind: the break of a specimen, static plateaus, and the lag between two clocks."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,39 +11,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
-_TURN = 0.1  # of the range: a smaller fall is noise and no turn
 _BROKEN = 0.5  # of the largest stress: what is left of it after a break
 _HELD, _RELAXED = 2e-3, 0.02  # of the range of the stretch, and of the largest stress
 _TRIED_ON = 4000  # samples on which a lag is looked for first
 _CHANGED = 0.05  # of the range: a step between two plateaus
 _NOISE = 6.0  # standard deviations of the change between samples
-
-
-class Leg(NamedTuple):
-    """Rows first to before `end` over which a quantity rises, or falls."""
-
-    first: int
-    end: int
-    rising: bool
-
-
-def legs(values: Array) -> list[Leg]:
-    """Return the loadings and unloadings of a test, by the turns that are larger than a tenth of its range."""
-    span = float(np.ptp(values)) * _TURN
-    found: list[Leg] = []
-    first = turn = 0
-    rising: bool | None = None
-    for k, value in enumerate(values):
-        if rising is None:
-            if abs(value - values[first]) > span:
-                rising, turn = bool(value > values[first]), k
-        elif (value >= values[turn]) == rising or value == values[turn]:
-            turn = k if value != values[turn] else turn
-        elif abs(value - values[turn]) > span:
-            found.append(Leg(first, turn + 1, rising))
-            first, rising, turn = turn, not rising, k
-    found.append(Leg(first, len(values), True if rising is None else rising))
-    return found
 
 
 def break_row(stress: Array) -> int:

@@ -13,10 +13,11 @@ from softnlp.base.reading import shown
 from softnlp.base.units import MEGAPASCAL
 from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.imported import ANY, Imported, require_possible
-from softnlp.laboratory.signals import Leg, break_row, enclosed_area, legs, relaxing
+from softnlp.laboratory.signals import break_row, enclosed_area, relaxing
 from softnlp.laboratory.specimen import ACROSS, ALONG, STRETCH, Curve, curve_of, specimens
 from softnlp.laboratory.table import RawTable
 from softnlp.studies.check import Check
+from softnlp.studies.cycles import Leg, legs
 from softnlp.studies.plausibility import curve_checks, stiffness_checks
 
 Array = NDArray[np.float64]

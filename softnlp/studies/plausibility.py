@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from softnlp.base.units import MEGAPASCAL
 from softnlp.model.materials import load_materials
 from softnlp.studies.check import Check, Range, messages
+from softnlp.studies.cycles import unloadings
 
 Array = NDArray[np.float64]
 
@@ -41,7 +42,6 @@ _STIFF = 2.0  # times the stiffest silicone of the library
 _SAME = 0.02  # relative, of areas
 _SLACKEST, _TRIED, _CLEARLY = 0.6, 61, 20.0  # of the extension; how many are tried; F of one that is seen
 _MOST = 2000  # points by which slack is looked for
-_TURN, _RESTART = 0.2, 0.1  # of the range of the stretch: the least fall; how near to its end another test starts
 _READINGS = (
     (1e6, "stress in Pa (name its column stress_Pa), or a specimen's width and thickness in m"),
     (1e3, "stress in kPa (name its column stress_kPa), or force in mN"),
@@ -89,7 +89,7 @@ def curve_checks(stretch: Array, stress: Array, read: Sequence[Check] = ()) -> t
         ),
         Check(
             "number of unloadings",
-            _unloadings(stretch),
+            unloadings(stretch),
             *UNLOADINGS,
             "looks like several load cycles, whose loading and unloading differ; keep one loading of each specimen",
         ),
@@ -329,18 +329,3 @@ def _growth(stretch: Array, stress: Array) -> list[Check]:
         )
     usual = GROWTH[0][0] - more, GROWTH[0][1] + more
     return [Check(_GROWS, value, usual, GROWTH[1], likely)]
-
-
-def _unloadings(stretch: Array) -> int:
-    """Return how often the stretch falls point by point; a jump back to the start is another test."""
-    span, lowest = float(np.ptp(stretch)), float(np.min(stretch))
-    count, falling, turn = 0, False, 0
-    for k, now in enumerate(stretch):
-        change = now - stretch[turn]
-        if change * (-1 if falling else 1) >= 0:
-            turn = k
-        elif abs(change) > _TURN * span:
-            restart = k == turn + 1 and now <= lowest + _RESTART * span
-            falling, count = not falling and not restart, count + (not falling and not restart)
-            turn = k
-    return count
