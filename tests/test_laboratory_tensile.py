@@ -262,6 +262,7 @@ def test_a_wrong_reading_is_stopped_by_name(name: str, tmp_path: Path) -> None:
         ("true", "true stress"),
         ("cycles", "several load cycles"),
         ("failure", "the points after the break is 5"),
+        ("up to failure", "the largest stretch is 8.84, expected 1.1 to 3: the whole test, perhaps to failure"),
         ("area", "left at 1"),
         ("area alone", "left at 1"),
     ],
@@ -275,6 +276,7 @@ def test_a_wrong_reading_of_a_renamed_file_is_warned_by_name(
         "true": ("strain,stress_MPa", four[four[:, 3] < 1.2][:, [3, 2]]),
         "cycles": ("displacement_mm,force_N", cyclic[:, 1:3]),
         "failure": ("strain,stress_MPa", four[:, 3:5]),
+        "up to failure": ("strain,stress_MPa", four[: np.argmax(four[:, 4]) + 1, 3:5]),
         "area alone": ("stretch,stress_MPa", np.column_stack([STRETCH, 8 * STRESS])),
         "area": ("stretch,stress_MPa,force_N", np.column_stack([STRETCH, 8 * STRESS, 8 * STRESS])),
     }[name]

@@ -18,11 +18,11 @@ from softnlp.laboratory.specimen import ACROSS, ALONG, STRETCH, Curve, curve_of,
 from softnlp.laboratory.table import RawTable
 from softnlp.studies.check import Check
 from softnlp.studies.cycles import Leg, legs
-from softnlp.studies.plausibility import curve_checks, stiffness_checks
+from softnlp.studies.plausibility import LARGEST_STRETCH, curve_checks, stiffness_checks
 
 Array = NDArray[np.float64]
 
-_LONG, _POSSIBLE = 3.0, 12.0  # a test between these is cut to the range where robots are; beyond, it is no stretch
+_POSSIBLE = 12.0  # what is stretched further than usual up to here is cut to where robots are; beyond, it is no stretch
 _USUAL = (1.0, 2.0)
 _CYCLES = ("first loading", "unloading", "all")
 
@@ -136,7 +136,7 @@ def _held_check(parts: Sequence[Curve], choices: Choices) -> Check:
 def _cut(stretch: Array, stress: Array, choices: Choices) -> tuple[Array, Array]:
     """Return the points within the range of stretch that is asked for."""
     limits = choices.numbers("stretch", 2)
-    if limits is None and _LONG < np.max(stretch) <= _POSSIBLE and np.min(stretch) < _USUAL[1]:
+    if limits is None and LARGEST_STRETCH[0][1] < np.max(stretch) <= _POSSIBLE and np.min(stretch) < _USUAL[1]:
         reason = f"the test goes to {np.max(stretch):.3g}; robots stretch less, and a law fits the range it is used in"
         limits = choices.take("stretch", list(_USUAL), f"{reason}; stretch=[1, {np.max(stretch):.3g}] takes it all")
     if limits is None:
