@@ -173,6 +173,16 @@ def test_plateaus_and_lags_of_a_known_signal() -> None:
     assert quality > 0.99
 
 
+def test_the_lag_of_a_long_record_with_short_plateaus_is_found() -> None:
+    random = np.random.default_rng(1)
+    time = 0.5 * np.arange(12_000)
+    held = random.choice([0, 0.4, 0.8, 1.2], size=(3001, 3))[(time / 2).astype(int)]
+    response = held @ random.uniform(-20, 20, (3, 3)) + random.normal(scale=0.2, size=(12_000, 3))
+    lag, error, quality = lag_between(time, response, time + 7.3, held)
+    assert abs(lag - 7.3) <= error <= 0.3
+    assert quality > 0.99
+
+
 def test_files_of_the_folder_are_those_of_the_truth() -> None:
     assert all((FOLDER / name).is_file() for name in TRUTH)
 

@@ -88,6 +88,9 @@ class Commands:
         self.steps: NDArray[np.bool_] = steps & bool(np.mean(steps) <= 0.5)  # none of one that moves all the time
         self.stepping = bool(np.any(self.steps))
         self.counted = np.cumsum(self.steps)
+        holds = np.diff(time[1:][self.steps])
+        usual = 3 * float(np.median(np.diff(time)))
+        self.hold = float(np.median(holds[holds > usual])) if np.any(holds > usual) else np.inf
         self.least = 0.02 * max(float(np.max(np.ptp(self.columns, axis=1))), 1e-30)
 
 
@@ -99,16 +102,25 @@ def lag_between(time: Array, response: Array, command_time: Array, command: Arra
     """
     half = min(np.ptp(time), np.ptp(command_time)) / 2
     low, high = command_time[0] - time[-1] + half, command_time[-1] - time[0] - half
-    step = max(min(float(np.median(np.diff(time))), float(np.median(np.diff(command_time)))) / 2, (high - low) / 2000)
-    tried = np.arange(low, high + step, step)
+    sampled = min(float(np.median(np.diff(time))), float(np.median(np.diff(command_time)))) / 2
     some, few = (slice(None, None, 1 + len(time) // most) for most in (_TRIED_ON, 10 * _TRIED_ON))
     thin = slice(None, None, 1 + len(command) // (10 * _TRIED_ON))
     commands = Commands(command_time[thin], command[thin])
+    # of a long record as finely as its plateaus need, and then around the best
+    step = max(sampled, (high - low) / 10_000, min((high - low) / 2000, commands.hold / 3))
+    tried = np.arange(low, high + step, step)
     quality = np.array([explained(time[some], response[some], commands, lag) for lag in tried])
-    fine = tried[int(np.argmax(quality))] + np.linspace(-2, 2, 41) * step
-    sharp = np.array([explained(time[few], response[few], commands, lag) for lag in fine])
-    good = fine[sharp >= sharp.max() - 1e-9 - 0.02 * (1 - sharp.min())]
-    return float(np.mean(good)), float(max(np.ptp(good) / 2, step / 2)), float(sharp.max())
+    best = tried[int(np.argmax(quality))]
+    while True:
+        fine = best + np.linspace(-2, 2, 41) * step
+        sharp = np.array([explained(time[few], response[few], commands, lag) for lag in fine])
+        good = fine[sharp >= sharp.max() - 1e-9 - 0.02 * (1 - sharp.min())]
+        if step <= 2 * sampled or np.ptp(good) > step:
+            break
+        best, step = float(np.mean(good)), step / 10
+    between = sum(float(np.median(np.diff(clock))) for clock in (time[few], commands.time))
+    error = max(np.ptp(good), step, between) / 2
+    return float(np.mean(good)), float(error), float(sharp.max())
 
 
 def explained(time: Array, response: Array, commands: Commands, lag: float) -> float:
