@@ -111,7 +111,8 @@ def _imported(folder: Path, files: Sequence[str], kind: str, settings: Mapping[s
             with located(source=label):
                 imported = recipe.run()
         else:
-            imported = import_files(list(files), kind, flat(settings), folder)
+            with located(source=label):
+                imported = import_files(list(files), kind, flat(settings), folder)
     except AskError as error:
         source = None if error.message.startswith(label) else error.source or label
         raise type(error)(f"{error.message}{_INLINE}", source=source, key=error.key) from None

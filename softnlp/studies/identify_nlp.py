@@ -248,7 +248,7 @@ def closed_fit(
     settled = ~(np.isinf(errors) & np.array([name in REGISTRATION_NAMES for name in found.free.names]))
     free, x, errors = found.free.those(settled), found.constants[settled], errors[settled]
     nlp = AtOnce(free, numerics, registration, loads)
-    nlp.values |= found.free.values(found.constants)
+    nlp.values |= {name: np.asarray(value) for name, value in found.free.values(found.constants).items()}
     if nlp.clock is not None:
         loads = turned(loads, -found.free.values(found.constants)[CLOCK])
     for k, data in enumerate(every):
