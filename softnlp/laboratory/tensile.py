@@ -17,14 +17,13 @@ from softnlp.laboratory.signals import break_row, enclosed_area, relaxing
 from softnlp.laboratory.specimen import ACROSS, ALONG, STRETCH, Curve, curve_of, specimens
 from softnlp.laboratory.table import RawTable
 from softnlp.studies.check import Check
-from softnlp.studies.cycles import Leg, legs
+from softnlp.studies.cycles import CYCLES, Leg, legs
 from softnlp.studies.plausibility import LARGEST_STRETCH, curve_checks, stiffness_checks
 
 Array = NDArray[np.float64]
 
 _POSSIBLE = 12.0  # what is stretched further than usual up to here is cut to where robots are; beyond, it is no stretch
 _USUAL = (1.0, 2.0)
-_CYCLES = ("first loading", "unloading", "all")
 
 
 def import_tensile(tables: Sequence[RawTable], choices: Choices) -> Imported:
@@ -72,7 +71,7 @@ def _used(curve: Curve, choices: Choices) -> tuple[Curve, dict[str, float], int]
     asked = choices.get("cycle")
     if asked is None:
         reason = f"{len(loadings)} loadings; the first is that of a new specimen" if len(loadings) > 1 else ""
-        asked = choices.take("cycle", _CYCLES[0], reason) if reason else _CYCLES[0]
+        asked = choices.take("cycle", CYCLES[0], reason) if reason else CYCLES[0]
     if asked == "all":
         chosen = Leg(0, len(curve.stretch), True)
     elif asked == "first loading":

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+CYCLES = ("first loading", "unloading", "all")  # what may be asked for, beside the number of a loading
 _FALL, _RESTART = 0.2, 0.1  # of the range of the stretch: the least fall; how near to its end another test starts
 
 
