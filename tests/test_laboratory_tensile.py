@@ -322,6 +322,8 @@ def test_legs_and_breaks() -> None:
         ("Nominelle Dehnung,Kraft\nmm,N", (25, 1), {"gauge_length_mm": 25}),
         ("Distance (mm),Force (gf)", (25, 1e3 / 9.80665), {"gauge_length_mm": 25}),
         ("Déplacement (mm),Force (N)", (25, 1), {"gauge_length_mm": 25}),
+        ("Déformation (%),Contrainte (kPa)", (100, 1e3 / 8), {}),
+        ("Deformation,Force (N)", (25, 1), {"gauge_length_mm": 25, "unit.Deformation": "mm"}),
         ("Desplazamiento (mm),Fuerza (N)", (25, 1), {"gauge_length_mm": 25}),
         ("Allungamento [mm],Carico [N]", (25, 1), {"gauge_length_mm": 25}),
     ],
@@ -336,6 +338,13 @@ def test_units_of_machines(
     file = machine(tmp_path, header, np.column_stack(columns))
     found = imported(file, **{key.replace(".", "__"): value for key, value in {"area_mm2": 8, **settings}.items()})
     assert found.numbers["shear_modulus_MPa"] == pytest.approx(0.03, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["Deformation", "Dehnung", "Elongation"])
+def test_what_may_be_in_mm_or_percent_is_asked(name: str, tmp_path: Path) -> None:
+    file = machine(tmp_path, f"{name},Load (N)", np.column_stack([25 * (STRETCH - 1), 8 * STRESS]))
+    with pytest.raises(AskError, match=f"column '{name}' has no unit"):
+        imported(file, **SPECIMEN)
 
 
 @pytest.mark.parametrize("unit", ["kgx", "Nn"])

@@ -21,11 +21,12 @@ from softnlp.studies.plausibility import SHEAR_MODULUS, area_check, divisor_chec
 Array = NDArray[np.float64]
 
 DISPLACEMENT = (
-    r"extension|extensomet|disp(?![a-z])|displac|crosshead|position|stroke|travel|traverse|elongation|distance|"
-    r"^d$|^delta ?l$|standardweg|^weg|verl[aä]ngerung|verformung|d[eé]placement|desplaz|spostam|verplaats|allung|alarg"
+    r"extension|extensomet|disp(?![a-z])|displac|crosshead|position|stroke|travel|traverse|elongation|distance|^d$|"
+    r"^delta ?l$|standardweg|^weg|verl[aä]ngerung|verformung|d[eé]form|d[eé]placement|desplaz|spostam|verplaats|"
+    r"allung|alarg"
 )
 _FORCE = r"load|force|kraft|^last|^f[yz]?$|fuerza|forza|carga|carico|kracht"
-_STRAIN, STRETCH = r"strain|dehnung|d[eé]formation|deformaci|deformazi", r"stretch|lambda"
+_STRAIN, STRETCH = r"strain|dehnung", r"stretch|lambda"
 _STRESS = r"stress|spannung|^sigma|contrainte|esfuerzo|sforzo"
 ALONG, ACROSS = rf"{DISPLACEMENT}|{_STRAIN}|{STRETCH}", rf"{_STRESS}|{_FORCE}"
 _TRUE = r"true|cauchy|wahre|hencky|(?<![a-z])(?:ln|log(?:arithm\w*)?)(?![a-z])"
@@ -237,7 +238,7 @@ def _strain(
             if 0.5 < ratio / UNITS[unit].scale < 2:
                 choices.take("unit.strain", unit, "it then agrees with the displacement over the gauge length")
                 return plain * UNITS[unit].scale
-    if largest > 12:
+    if largest > 12 and "strain" in table.names[k].lower():  # Dehnung may be in mm
         choices.take("unit.strain", "%", f"it goes to {largest:.4g}, and no silicone to that stretch")
         return plain * UNITS["%"].scale
     plain_one, percent = (float(_stretch_of(np.array(largest * scale), chosen)) for scale in (1.0, 0.01))
