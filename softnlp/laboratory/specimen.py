@@ -255,7 +255,7 @@ def _stress(
     """Return the engineering stress [Pa], and the checks of what the machine divided by."""
     columns = {
         "engineering stress": one_column(table, "stress", table.named(_STRESS, f"{_TRUE}|{_RATE}"), choices),
-        "force": one_column(table, "force", table.named(_FORCE, f"{_RATE}|cell"), choices),
+        "force": one_column(table, "force", table.named(_FORCE, f"{_RATE}|cell|peak"), choices),
         "true stress": one_column(table, "true stress", table.named(rf"(?=.*({_TRUE})).*({_STRESS})"), choices),
     }
     known = [name for name, k in columns.items() if k is not None]
