@@ -79,7 +79,7 @@ def import_pressure(tables: Sequence[RawTable], choices: Choices) -> Imported:
         lag, error, _ = lag_between(other_time, other, time, pressures)
         lag = float(choices.take("lag_s", round(lag, 4), f"the two logs then go together; taken off {tables[0].file}"))
         time = time - lag
-        checks.append(lag_check(lag))
+        checks.append(lag_check(lag, error))
         numbers |= {"lag_s": lag, "lag_error_s": error}
     deadband = choices.number("deadband_bar")
     if deadband is not None:
@@ -232,10 +232,11 @@ def _rest_check(gauge: Array, choices: Choices) -> Check:
     return Check("level at which all sets rest", level, (-usual, usual), (-np.inf, most), likely, "bar")
 
 
-def lag_check(lag: float) -> Check:
-    """Return the check of how much later one clock reads than another [s]."""
+def lag_check(lag: float, error: float) -> Check:
+    """Return the check of how much later one clock reads than another, and of the error of that [s]."""
     likely = "the clocks differ by this; it was taken off the time of the pressures"
-    return Check("lag between two files", lag, (-0.01, 0.01), ANY, likely, "s")
+    least = max(0.01, error)
+    return Check("lag between two files", lag, (-least, least), ANY, likely, "s")
 
 
 def _level_checks(pressures: Array) -> list[Check]:

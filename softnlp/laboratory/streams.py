@@ -57,7 +57,7 @@ def with_pressures(
     found = {"t_s": np.array([time[r].mean() for r in rows])}
     found |= {f"p{k + 1}_bar": column for k, column in enumerate(values.T)}
     found |= {name: np.array([column[r].mean() for r in rows]) for name, column in rest.items()}
-    checks.append(lag_check(float(lag)))
+    checks.append(lag_check(float(lag), error))
     likely = (
         "the pressures do not move what was measured: another experiment, another lag_s, or too few plateaus to tell"
     )
