@@ -138,6 +138,8 @@ def test_forces_lose_their_bias_and_take_the_pressures_of_plateaus() -> None:
     both = imported("force_torque_counts.csv", "pressure_log_mbar_absolute.csv")
     np.testing.assert_allclose(both.columns["fx_N"], -0.9 * both.columns["p1_bar"], atol=0.01)
     assert both.rows == 11
+    warned = [check.name for check in both.checks if check.verdict == "warned"]
+    assert warned == ["offset between two clocks of a file", "lag between two files"]  # not that two sets push nothing
 
 
 def test_a_log_without_header_and_one_of_labview() -> None:
