@@ -228,6 +228,14 @@ def test_toe_tare_and_preload(tmp_path: Path) -> None:
     assert imported(tared, **SPECIMEN, tare=0.05, preload_N=0.005).columns["stretch"][0] == 1.0
 
 
+def test_a_small_preload_is_warned_of_and_noise_is_not(tmp_path: Path) -> None:
+    name, random = "stress at stretch 1, relative to the largest,", np.random.default_rng(2)
+    noise = np.clip(random.standard_normal(STRETCH.size), -2, 2) * 0.02 * STRESS.max()
+    for more, verdict in ((0.018 * STRESS.max(), "warned"), (noise, "passed")):
+        file = machine(tmp_path, "Extension (mm),Load (N)", np.column_stack([25 * (STRETCH - 1), 8 * (STRESS + more)]))
+        assert check_of(imported(file, **SPECIMEN), name).verdict == verdict
+
+
 WRONG = {
     "kN as N": ("Extension (mm),Load (N)", {**SPECIMEN}, "shear modulus of the data is 3e-05"),
     "kPa as MPa": ("Stretch,Stress (MPa)", {}, "stress in kPa"),

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 LARGEST_STRETCH: tuple[Range, Range] = (1.1, 3.0), (1.01, 10.0)
 SMALLEST_STRETCH: tuple[Range, Range] = (0.3, inf), (0.3, inf)
 STRESS_AT_1: tuple[Range, Range] = (-0.03, 0.03), (-0.3, 0.05)  # a slack specimen is common and pardoned for longer
+AT_1 = 0.01  # where points are at stretch 1 themselves
 SHEAR_MODULUS: tuple[Range, Range] = (0.002, 2.0), (0.001, 10.0)  # [MPa]
 FIRST: tuple[Range, Range] = (0.3, 5.0), (0.15, inf)
 SLACK: tuple[Range, Range] = (0.0, 0.03), (0.0, 0.1)  # of a tenth makes the modulus a quarter too small
@@ -37,6 +38,7 @@ AREA: tuple[Range, Range] = (1.5, 2000.0), (0.0, inf)  # [mm^2]
 _ERRORS = 3.0  # standard errors of a number by which its range is widened
 _FEWEST = 5  # points that a line is laid through
 _NEAR, _NEARER = 0.08, 0.1  # of extension, and of the largest: a test that begins within both tells of stretch 1
+_AT_1 = 1e-3  # of stretch
 _NOTHING = 1e-30  # [Pa], in place of a stress of 0
 _STIFF = 2.0  # times the stiffest silicone of the library
 _SAME = 0.02  # relative, of areas
@@ -242,9 +244,8 @@ def _beginning(stretch: Array, stress: Array) -> list[Check]:
         begins = _line(np.column_stack([np.ones(later.size), later]), stress[first])[0][0]
         reduced = _reduced(stretch)
         size = float(np.median(stress / reduced) * reduced[first[0]]) or _NOTHING
-        noise = np.sqrt(np.mean(np.diff(stress[np.argsort(stretch, kind="stable")], 2) ** 2) / 6)
         usual, (low, high) = FIRST
-        possible = low - 2 * float(noise) / abs(size), high
+        possible = low - 2 * _noise(stretch, stress) / abs(size), high
         name = "reduced stress at the smallest stretch, relative to its median,"
         return [Check(name, float(begins / size), usual, possible, _BEGINS_LATER)]
     near = away <= max(0.5 * np.max(away), np.partition(away, _FEWEST - 1)[_FEWEST - 1])
@@ -258,7 +259,18 @@ def _beginning(stretch: Array, stress: Array) -> list[Check]:
         likely = "looks like strain; name its column strain, or strain_percent where it is in percent"
     elif offset < 0 and slope > 0:
         likely = _BEGINS_LATER
-    return [Check("stress at stretch 1, relative to the largest,", offset / size, usual, possible, likely)]
+    name = "stress at stretch 1, relative to the largest,"
+    by_line = Check(name, offset / size, usual, possible, likely)
+    there = stress[away <= _AT_1]
+    if by_line.verdict != "passed" or not there.size:
+        return [by_line]
+    most = AT_1 + _ERRORS * _noise(stretch, stress) / size
+    return [Check(name, float(np.median(there)) / size, (-most, most), (-inf, inf), likely)]
+
+
+def _noise(stretch: Array, stress: Array) -> float:
+    """Return the standard deviation of a stress about a smooth curve, by its second differences."""
+    return float(np.sqrt(np.mean(np.diff(stress[np.argsort(stretch, kind="stable")], 2) ** 2) / 6))
 
 
 def _shear_modulus(stretch: Array, stress: Array) -> list[Check]:
