@@ -19,6 +19,8 @@ from softnlp.base.errors import InputError
 from softnlp.base.files import make_folder, write_whole
 from softnlp.base.status import Status
 from softnlp.model.inputs import loads_of_table, robot_of_attributes, silicone_of_attributes, versions
+from softnlp.model.obstacle_tables import obstacles_of_tables
+from softnlp.model.obstacles import Obstacle
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.results.dataset import netcdf_bytes
@@ -113,6 +115,7 @@ class RunView:
     stable : (S,) of `STABLE_FLAGS`, undefined where unsolved. stretch : (S,). bending_angle : (S,) [rad].
     backbone_length : (S,) [m]. bodies : S entries. contact : of a blocked force, else None. targets : of inverse
     kinematics, else None. std : standard deviations (S,) of outputs by name [SI], none where nothing scatters.
+    obstacles : what the body may touch.
     """
 
     title: str
@@ -132,6 +135,7 @@ class RunView:
     contact: ContactView | None = None
     targets: TargetView | None = None
     std: Mapping[str, Array] = field(default_factory=dict)
+    obstacles: tuple[Obstacle, ...] = ()
 
     @property
     def solved(self) -> tuple[int, ...]:
@@ -167,6 +171,7 @@ def view_of_run(run: Run) -> RunView:
         pressure=np.array([step.pressure for step in run.steps], dtype=float),
         time=None if np.all(np.isnan(times)) else np.array(times),
         std=[name for name in DEVIATING if f"std_{name}" in known],
+        obstacles=run.obstacles,
     )
 
 
@@ -213,6 +218,7 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
         pressure=number("pressure"),
         time=values.get(OUTPUTS["t"].key),
         std=[name for name in DEVIATING if OUTPUTS[f"std_{name}"].key in values],
+        obstacles=obstacles_of_tables(json.loads(attributes["obstacles"])) if "obstacles" in attributes else (),
     )
 
 

@@ -103,8 +103,8 @@ class Touched:
     """A solution and what was found of it.
 
     values : of the quantities, SI. s : (K + 1,) of the nodes. before, behind : (18, K + 1) states on both sides of
-    what pushes at a node. pushes, gaps : (obstacles, K + 1), scaled. constants : what the field takes. radius, numbers :
-    what the obstacles take. units : L_0 [m] and EI/L_0^2 [N].
+    what pushes at a node. pushes, gaps : (obstacles, K + 1), scaled. constants : what the field takes.
+    radius, numbers : what the obstacles take. units : L_0 [m] and EI/L_0^2 [N].
     """
 
     grid: ObstacleGrid
@@ -144,9 +144,7 @@ def touched(grid: ObstacleGrid, solution: Solution, values: dict[str, Any]) -> T
     s = np.concatenate([[0.0], np.cumsum(steps)])
     s[-1] = 1.0
     units = np.asarray(grid.problem.units(x, p)).ravel()
-    return Touched(
-        grid, solution, values, s, before, behind, pushes, gaps, constants, radius, numbers, units
-    )
+    return Touched(grid, solution, values, s, before, behind, pushes, gaps, constants, radius, numbers, units)
 
 
 def sharpened(values: dict[str, Any], tau: float) -> dict[str, Any]:

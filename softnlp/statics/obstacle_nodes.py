@@ -14,8 +14,6 @@ from softnlp.statics.pose import Mapped
 Array = NDArray[np.float64]
 
 _SAMPLES = 8  # of each interval, where gaps are looked at between nodes
-_ROOM = 0.15  # of an interval: what is left between a node that is moved and the next
-_STILL = 1e-5  # of an interval: a node nearer than that stays
 
 
 def between(shape: Mapped, found: Touched, s: Array) -> Array:
@@ -41,53 +39,40 @@ def gaps_between(shape: Mapped, found: Touched) -> tuple[Array, Array]:
     return s, gaps
 
 
-def depth(shape: Mapped, found: Touched) -> float:
-    """Return the deepest overlap between nodes, over L_0; 0 for none."""
-    return max(0.0, -float(np.min(gaps_between(shape, found)[1], initial=0.0)))
+def regraded(found: Touched, intervals: int) -> Array:
+    """Return nodes (K + 1,), half of them where obstacles touch and close by.
 
-
-def moved_nodes(shape: Mapped, found: Touched) -> Array | None:
-    """Return the nodes (K + 1,) with one at each point where an obstacle touches alone; None where all are there.
-
-    A contact at one point has its least gap there; of two nodes that share it one goes there.
+    A push at one point makes a kink of the axis, by shear, so that a body touches along a short piece: F / GA over the
+    curvature that it has against the obstacle, a few hundredths of the length.
     """
-    s, K = found.s.copy(), found.s.size - 1
-    fine, gaps = gaps_between(shape, found)
-    taken, far = set[int](), 0.0
-    for j, obstacle in enumerate(found.grid.case.obstacles):
-        if obstacle.part != "body":
-            continue
-        for own in _runs(found.active[j]):
-            if len(own) > 2 or own[-1] == K or taken & {own[0] - 1, *own, own[-1] + 1}:
-                continue
-            low, high = found.s[own[0] - 1], found.s[own[-1] + 1]
-            inside = np.flatnonzero((fine > low) & (fine < high))
-            target = _lowest(fine[inside], gaps[j, inside])
-            if len(own) == 2:
-                F = found.pushes[j, own]
-                target = float(F @ found.s[own] / F.sum())
-            k = min(own, key=lambda node: abs(found.s[node] - target))
-            room = _ROOM * min(found.s[k] - found.s[k - 1], found.s[k + 1] - found.s[k])
-            target = float(np.clip(target, found.s[k - 1] + room, found.s[k + 1] - room))
-            far = max(far, abs(target - s[k]) * K)
-            s[k] = target
-            taken |= {k - 1, k, k + 1}
-    return s if far > _STILL else None
+    windows = []
+    for own in _runs(np.any(found.active, axis=0)):
+        low, high = max(own[0] - 1, 0), min(own[-1] + 1, found.s.size - 1)
+        windows.append((found.s[low], found.s[high]))
+    if not windows:
+        return np.linspace(0, 1, intervals + 1)
+    breaks = np.unique([0.0, 1.0, *(end for window in windows for end in window)])
+    middle = (breaks[1:] + breaks[:-1]) / 2
+    inside = np.array([any(low < m < high for low, high in windows) for m in middle])
+    size = np.diff(breaks)
+    share = np.where(inside, 0.5 / inside.sum(), 0.0) + 0.5 * size
+    at = np.concatenate([[0.0], np.cumsum(share)])
+    s = np.interp(np.linspace(0, 1, intervals + 1), at / at[-1], breaks)
+    s[0], s[-1] = 0.0, 1.0
+    return s
+
+
+def fewest_touching(found: Touched) -> int:
+    """Return the least number of nodes that touch side by side; many where the tip touches alone, or nothing does."""
+    runs = _runs(np.any(found.active, axis=0))
+    return min((len(own) for own in runs if own != [found.s.size - 1]), default=found.s.size)
 
 
 def _runs(active: NDArray[np.bool_]) -> list[list[int]]:
     """Return the nodes that touch, those next to each other together."""
     touching = np.flatnonzero(active)
-    return [[int(k) for _, k in group] for _, group in groupby(enumerate(touching), key=lambda pair: pair[1] - pair[0])]
-
-
-def _lowest(s: Array, gap: Array) -> float:
-    """Return where a gap is least, by the parabola through the least sample and its neighbours."""
-    k = int(np.clip(np.argmin(gap), 1, gap.size - 2))
-    a = np.polyfit(s[k - 1 : k + 2] - s[k], gap[k - 1 : k + 2], 2)
-    if not a[0] > 0:
-        return float(s[np.argmin(gap)])
-    return float(np.clip(s[k] - a[1] / (2 * a[0]), s[k - 1], s[k + 1]))
+    groups = groupby(enumerate(touching), key=lambda pair: pair[1] - pair[0])
+    return [[int(k) for _, k in group] for _, group in groups]
 
 
 def resampled(shape: Mapped, found: Touched, grid: ObstacleGrid, s: Array) -> Array:

@@ -4,37 +4,67 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.errors import InputError
 from softnlp.base.status import Status
+from softnlp.base.units import MILLIMETRE
 from softnlp.model.obstacles import Obstacle
 from softnlp.model.rod import STATE_SIZE, Loads
+from softnlp.model.segments import SegmentedRobot
 from softnlp.nlp.continuation import follow
 from softnlp.nlp.solver import Solution, discretisation_correction
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.obstacle_grid import SHARP, ObstacleGrid, Touched, compiled_obstacles, sharpened, touched
-from softnlp.statics.obstacle_nodes import depth, moved_nodes, resampled
-from softnlp.statics.obstacle_step import obstacle_step
+from softnlp.statics.obstacle_nodes import fewest_touching, regraded, resampled
+from softnlp.statics.obstacle_step import names_of, obstacle_step
 from softnlp.statics.obstructed import SMOOTHING, STEPS
-from softnlp.statics.pose_grid import next_size
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
 
 Array = NDArray[np.float64]
 
 _FIRST, _FINEST = 40, 320  # intervals
+_FEWEST = 4
+_REST, _TOUCHING = 400, 1e-9  # points of the unpressurised robot that are looked at, and the overlap that counts
 _PATH_TAU = 1e-3  # tau along a path: a gap of 6 um under a push of 1/100
 _TAUS = (1e-5, SHARP)
 _LARGEST_JUMP = 0.1  # between points of a path, in scaled positions and direction cosines
 _SMALLEST_STEP = 1 / 1024
 _THROUGH = 5e-3  # of L_0: an overlap half-way between two points of a path from which that went through an obstacle
-_MOVES = 4  # of nodes to contacts
+_PASSES, _ENOUGH = 3, 6  # of putting nodes where obstacles touch, and how many are to be there
 _STEEPER = 4.0  # growth of what a step changes from which a path that ends has turned
-_ORDER = 2  # of the tip's error where contacts spread over nodes
+_ORDER = 2  # of the tip's error, since pushes are those of nodes
+
+
+def among_obstacles(poses: PoseSolver, obstacles: Sequence[Obstacle]) -> ObstacleSolver:
+    """Return a solver of poses among obstacles.
+
+    Raises
+    ------
+    InputError
+        For a robot of several segments, another transcription than multiple shooting, two obstacles of one name, and a
+        robot that overlaps one at rest.
+    """
+    if isinstance(poses.model.robot, SegmentedRobot):
+        raise InputError("a robot of several segments, or one that varies along s, takes none so far", table="obstacle")
+    if poses.numerics.transcription != "multiple-shooting":
+        raise InputError('obstacles are solved by "multiple-shooting" only', table="solver", key="transcription")
+    if (given := poses.numerics.intervals) is not None and given < _FEWEST:
+        raise InputError(f"obstacles take at least {_FEWEST}, got {given}", table="solver", key="intervals")
+    names = names_of(obstacles)
+    for k, name in enumerate(names):
+        if name in names[:k]:
+            raise InputError(f"two obstacles are called {name!r}", table=f"obstacle.{k + 1}", key="name")
+    solver = ObstacleSolver(poses, obstacles)
+    for k, (name, deep) in enumerate(zip(names, solver.overlaps_at_rest(), strict=True)):
+        if deep > 0:
+            text = f"the robot overlaps {name} by {deep / MILLIMETRE:.3g} mm at rest; move the obstacle away"
+            raise InputError(text, table=f"obstacle.{k + 1}")
+    return solver
 
 
 class ObstacleSolver:
@@ -58,6 +88,31 @@ class ObstacleSolver:
         """Return the quantities of a pose with nodes s (K + 1,)."""
         own = {f"obstacle.{j + 1}": o.numbers for j, o in enumerate(self.obstacles)}
         return {**self.poses.values(pressure, loads), **own, SMOOTHING: _PATH_TAU, STEPS: np.diff(s)}
+
+    def overlaps_at_rest(self) -> list[float]:
+        """Return how deep the unpressurised robot is in each obstacle, 0 where it is not [m]."""
+        s = np.linspace(0, 1, _REST + 1)
+        grid = self.grid(_FIRST)
+        values = self.poses.values(np.zeros(self.poses.model.sets), Loads())
+        column = self.poses.column(values)
+        straight = np.asarray(self.poses.functions.arc(column, 1.0, s[None, :]))[:, 1:]
+        nodes = np.zeros((STATE_SIZE, _FIRST + 1))
+        p = grid.problem.pack(self.values(np.zeros(self.poses.model.sets), Loads(), np.linspace(0, 1, _FIRST + 1)))
+        _, radius, numbers = self._taken(grid, grid.packed(1.0, nodes, np.zeros((len(self.obstacles), _FIRST + 1))), p)
+        count = len(self.obstacles)
+        wide = [np.tile(part[:, None], _REST) for part in (radius, numbers)]
+        pushed = grid.case.touching.pushed.map(_REST)
+        gaps = np.asarray(pushed(straight, np.zeros((count, _REST)), *wide)[1])
+        L_0 = float(np.asarray(grid.problem.units(np.ones(grid.problem.nlp["x"].numel()), p)).ravel()[0])
+        least = [np.min(own) if o.part == "body" else own[-1] for o, own in zip(self.obstacles, gaps, strict=True)]
+        return [max(0.0, -float(gap)) * L_0 if gap < -_TOUCHING else 0.0 for gap in least]
+
+    def _taken(self, grid: ObstacleGrid, x: Array, p: Array) -> tuple[Array, Array, Array]:
+        """Return what the field takes beside states, and the radius and numbers that obstacles take."""
+        every = np.asarray(grid.problem.case_constants(x, p)).ravel()
+        nc, count = grid.case.functions.field.size1_in(1), len(self.obstacles)
+        last = every.size - STATE_SIZE * (grid.intervals + 1)
+        return every[:nc], every[nc : nc + count], every[nc + count : last]
 
     def solve(self, pressure: Array, loads: Loads, near: Touched | None = None) -> tuple[Step, Touched | None]:
         """Solve one pose, followed from a neighbouring one or from the unpressurised shape.
@@ -100,7 +155,7 @@ class ObstacleSolver:
     def _followed(
         self, pressure: Array, loads: Loads, near: Touched | None, intervals: int
     ) -> tuple[Touched | None, int, float, bool]:
-        """Follow the branch from a neighbour, or from rest, to a pose; also the iterations, how far, and if it turned."""
+        """Follow the branch from a neighbour or from rest; also the iterations, how far it came, and if it turned."""
         grid, s = self.grid(intervals), np.linspace(0, 1, intervals + 1)
         shape = self.poses.shape
         end = self.values(pressure, loads, s)
@@ -151,9 +206,7 @@ class ObstacleSolver:
     def _through(self, grid: ObstacleGrid, before: Array, solution: Solution) -> bool:
         """Whether half-way between two points of a path the robot is inside an obstacle: it went through it."""
         K, count = grid.intervals, len(self.obstacles)
-        case = np.asarray(grid.problem.case_constants(solution.x, solution.p)).ravel()
-        nc = grid.case.functions.field.size1_in(1)
-        radius, numbers = case[nc : nc + count], case[nc + count : case.size - STATE_SIZE * (K + 1)]
+        _, radius, numbers = self._taken(grid, solution.x, solution.p)
         wide = [np.tile(part[:, None], K + 1) for part in (radius, numbers)]
         a, b = grid.nodes(before), grid.nodes(solution.x)
         for t in (0.25, 0.5, 0.75):
@@ -166,29 +219,44 @@ class ObstacleSolver:
 
     def _turned(self, grid: ObstacleGrid, points: Sequence[tuple[float, Array]]) -> bool:
         """Whether the changes along a path grew as they do before a fold."""
-        rates = [
-            grid.distance(b[1] - a[1]) / (b[0] - a[0]) for a, b in zip(points[:-1], points[1:], strict=True) if b[0] > a[0]
-        ]
+        rates = [grid.distance(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(points) if b[0] > a[0]]
         return len(rates) > 2 and rates[-1] > _STEEPER * float(np.median(rates))
 
     def _refined(self, found: Touched) -> tuple[Touched, int, float]:
-        """Put nodes at contacts and refine the grid until its accuracy is met; also the iterations and the error."""
-        found, spent = self._placed(found)
+        """Put nodes where obstacles touch and refine until the accuracy is met; also the iterations and the error."""
         accuracy, given = self.numerics.accuracy, self.numerics.intervals is not None
+        found, spent = self._graded(found, found.grid.intervals)
         error = self._own_error(found)
+        if not found.active.any() and (given or error <= accuracy):
+            return found, spent, error
         while True:
-            finer = self._finer(found, min(2 * found.grid.intervals, 2 * _FINEST))
-            if finer is None:
-                return found, spent, error
-            finer, more = self._placed(finer)
-            spent += more + finer.solution.iterations
-            tips = [f.before[:3, -1] for f in (found, finer)]
-            change = float(np.linalg.norm(tips[1] - tips[0]))
+            finer, more = self._graded(found, 2 * found.grid.intervals)
+            spent += more
+            if finer is found:
+                return found, spent, float("inf") if found.active.any() else error
+            change = float(np.linalg.norm(finer.before[:3, -1] - found.before[:3, -1]))
             if given:
                 return found, spent, max(error, change * 2**_ORDER / (2**_ORDER - 1))
             found, error = finer, max(self._own_error(finer), change / (2**_ORDER - 1))
             if error <= accuracy or 2 * found.grid.intervals > _FINEST:
                 return found, spent, error
+
+    def _graded(self, found: Touched, intervals: int) -> tuple[Touched, int]:
+        """Return a solution on so many intervals, half of them where it touches, and the iterations.
+
+        Where no such grid leads to the same pose the one that was given comes back.
+        """
+        spent = 0
+        for _ in range(_PASSES):
+            if not found.active.any() and found.grid.intervals == intervals:
+                break
+            trial = self._on(self.grid(intervals), found, regraded(found, intervals))
+            if trial is None:
+                break
+            spent, found = spent + trial.solution.iterations, trial
+            if fewest_touching(found) >= _ENOUGH:
+                break
+        return found, spent
 
     def _own_error(self, found: Touched) -> float:
         """Return how far the tip moves with half the steps on the same nodes, over L_0."""
@@ -198,27 +266,6 @@ class ObstacleSolver:
             return float("inf")
         moved = found.grid.nodes(correction)[:3, -1]
         return float(np.linalg.norm(moved)) * 16 / 15
-
-    def _finer(self, found: Touched, intervals: int) -> Touched | None:
-        """Return a solution on more intervals, None where that leads elsewhere."""
-        grid = self.grid(intervals)
-        parts = intervals // found.grid.intervals
-        s = np.append((found.s[:-1, None] + np.diff(found.s)[:, None] * np.arange(parts) / parts).ravel(), 1.0)
-        return self._on(grid, found, s)
-
-    def _placed(self, found: Touched) -> tuple[Touched, int]:
-        """Move nodes to where obstacles touch at one point."""
-        spent = 0
-        for _ in range(_MOVES):
-            s = moved_nodes(self.poses.shape, found)
-            if s is None:
-                break
-            trial = self._on(found.grid, found, s)
-            if trial is None:
-                break
-            spent += trial.solution.iterations
-            found = trial
-        return found, spent
 
     def _on(self, grid: ObstacleGrid, found: Touched, s: Array) -> Touched | None:
         """Solve a solution again on nodes s of a grid; None where that leads elsewhere."""
@@ -232,5 +279,3 @@ class ObstacleSolver:
             if solution.holds(self.numerics.tolerance) and near:
                 return touched(grid, solution, {**values, SMOOTHING: SHARP})
         return None
-
-

@@ -1,9 +1,10 @@
 """A load case with obstacles: at every node the robot may be pushed, where it touches and only there.
 
-At node k the rod has the gap G(p, R) = d(p) - r |n_t|, with d the obstacle's signed distance, n its gradient and n_t the
-part of that across the axis: the section is a disc of radius r. A contact of size F >= 0 does the work F dG, so that
-the rod takes the force F dG/dp and the moment F dG/d(theta) there, by which N and M jump. F and G are not negative and
-one of them is zero; as an equation that is G + F - sqrt(G^2 + F^2 + 2 tau^2) = 0, whose solutions have G F = tau^2.
+At node k the rod has the gap G(p, R) = d(p) - r |n_t|, with d the obstacle's signed distance, n its gradient and n_t
+the part of that across the axis: the section is a disc of radius r. A contact of size F >= 0 does the work F dG, so
+that the rod takes the force F dG/dp and the moment F dG/d(theta) there, by which N and M jump. F and G are not negative
+and one of them is zero; as an equation that is G + F - sqrt(G^2 + F^2 + 2 tau^2) = 0, whose solutions have
+G F = tau^2.
 """
 
 from __future__ import annotations
@@ -50,8 +51,8 @@ def numbers_of(obstacles: Sequence[Obstacle], intervals: int) -> list[Quantity]:
 class Touching:
     """What a contact does to a node, as functions in scaled units.
 
-    pushed : (x, F, radius, numbers of all) -> state behind the node, gaps; F and gaps (obstacles,). stiffness : the same
-    -> the symmetric 6 x 6 second derivative of sum F_j G_j by p and a rotation, and the (6, obstacles) first ones.
+    pushed : (x, F, radius, numbers of all) -> state behind the node, gaps; F and gaps (obstacles,). stiffness : the
+    same -> the symmetric 6 x 6 second derivative of sum F_j G_j by p and a rotation, and the (6, obstacles) first ones.
     """
 
     pushed: ca.Function
@@ -139,9 +140,7 @@ class ObstructedCase:
         nodes = ca.reshape(states, nx, K + 1)
         before = ca.horzcat(ca.MX(count, 1), self.every[:, : K - 1])
         A, B, t = interval.map(K)(nodes[:, :K], before, self.fields, along, self.given[STEPS].symbol.T)
-        A, B = (
-            ca.sparsity_cast(part, ca.diagcat(*[interval.sparsity_out(k)] * K)) for k, part in enumerate((A, B))
-        )
+        A, B = (ca.sparsity_cast(part, ca.diagcat(*[interval.sparsity_out(k)] * K)) for k, part in enumerate((A, B)))
         own = ca.horzcat(A, ca.MX(nx * K, nx)) - ca.DM(
             ca.Sparsity.triplet(nx * K, nx * (K + 1), list(range(nx * K)), list(range(nx, nx * (K + 1)))), 1
         )
@@ -192,8 +191,7 @@ def obstructed_case(
     constants, balance, units = functions.section(column[: functions.section.size1_in(0)], stretch)
     L_0, F_0 = units[0], units[1]
     own = [
-        given[f"obstacle.{j + 1}"].symbol
-        / ca.vertcat(*(unit_scale(unit, L_0, F_0) for unit in obstacle.units))
+        given[f"obstacle.{j + 1}"].symbol / ca.vertcat(*(unit_scale(unit, L_0, F_0) for unit in obstacle.units))
         for j, obstacle in enumerate(obstacles)
     ]
     numbers = ca.vertcat(*own)
@@ -262,8 +260,8 @@ def obstructed_case(
 def _blocks(functions: RodFunctions, touch: Touching) -> tuple[ca.Function, ca.Function]:
     """Return the slopes of an interval, and of the gaps of a node.
 
-    (x, F, fields, their change, h) -> (18, 18), (18, obstacles), (18,) and (x, fields, their change) -> (obstacles, 18),
-    (obstacles,).
+    (x, F, fields, their change, h) -> (18, 18), (18, obstacles), (18,) and (x, fields, their change) ->
+    (obstacles, 18), (obstacles,).
     """
     nc, count = functions.field.size1_in(1), touch.pushed.size1_in(1)
     x, F, h = ca.SX.sym("x", rod.STATE_SIZE), ca.SX.sym("F", count), ca.SX.sym("h")

@@ -76,8 +76,8 @@ def answered(
     """Return the count over one rod, and the stiffness (6, 6) with which its left end answers.
 
     transition, nodes : as of `conjugate_points`. beyond : the stiffness of what is behind its right end. springs,
-    steps : (K + 1, 6, 6) with which each node is held, and the shares (K,) of the intervals, which are all taken then; the
-    nodes are behind what holds them.
+    steps : (K + 1, 6, 6) with which each node is held, and the shares (K,) of the intervals, which are all taken then;
+    the nodes are behind what holds them.
     """
     K = nodes.shape[1] - 1 if steps is not None else min(nodes.shape[1] - 1, MOST_INTERVALS)
     chosen = np.linspace(0, nodes.shape[1] - 1, K + 1).round().astype(int)

@@ -14,6 +14,7 @@ from softnlp.base.status import Status
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import Coefficients, Conventions
 from softnlp.model.materials import Material
+from softnlp.model.obstacles import Obstacle
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.model.section import SectionRadii as SectionRadii
@@ -382,6 +383,8 @@ class Run:
         Of a blocked force, else None.
     uncertainty
         What scatters and how much, by the keys of a scenario and in their units; empty where nothing was said.
+    obstacles
+        What the body may touch.
     """
 
     study: str
@@ -395,6 +398,7 @@ class Run:
     warnings: tuple[str, ...] = field(default=())
     contact: ContactSettings | None = None
     uncertainty: Mapping[str, Any] = field(default_factory=dict)
+    obstacles: tuple[Obstacle, ...] = ()
 
     @property
     def failed(self) -> tuple[Step, ...]:
