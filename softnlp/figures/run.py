@@ -83,10 +83,13 @@ def run_figure(view: RunView, measured: Sequence[tuple[float, float]] = ()) -> F
     if view.obstacles:
         draw_obstacles(axes, view.obstacles, view.robot.length)
     x = abscissa(view)
-    panels = new_panels(figure, 3 if x.with_pressures else 2)
+    among = view.contact_force is not None
+    panels = new_panels(figure, 2 + among + x.with_pressures)
     series(panels[0], view, x, BENDING.shown(view.bending_angle), BENDING.heading, std=_std(view, BENDING))
     longer = ELONGATION.shown(view.backbone_length - view.robot.length)
     series(panels[1], view, x, longer, ELONGATION.axis, std=_std(view, ELONGATION))
+    if view.contact_force is not None:
+        series(panels[2], view, x, view.contact_force.sum(axis=1), "contact force [N]", least_span=0.01)
     finish_panels(figure, panels, view, x)
     _explain_steps(figure, view)
     return figure

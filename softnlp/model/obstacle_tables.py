@@ -73,12 +73,12 @@ def _made(table: Mapping[str, Any]) -> Obstacle:
     for key in own:
         if key not in given:
             raise InputError(f"missing; a {kind} takes {', '.join(own)}", key=key)
-    values = {}
+    values: dict[str, Any] = {}
     for key, field in own.items():
         value, scale = given[key], _scale(field)
         values[field] = [v * scale for v in value] if isinstance(value, list | tuple) else value * scale
-    both = {key: table[key] for key in _BOTH if table.get(key) is not None}
-    return made(**values, **both)
+    values |= {key: table[key] for key in _BOTH if table.get(key) is not None}
+    return made(**values)
 
 
 def _own(kind: type[Obstacle]) -> list[str]:

@@ -105,6 +105,7 @@ class Touched:
     values : of the quantities, SI. s : (K + 1,) of the nodes. before, behind : (18, K + 1) states on both sides of
     what pushes at a node. pushes, gaps : (obstacles, K + 1), scaled. constants : what the field takes.
     radius, numbers : what the obstacles take. units : L_0 [m] and EI/L_0^2 [N].
+    snapped : whether the branch turned back on the way.
     """
 
     grid: ObstacleGrid
@@ -119,6 +120,7 @@ class Touched:
     radius: Array
     numbers: Array
     units: Array
+    snapped: bool = False
 
     @property
     def active(self) -> NDArray[np.bool_]:

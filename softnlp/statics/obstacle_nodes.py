@@ -13,6 +13,7 @@ from softnlp.statics.pose import Mapped
 
 Array = NDArray[np.float64]
 
+_SHORT = 0.15  # of the length: up to which all of a piece that touches counts
 _SAMPLES = 8  # of each interval, where gaps are looked at between nodes
 
 
@@ -43,12 +44,14 @@ def regraded(found: Touched, intervals: int) -> Array:
     """Return nodes (K + 1,), half of them where obstacles touch and close by.
 
     A push at one point makes a kink of the axis, by shear, so that a body touches along a short piece: F / GA over the
-    curvature that it has against the obstacle, a few hundredths of the length.
+    curvature that it has against the obstacle, a few hundredths of the length. Of a long piece both ends count, where
+    the body lifts off.
     """
-    windows = []
+    windows, last = [], found.s.size - 1
     for own in _runs(np.any(found.active, axis=0)):
-        low, high = max(own[0] - 1, 0), min(own[-1] + 1, found.s.size - 1)
-        windows.append((found.s[low], found.s[high]))
+        short = found.s[own[-1]] - found.s[own[0]] <= _SHORT
+        ends = [own] if short else [own[:1], own[-1:]]
+        windows += [(found.s[max(some[0] - 1, 0)], found.s[min(some[-1] + 1, last)]) for some in ends]
     if not windows:
         return np.linspace(0, 1, intervals + 1)
     breaks = np.unique([0.0, 1.0, *(end for window in windows for end in window)])
@@ -57,7 +60,7 @@ def regraded(found: Touched, intervals: int) -> Array:
     size = np.diff(breaks)
     share = np.where(inside, 0.5 / inside.sum(), 0.0) + 0.5 * size
     at = np.concatenate([[0.0], np.cumsum(share)])
-    s = np.interp(np.linspace(0, 1, intervals + 1), at / at[-1], breaks)
+    s: Array = np.interp(np.linspace(0, 1, intervals + 1), at / at[-1], breaks)
     s[0], s[-1] = 0.0, 1.0
     return s
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,12 +17,12 @@ from softnlp.base.units import MILLIMETRE
 from softnlp.model.obstacles import Obstacle
 from softnlp.model.rod import STATE_SIZE, Loads
 from softnlp.model.segments import SegmentedRobot
-from softnlp.nlp.continuation import follow
+from softnlp.nlp.continuation import around_folds, follow
 from softnlp.nlp.solver import Solution, discretisation_correction
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.obstacle_grid import SHARP, ObstacleGrid, Touched, compiled_obstacles, sharpened, touched
 from softnlp.statics.obstacle_nodes import fewest_touching, regraded, resampled
-from softnlp.statics.obstacle_step import names_of, obstacle_step
+from softnlp.statics.obstacle_step import OVERLAP, is_minimum, names_of, obstacle_step
 from softnlp.statics.obstructed import SMOOTHING, STEPS
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
@@ -35,6 +37,7 @@ _TAUS = (1e-5, SHARP)
 _LARGEST_JUMP = 0.1  # between points of a path, in scaled positions and direction cosines
 _SMALLEST_STEP = 1 / 1024
 _THROUGH = 5e-3  # of L_0: an overlap half-way between two points of a path from which that went through an obstacle
+_AROUND: dict[str, Any] = {"first_step": 0.02, "largest_step": 0.2, "most_solves": 800}
 _PASSES, _ENOUGH = 3, 6  # of putting nodes where obstacles touch, and how many are to be there
 _STEEPER = 4.0  # growth of what a step changes from which a path that ends has turned
 _ORDER = 2  # of the tip's error, since pushes are those of nodes
@@ -145,12 +148,21 @@ class ObstacleSolver:
             seconds = time.perf_counter() - began
             return Step(pressure, Status.DISPUTED, str(disputed), iterations=spent, solve_time=seconds), None
         if solution is not found.solution:
-            found = touched(found.grid, solution, found.values)
+            found = replace(touched(found.grid, solution, found.values), snapped=found.snapped)
         if not found.solution.holds(self.numerics.tolerance):
             seconds = time.perf_counter() - began
             message = Status.DIVERGED.advice
             return Step(pressure, Status.DIVERGED, message, iterations=spent, solve_time=seconds), None
-        return obstacle_step(self.poses, self.obstacles, pressure, loads, found, error, spent, began), found
+        step = obstacle_step(self.poses, self.obstacles, pressure, loads, found, error, spent, began)
+        deep = -min(contact.gap for contact in step.contacts)
+        if not np.isfinite(error) or (self.numerics.intervals is None and deep > OVERLAP):
+            message = f"{Status.INACCURATE.advice}; with {found.grid.intervals} intervals the body is"
+            message += f" {max(deep, 0.0) / MILLIMETRE:.2g} mm inside an obstacle between nodes"
+            status = Status.INACCURATE
+            return Step(
+                pressure, status, message, residual=step.residual, iterations=spent, solve_time=step.solve_time
+            ), None
+        return step, found
 
     def _followed(
         self, pressure: Array, loads: Loads, near: Touched | None, intervals: int
@@ -191,17 +203,50 @@ class ObstacleSolver:
             same_branch=passed,
         )
         spent = started.iterations + way.iterations
-        if not way.arrived:
-            return None, spent, way.fraction, self._turned(grid, points)
         solution = way.solution
+        if not way.arrived:
+            beyond, more = self._beyond(grid, lambda t: a + t * (b - a), solution, way.fraction, end)
+            spent += more
+            return beyond, spent, way.fraction, self._turned(grid, points)
+        found, more = self._sharp(grid, solution.x, end)
+        return found, spent + more, 1.0, False
+
+    def _sharp(self, grid: ObstacleGrid, x: Array, values: dict[str, Any]) -> tuple[Touched | None, int]:
+        """Solve with less and less smoothing, and return the solution, None where one is lost, and the iterations."""
+        spent = 0
         for tau in _TAUS:
-            values = sharpened(end, tau)
-            trial = grid.engine.solve(grid.problem.pack(values), solution.x)
-            spent += trial.iterations
-            if not trial.holds(self.numerics.tolerance):
-                return None, spent, 1.0, False
-            solution, end = trial, values
-        return touched(grid, solution, end), spent, 1.0, False
+            values = sharpened(values, tau)
+            solution = grid.engine.solve(grid.problem.pack(values), x)
+            spent, x = spent + solution.iterations, solution.x
+            if not solution.holds(self.numerics.tolerance):
+                return None, spent
+        return touched(grid, solution, values), spent
+
+    def _beyond(
+        self, grid: ObstacleGrid, path: Callable[[float], Array], start: Solution, fraction: float, end: dict[str, Any]
+    ) -> tuple[Touched | None, int]:
+        """Go on around the folds of a path and return the first stable pose at its end, to which the robot snaps."""
+        if grid.stepper.linear is None or not start.holds(10 * grid.stepper.tolerance):
+            return None, 0
+        spent, weight = 0, np.zeros(start.x.size)
+        states = np.zeros((grid.intervals + 1, STATE_SIZE))
+        states[:, :12] = 1.0 / len(states)
+        weight[1 : 1 + states.size] = states.ravel()
+        passages = around_folds(
+            grid.stepper, grid.stepper.linear, path, start, fraction, weight=weight, **_AROUND
+        )  # fmt: skip
+        for x, more in passages:
+            spent += more
+            if x is None:
+                break
+            rough = grid.stepper.solve(path(1.0), x)
+            if not rough.holds(10 * grid.stepper.tolerance):
+                continue
+            found, iterations = self._sharp(grid, rough.x, end)
+            spent += rough.iterations + iterations
+            if found is not None and is_minimum(self.poses, found):
+                return replace(found, snapped=True), spent
+        return None, spent
 
     def _through(self, grid: ObstacleGrid, before: Array, solution: Solution) -> bool:
         """Whether half-way between two points of a path the robot is inside an obstacle: it went through it."""
@@ -277,5 +322,5 @@ class ObstacleSolver:
                 solution = grid.engine.solve(grid.problem.pack({**values, SMOOTHING: tau}), solution.x)
             near = grid.distance(solution.x - x) <= _LARGEST_JUMP
             if solution.holds(self.numerics.tolerance) and near:
-                return touched(grid, solution, {**values, SMOOTHING: SHARP})
+                return replace(touched(grid, solution, {**values, SMOOTHING: SHARP}), snapped=found.snapped)
         return None

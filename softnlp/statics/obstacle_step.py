@@ -54,6 +54,11 @@ def obstacle_step(
     pose = pose_of(poses.model, result, shape, float(result["bending_angle"][0]), arc_tip * L_0, stable)
     contacts = contacts_of(obstacles, found, poses)
     warnings = list(pose_warnings(poses.model, pose))
+    if found.snapped:
+        warnings.append(
+            "the branch that the last pose is on turns back before this one: the robot snaps, and this is the first "
+            "stable pose after that"
+        )
     if error > poses.numerics.accuracy:
         warnings.append(
             f"estimated discretisation error {error:.2g} of the length is above the accuracy asked for with "
