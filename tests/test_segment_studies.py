@@ -83,6 +83,19 @@ def test_the_blocked_force_of_two_halves_is_that_of_the_whole(tmp_path: Path) ->
         assert two[1]["stable"] is None
 
 
+def test_a_wall_of_segments_stands_also_where_the_last_pressure_has_no_shape(tmp_path: Path) -> None:
+    """The wall stands where the free shape goes, of which a thousandth of the pressure tells as much."""
+    law = 'model = "soft"\nformula = "0.03 * (stretch - 1) - 0.01 * (stretch - 1) ** 2"\n'
+    soft = BASE.split("[segment.material]")[0] + f'[segment.material]\nname = "soft"\n{law}'
+    wall = '[contact]\nclosure = "free"\n[solver]\nengine = "newton"\n'
+    rows = "[0.02, 0, 0, 0, 0, 0], [9, 0, 0, 0, 0, 0]"
+    held, beyond = solved(tmp_path, scenario([soft, TOP], rows, wall, "blocked-force"))
+    assert held["blocked_force_N"] > 1e-3
+    assert held["wall_normal"] == pytest.approx([1, 0, 0], abs=1e-9)
+    assert beyond["status"] in ("unstable_material", "no_equilibrium")
+    assert beyond["message"].count("segment 1") == 1
+
+
 def test_a_wall_takes_closure_free_with_segments(tmp_path: Path) -> None:
     file = tmp_path / "scenario.toml"
     file.write_text(scenario([BASE, TOP], "[0.1, 0, 0, 0, 0, 0]", "[contact]\n", study="blocked-force"))
