@@ -151,7 +151,7 @@ class ChainWall:
         return bool(answer["tip_forces"][0] >= -_PULL * F_0)
 
     def _first_contact(self, pressure: Array, wall: Wall) -> tuple[float, Wall]:
-        """Return about the fraction of the pressure at which the free shape meets the wall for good, and the wall there.
+        """Return about the part of the pressure at which the free shape meets the wall for good, and the wall there.
 
         Where the robot is pressed into it already at rest the wall is the one that touches it then.
         """
