@@ -37,6 +37,15 @@ def test_a_pose_that_six_sets_reach_takes_the_least_pressures(tmp_path: Path) ->
     assert abs(still @ P) < 2e-3 * np.linalg.norm(P)
 
 
+@pytest.mark.slow
+def test_a_shape_that_a_body_can_take_is_looked_for_where_the_first_ones_cross_themselves(tmp_path: Path) -> None:
+    thin = segment('name = "D10L60"', "Ecoflex 00-30")
+    target = '[target]\ntip_position_mm = [[10.0, 0.0, 90.0]]\n[solver]\nengine = "newton"\n'
+    (found,) = solved(tmp_path, scenario([thin, thin], "", target, study="inverse"))
+    assert (found["status"], found["self_intersecting"]) == ("solved", False), found["message"]
+    np.testing.assert_allclose(found["tip_position_mm"], [10, 0, 90], atol=1e-6 * 120)
+
+
 def test_bounds_beyond_the_last_pressure_of_a_segment_are_refused(tmp_path: Path) -> None:
     bounds = "[stiffening]\nelongation = 0.0\n[bounds]\npressure_bar = [0, 50]\n"
     more = "[target]\ntip_position_mm = [[4.0, 3.0, 65.0]]\n" + bounds
