@@ -193,8 +193,11 @@ def test_a_fold_is_believed_on_a_grid_between_the_coarse_one_and_that_of_the_use
     folded = solve(solver, 6.0)[0]
     assert (folded.status, sizes) == (Status.FOLD, [20, 80])
     monkeypatch.setattr(blocked, "_SURE", 0.0)
+    assert solve(solver, 6.0)[0].status is Status.FOLD
+    assert sizes[2:] == [20, 80]  # both lose it at one place
+    monkeypatch.setattr(blocked, "_SAME_PLACE", -1.0)
     again = solve(solver, 6.0)[0]
-    assert sizes[2:] == [20, 80, 320]
+    assert sizes[4:] == [20, 80, 320]
     assert last_bar(again) == pytest.approx(last_bar(folded), rel=1e-3)
 
 

@@ -47,6 +47,8 @@ _NEAR_FOLD = 0.2  # of the largest in-plane determinant on the way: below it a b
 _FINEST_FIRST = 55  # intervals of a first grid, however far the free shape curls: the wall keeps the rod from that
 _MOST_STEPS_MINIMUM = 24  # to a point of a path where that is a minimum, see `MOST_STEPS`
 _MOST_WORK, _LEAST = 20_000, 100  # to follow a branch, in intervals of Newton's iterations; iterations on any grid
+_LEAST_WORK = 40_000  # the same of these iterations: on the finest grids they are fewer
+_SAME_PLACE = 0.01  # of the way: two grids that lose the branch as near to each other lose it there
 _SOUND = 0.5  # of the largest determinant: nearer to a fold an error is that of the place of the fold
 _NEAR_END = 0.98  # of a path: a fold that a coarse grid finds beyond it may lie behind the end
 _SURE = 1e-3  # estimated error of a shape on that grid below which the end of the branch after it is believed
@@ -201,7 +203,7 @@ class BlockedSolver:
         own, given, left = self.numerics.transcription, self.numerics.intervals is not None, _MOST_WORK
         like = first if own == SEARCHED_BY else 2 * first  # intervals of shooting that show as much
         tried = search_grids(first, own, SEARCHED_BY, once=given or near is not None)
-        before: Reached | None = None
+        before, lost = None, 0.0
 
         def searched(size: int) -> BlockedGrid:
             return self.grid(size, plane, SEARCHED_BY)
@@ -209,13 +211,17 @@ class BlockedSolver:
         for size, name in tried:
             cost, shown = iteration_cost(size, name), name == own and size >= first
             grid = self.grid(size, plane, name)
-            most = max(left // cost, _LEAST)
+            most = max(left // cost, min(_LEAST, _LEAST_WORK // size))
             found = self._followed(grid, route, situation, pressed, free, plane, near, most, before)
             before = found.before if isinstance(found, Ended) else None
             more = found.solution.iterations if isinstance(found, Blocked) else found.iterations
             spent, left = spent + more, left - more * cost
             if isinstance(found, Ended) and found.folded and (shown or size >= like or found.error <= _SURE):
                 break
+            if isinstance(found, Ended):
+                if lost > 0 and not found.stopped and abs(found.fraction - lost) <= _SAME_PLACE:
+                    break  # a finer grid loses it where the last one did
+                lost = found.fraction
             if isinstance(found, Blocked):
                 finer = found if shown else stepwise(found, self.grid(first, plane), searched, self._refined)
                 if finer is not None:
@@ -391,7 +397,7 @@ class BlockedSolver:
         folded = not stopped and len(sizes) > 1 and (grid.is_minimum or sizes[-1] < _NEAR_FOLD * max(sizes))
         error = sound_error(grid, self.equations.shape, path, sound, before) if folded and fraction < _NEAR_END else 1.0
         before = point_before(grid, trace, points, sound, fraction, (begin, end), pressed, free) or before
-        return Ended(reached, folded, spent, error, stopped, before)
+        return Ended(reached, folded, spent, error, stopped, before, fraction)
 
     def _refined(self, found: Blocked, grid: BlockedGrid) -> Blocked | None:
         """Return a solution solved again on a finer grid, or None where that leads elsewhere."""

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 _SAME = 0.05  # scaled change of a solution on a finer grid below which it is the same one
 _CONTRACTION = 0.1  # share of a larger change that Newton's first step leaves where it is the same one as well
-_SLOWLY = 2**0.25  # by what grids grow where a jump leads elsewhere
+_SLOWLY = 2**0.25  # by what grids grow where a jump leads elsewhere, and its root where that does too
 _FINE = 2e-3  # estimated error from which the jump is tried again
 
 
@@ -69,15 +69,18 @@ def stepwise(
 
     finer : the grid of so many intervals, of the kind whose steps are cheap. refine : a solution on a grid.
     """
-    at, size = refine(found, grid), float(found.grid.intervals)
-    while at is None and size < grid.intervals / _SLOWLY:
-        size *= _SLOWLY
-        next_one = refine(found, finer(round(size)))
-        if next_one is None:
+    at, ratio = refine(found, grid), _SLOWLY
+    while at is None and found.grid.intervals * ratio < grid.intervals:
+        size = round(found.grid.intervals * ratio)
+        between = refine(found, finer(size)) if size > found.grid.intervals else None
+        if between is not None:
+            found = between
+            if found.refinement_error <= _FINE:
+                return refine(found, grid)
+        elif ratio < _SLOWLY:
             return None
-        found = next_one
-        if found.refinement_error <= _FINE:
-            return refine(found, grid)
+        else:
+            ratio = ratio**0.5
     return at
 
 
