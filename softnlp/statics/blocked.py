@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -171,26 +172,20 @@ class BlockedSolver:
         spent += more
         if usable and self._is_rough(found):  # the neighbour's grid was too coarse for this shape: its word is no good
             found, more = self._searched(situation, pressed, free, plane, first, None)
-            spent += more
-            found, more = self._to_accuracy(found, plane)
-            spent += more
+            found, further = self._to_accuracy(found, plane)
+            spent += more + further
         return found, spent
 
     def _is_rough(self, found: Blocked | Ended) -> bool:
         """Whether a solution misses the accuracy on grids that nobody chose."""
-        chosen = self.numerics.intervals is not None
-        return isinstance(found, Blocked) and not chosen and not found.error <= self.numerics.accuracy
+        return isinstance(found, Blocked) and self.numerics.intervals is None and found.error > self.numerics.accuracy
 
     def _to_accuracy(self, found: Blocked | Ended, plane: Array | None) -> tuple[Blocked | Ended, int]:
         """Return a solution on a grid that meets the accuracy, or the finest that has it, and the iterations."""
         if isinstance(found, Ended):
             return found, 0
-        target = self.poses.numerics.accuracy / 3
-        return to_accuracy(
-            found,
-            lambda error, intervals: self.poses.next_intervals(error, intervals, target),
-            lambda there, intervals: self._refined(there, self.grid(intervals, plane)),
-        )
+        wanted = partial(self.poses.next_intervals, target=self.poses.numerics.accuracy / 3)
+        return to_accuracy(found, wanted, lambda there, size: self._refined(there, self.grid(size, plane)))
 
     def _searched(
         self, situation: Situation, pressed: Array, free: Free, plane: Array | None, first: int, near: Blocked | None
