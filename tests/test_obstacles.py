@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softnlp.base.errors import InputError
+from softnlp.model.obstacle_distance import signed_distance
 from softnlp.model.obstacle_tables import obstacle_tables, obstacles_of_tables
 from softnlp.model.obstacles import Capsule, Cylinder, Obstacle, Plane, Sphere, Trocar, Tube
 
@@ -23,7 +24,7 @@ EVERY: list[Obstacle] = [
 
 
 def at(obstacle: Obstacle, point: tuple[float, float, float]) -> float:
-    return float(obstacle.distance(ca.DM(point), ca.DM(obstacle.numbers)))
+    return float(signed_distance(obstacle, ca.DM(point), ca.DM(obstacle.numbers)))
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ from softnlp.base.reading import IMPORTED, LARGEST_TOML, one_line, read_bytes, r
 from softnlp.base.units import BAR
 from softnlp.model.segments import require_one_segment
 from softnlp.scenario.check import SCHEMAS
+from softnlp.scenario.data import require_no_obstacles
 from softnlp.scenario.read import Scenario, load_scenario, placed, scenario_from_text
 
 if TYPE_CHECKING:
@@ -134,6 +135,7 @@ class Session:
                 (Path(folder) / file).write_bytes(content)
             found = scenario_from_text(document.text(), Path(folder) / name)
             require_one_segment(found.robot, "this page")
+            require_no_obstacles(found, "this page")
             return found
 
     def open_path(self, path: Path) -> None:
@@ -141,6 +143,7 @@ class Session:
         asked = load_scenario(path)  # says the same of a broken file as the commands
         with located(source=one_line(str(path))):
             require_one_segment(asked.robot, "this page")
+            require_no_obstacles(asked, "this page")
         document = Document(read_text(path, LARGEST_TOML))
         files = {}
         for file in document.files():

@@ -10,9 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Any, ClassVar, Literal, get_args
+from typing import ClassVar, Literal, get_args
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,13 +20,6 @@ from softnlp.base.errors import InputError
 Array = NDArray[np.float64]
 Part = Literal["body", "tip axis", "tip rim"]
 """What touches: every point of the body, the end of the axis alone, or the rim of radius D_r/2 at the tip."""
-
-_NOTHING = 1e-24  # under a root, so that its slope is a number at zero
-_ROUNDED = 1e-9  # the same on an axis or at a centre, where the slope turns round: of lengths in L_0, 3e-5 squared
-
-
-def _norm(a: Any) -> Any:
-    return ca.sqrt(ca.sumsqr(a) + _ROUNDED)
 
 
 def _finite(values: Sequence[float], size: int, key: str) -> tuple[float, ...]:
@@ -80,24 +72,7 @@ class Obstacle:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """What it is made of, in the order of `units` [m or 1]."""
-        raise NotImplementedError
-
-    def distance(self, point: Any, numbers: Any) -> Any:
-        """Return the signed distance of a point.
-
-        Parameters
-        ----------
-        point
-            (3,) symbols or numbers, world frame [m].
-        numbers
-            As `Obstacle.numbers`, symbols perhaps.
-
-        Returns
-        -------
-        Any
-            A number, positive outside [m].
-        """
+        """What it is made of, (entries,) in the order of `units` [m, 1]."""
         raise NotImplementedError
 
 
@@ -107,6 +82,10 @@ class Plane(Obstacle):
 
     Attributes
     ----------
+    part
+        What of the robot touches it.
+    name
+        By which results call it; its kind and number where there is none.
     point
         (3,) of its surface, world frame [m].
     normal
@@ -125,12 +104,8 @@ class Plane(Obstacle):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Point and normal."""
+        """Point and normal, (6,) [m, 1]."""
         return (*self.point, *self.normal)
-
-    def distance(self, point: Any, numbers: Any) -> Any:
-        """Return (p - p_0) . n."""
-        return ca.dot(point - numbers[:3], numbers[3:6])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,6 +114,10 @@ class Sphere(Obstacle):
 
     Attributes
     ----------
+    part
+        What of the robot touches it.
+    name
+        By which results call it; its kind and number where there is none.
     centre
         (3,) world frame [m].
     radius
@@ -157,12 +136,8 @@ class Sphere(Obstacle):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Centre and radius."""
+        """Centre and radius, (4,) [m]."""
         return (*self.centre, self.radius)
-
-    def distance(self, point: Any, numbers: Any) -> Any:
-        """Return |p - c| - r."""
-        return _norm(point - numbers[:3]) - numbers[3]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,6 +146,10 @@ class _Round(Obstacle):
 
     Attributes
     ----------
+    part
+        What of the robot touches it.
+    name
+        By which results call it; its kind and number where there is none.
     start, end
         (3,) on its axis, world frame [m].
     radius
@@ -192,49 +171,46 @@ class _Round(Obstacle):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Both points and the radius."""
+        """Both points and the radius, (7,) [m]."""
         return (*self.start, *self.end, self.radius)
-
-    @staticmethod
-    def _along(point: Any, numbers: Any) -> tuple[Any, Any, Any]:
-        """Return how far a point is from the axis, from the middle along it, and half the length."""
-        a, b = numbers[:3], numbers[3:6]
-        length = _norm(b - a)
-        e = (b - a) / length
-        from_middle = point - (a + b) / 2
-        z = ca.dot(from_middle, e)
-        return _norm(from_middle - z * e), z, length / 2
-
-
-def _corner(outward: Any, beyond: Any) -> Any:
-    """Return the distance to the edge of a solid that two distances to its faces bound."""
-    outside = ca.sqrt(ca.fmax(outward, 0) ** 2 + ca.fmax(beyond, 0) ** 2 + _NOTHING)
-    return ca.fmin(ca.fmax(outward, beyond), 0) + outside
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cylinder(_Round):
-    """A solid cylinder with flat ends."""
+    """A solid cylinder with flat ends.
+
+    Attributes
+    ----------
+    part
+        What of the robot touches it.
+    name
+        By which results call it; its kind and number where there is none.
+    start, end
+        (3,) on its axis, world frame [m].
+    radius
+        A number [m].
+    """
 
     kind = "cylinder"
-
-    def distance(self, point: Any, numbers: Any) -> Any:
-        """Return the distance to mantle, end face or edge."""
-        radial, z, half = self._along(point, numbers)
-        return _corner(radial - numbers[6], ca.fabs(z) - half)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Capsule(_Round):
-    """A solid cylinder with round ends of its radius about both points."""
+    """A solid cylinder with round ends of its radius about both points.
+
+    Attributes
+    ----------
+    part
+        What of the robot touches it.
+    name
+        By which results call it; its kind and number where there is none.
+    start, end
+        (3,) on its axis, world frame [m].
+    radius
+        A number [m].
+    """
 
     kind = "capsule"
-
-    def distance(self, point: Any, numbers: Any) -> Any:
-        """Return the distance to the line between the points, less the radius."""
-        a, b = numbers[:3], numbers[3:6]
-        t = ca.fmin(ca.fmax(ca.dot(point - a, b - a) / ca.sumsqr(b - a), 0), 1)
-        return _norm(point - a - t * (b - a)) - numbers[6]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -242,14 +218,20 @@ class Tube(_Round):
     """A bore through a wall that is thick on all sides; the robot is inside.
 
     Both end faces of the wall, and the rim of the bore, are part of it.
+
+    Attributes
+    ----------
+    part
+        What of the robot touches it.
+    name
+        By which results call it; its kind and number where there is none.
+    start, end
+        (3,) on its axis, world frame [m].
+    radius
+        A number [m].
     """
 
     kind = "tube"
-
-    def distance(self, point: Any, numbers: Any) -> Any:
-        """Return the distance to the bore, the end faces or the rim."""
-        radial, z, half = self._along(point, numbers)
-        return _corner(numbers[6] - radial, ca.fabs(z) - half)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -258,6 +240,10 @@ class Trocar(Obstacle):
 
     Attributes
     ----------
+    part
+        What of the robot touches it.
+    name
+        By which results call it; its kind and number where there is none.
     point
         (3,) the middle of the port, world frame [m].
     axis
@@ -282,15 +268,9 @@ class Trocar(Obstacle):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """The points at both ends and the radius."""
+        """The points at both ends and the radius, (7,) [m]."""
         half = self.length / 2 * np.array(self.axis)
         return (*(np.array(self.point) - half).tolist(), *(np.array(self.point) + half).tolist(), self.radius)
-
-    def distance(self, point: Any, numbers: Any) -> Any:
-        """Return that of the tube."""
-        return Tube.distance(self, point, numbers)  # type: ignore[arg-type]
-
-    _along = staticmethod(_Round._along)
 
 
 KINDS: dict[str, type[Obstacle]] = {c.kind: c for c in (Plane, Sphere, Cylinder, Capsule, Trocar, Tube)}

@@ -137,7 +137,11 @@ def _contacts(run: Run) -> dict[str, Variable]:
         "contact_force_N": ((*dims, "axis"), force, said("N", "force of the obstacle on the robot, world frame")),
         "contact_from_s": (dims, ends[0], said("1", "first point where it touches, s/L")),
         "contact_to_s": (dims, ends[1], said("1", "last point where it touches, s/L")),
-        "contact_gap_mm": (dims, gap, said("mm", "least distance to the body, negative for an overlap between nodes")),
+        f"contact_{OUTPUTS['gap'].key}": (
+            dims,
+            gap,
+            said("mm", "least distance to the body, < 0 overlaps between nodes"),
+        ),
         "complementarity_Nmm": (("step",), left, said("N mm", "sum of each contact's force times its gap")),
         "obstacle": _words("obstacle", names_of(run.obstacles), "name of the obstacle"),
     }

@@ -133,7 +133,7 @@ def contacts_of(step: Step) -> list[dict[str, Any]] | None:
             "force_N": plain(contact.force),
             "from_s": contact.start,
             "to_s": contact.end,
-            "gap_mm": number(contact.gap, MILLIMETRE),
+            OUTPUTS["gap"].key: number(contact.gap, MILLIMETRE),
         }
         for contact in step.contacts
     ]

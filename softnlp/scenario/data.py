@@ -140,6 +140,12 @@ def scenario_of(given: object, study: str | None, function: str) -> Scenario:
     return given
 
 
+def require_no_obstacles(scenario: Scenario, what: str) -> None:
+    """Raise `InputError` for a scenario with obstacles, where something takes none. what : what takes none."""
+    if scenario.obstacles:
+        raise InputError(f"{what} takes no [[obstacle]] so far", table="obstacle")
+
+
 def run_of(scenario: Scenario, steps: Iterable[Step], *notes: str) -> Run:
     """Return the run that these steps make of a scenario, with its warnings and then `notes`."""
     same = ("study", "robot", "material", "coefficients", "conventions", "loads", "title", "contact")

@@ -1,9 +1,12 @@
-"""The table [[obstacle]] of a scenario."""
+"""The table [[obstacle]], and the scenarios that take it."""
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
+from pydantic import Field
+
+from softnlp.scenario.schema import ForwardFile
 from softnlp.scenario.values import Label, Positive, Table, Vector
 
 MOST_OBSTACLES = 20
@@ -36,3 +39,9 @@ class ObstacleTable(Table):
     length_mm: Positive | None = None
     part: Literal["body", "tip axis", "tip rim"] = "body"
     name: Label | None = None
+
+
+class AmongObstaclesFile(ForwardFile):
+    """A whole scenario of `forward`."""
+
+    obstacle: Annotated[list[ObstacleTable], Field(max_length=MOST_OBSTACLES)] = Field(default=[])

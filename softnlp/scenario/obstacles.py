@@ -10,9 +10,6 @@ from softnlp.model.obstacles import Obstacle
 from softnlp.scenario.obstacle_schema import ObstacleTable
 from softnlp.scenario.schema import ScenarioFile
 
-OF_OBSTACLES = ("forward",)
-"""The studies that take obstacles."""
-
 
 def obstacles_of(file: ScenarioFile, tables: Sequence[ObstacleTable]) -> tuple[Obstacle, ...]:
     """Return the obstacles of a file.
@@ -20,10 +17,8 @@ def obstacles_of(file: ScenarioFile, tables: Sequence[ObstacleTable]) -> tuple[O
     Raises
     ------
     InputError
-        For a study that takes none, beside [uncertainty], and as `obstacles_of_tables`.
+        Beside [uncertainty], and as `obstacles_of_tables`.
     """
-    if file.study not in OF_OBSTACLES:
-        raise InputError(f"study {file.study!r} takes none so far", table="obstacle")
     if getattr(file, "uncertainty", None) is not None:
         raise InputError("takes none beside [[obstacle]] so far", table="uncertainty")
     return obstacles_of_tables([table.model_dump() for table in tables])

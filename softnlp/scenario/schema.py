@@ -22,7 +22,6 @@ from softnlp.model.gravity import DIRECTIONS
 from softnlp.model.ipopt_options import IPOPT_OPTIONS
 from softnlp.model.numerics import EngineName, Numerics, Transcribing
 from softnlp.model.robot import DIMENSIONS, MINIMUM_WALL, ROBOTS, Robot, check
-from softnlp.scenario.obstacle_schema import MOST_OBSTACLES, ObstacleTable
 from softnlp.scenario.values import MOST_STEPS as MOST_STEPS
 from softnlp.scenario.values import Count as Count
 from softnlp.scenario.values import Direction, deviation, intervals_of, number_or_fit, vector_or_fit
@@ -375,9 +374,8 @@ class UncertaintyTable(Table):
 
 
 class ForwardFile(ScenarioFile):
-    """A whole scenario of `forward`."""
+    """What scenarios of `forward` and `blocked-force` may hold."""
 
-    obstacle: Annotated[list[ObstacleTable], Field(max_length=MOST_OBSTACLES)] = Field(default=[])
     uncertainty: UncertaintyTable | None = None
     registration: RegistrationTable = RegistrationTable()
     pressure: PressureTable = Field(description="a table with one of sequence_bar, ramp, file")

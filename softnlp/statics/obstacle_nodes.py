@@ -65,6 +65,11 @@ def regraded(found: Touched, intervals: int) -> Array:
     return s
 
 
+def halved(found: Touched) -> Array:
+    """Return nodes (2 K + 1,) with one in the middle of each interval."""
+    return np.sort(np.concatenate([found.s, (found.s[1:] + found.s[:-1]) / 2]))
+
+
 def fewest_touching(found: Touched) -> int:
     """Return the least number of nodes that touch side by side; many where the tip touches alone, or nothing does."""
     runs = _runs(np.any(found.active, axis=0))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -21,7 +21,7 @@ from softnlp.nlp.continuation import around_folds, follow
 from softnlp.nlp.solver import Solution, discretisation_correction
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.obstacle_grid import SHARP, ObstacleGrid, Touched, compiled_obstacles, sharpened, touched
-from softnlp.statics.obstacle_nodes import fewest_touching, regraded, resampled
+from softnlp.statics.obstacle_nodes import fewest_touching, halved, regraded, resampled
 from softnlp.statics.obstacle_step import OVERLAP, is_minimum, names_of, obstacle_step
 from softnlp.statics.obstructed import SMOOTHING, STEPS
 from softnlp.statics.solver import PoseSolver
@@ -33,7 +33,7 @@ _FIRST, _FINEST = 40, 320  # intervals
 _FEWEST = 4
 _REST, _TOUCHING = 400, 1e-9  # points of the unpressurised robot that are looked at, and the overlap that counts
 _PATH_TAU = 1e-3  # tau along a path: a gap of 6 um under a push of 1/100
-_TAUS = (1e-5, SHARP)
+_SHARPER, _LEAST_SHARPER = 0.1, 0.8  # by what tau falls at once, and at least
 _LARGEST_JUMP = 0.1  # between points of a path, in scaled positions and direction cosines
 _SMALLEST_STEP = 1 / 1024
 _THROUGH = 5e-3  # of L_0: an overlap half-way between two points of a path from which that went through an obstacle
@@ -213,14 +213,19 @@ class ObstacleSolver:
 
     def _sharp(self, grid: ObstacleGrid, x: Array, values: dict[str, Any]) -> tuple[Touched | None, int]:
         """Solve with less and less smoothing, and return the solution, None where one is lost, and the iterations."""
-        spent = 0
-        for tau in _TAUS:
-            values = sharpened(values, tau)
-            solution = grid.engine.solve(grid.problem.pack(values), x)
-            spent, x = spent + solution.iterations, solution.x
-            if not solution.holds(self.numerics.tolerance):
-                return None, spent
-        return touched(grid, solution, values), spent
+        spent, tau, ratio = 0, _PATH_TAU, _SHARPER
+        while True:
+            following = max(tau * ratio, SHARP)
+            solution = grid.engine.solve(grid.problem.pack(sharpened(values, following)), x)
+            spent += solution.iterations
+            if solution.holds(self.numerics.tolerance):
+                tau, x = following, solution.x
+                if tau <= SHARP:
+                    return touched(grid, solution, sharpened(values, SHARP)), spent
+            else:
+                ratio = ratio**0.5
+                if ratio > _LEAST_SHARPER:
+                    return None, spent
 
     def _beyond(
         self, grid: ObstacleGrid, path: Callable[[float], Array], start: Solution, fraction: float, end: dict[str, Any]
@@ -278,7 +283,7 @@ class ObstacleSolver:
             finer, more = self._graded(found, 2 * found.grid.intervals)
             spent += more
             if finer is found:
-                return found, spent, float("inf") if found.active.any() else error
+                return found, spent, error if given or not found.active.any() else float("inf")
             change = float(np.linalg.norm(finer.before[:3, -1] - found.before[:3, -1]))
             if given:
                 return found, spent, max(error, change * 2**_ORDER / (2**_ORDER - 1))
@@ -295,7 +300,10 @@ class ObstacleSolver:
         for _ in range(_PASSES):
             if not found.active.any() and found.grid.intervals == intervals:
                 break
-            trial = self._on(self.grid(intervals), found, regraded(found, intervals))
+            grid = self.grid(intervals)
+            trial = self._on(grid, found, regraded(found, intervals))
+            if trial is None and intervals > found.grid.intervals:
+                trial = self._on(grid, found, halved(found))
             if trial is None:
                 break
             spent, found = spent + trial.solution.iterations, trial
@@ -315,12 +323,12 @@ class ObstacleSolver:
     def _on(self, grid: ObstacleGrid, found: Touched, s: Array) -> Touched | None:
         """Solve a solution again on nodes s of a grid; None where that leads elsewhere."""
         x = resampled(self.poses.shape, found, grid, s)
-        values: Mapping[str, Any] = {**found.values, STEPS: np.diff(s)}
-        for taus in ((SHARP,), (_PATH_TAU, *_TAUS)):
-            solution = Solution(x, np.zeros(0), np.inf, 0, "")
-            for tau in taus:
-                solution = grid.engine.solve(grid.problem.pack({**values, SMOOTHING: tau}), solution.x)
-            near = grid.distance(solution.x - x) <= _LARGEST_JUMP
-            if solution.holds(self.numerics.tolerance) and near:
-                return replace(touched(grid, solution, {**values, SMOOTHING: SHARP}), snapped=found.snapped)
+        values: dict[str, Any] = {**found.values, STEPS: np.diff(s)}
+        solution = grid.engine.solve(grid.problem.pack({**values, SMOOTHING: SHARP}), x)
+        if solution.holds(self.numerics.tolerance) and grid.distance(solution.x - x) <= _LARGEST_JUMP:
+            return replace(touched(grid, solution, {**values, SMOOTHING: SHARP}), snapped=found.snapped)
+        smooth = grid.engine.solve(grid.problem.pack({**values, SMOOTHING: _PATH_TAU}), x)
+        again = self._sharp(grid, smooth.x, values)[0] if smooth.holds(self.numerics.tolerance) else None
+        if again is not None and grid.distance(again.solution.x - x) <= _LARGEST_JUMP:
+            return replace(again, snapped=found.snapped)
         return None

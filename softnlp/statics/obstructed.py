@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from softnlp.base.quantity import Quantity, quantity
 from softnlp.model import rod
+from softnlp.model.obstacle_distance import signed_distance
 from softnlp.model.obstacles import Obstacle
 from softnlp.model.quantities import Model, quantities, section_function
 from softnlp.model.section import unit_scale
@@ -63,7 +64,7 @@ def _gap(x: Any, obstacle: Obstacle, numbers: Any, radius: Any) -> Any:
     """Return G at a state."""
     p, R, _, _ = rod.unpack(x)
     point = ca.SX.sym("point", 3)
-    distance = obstacle.distance(point, numbers)
+    distance = signed_distance(obstacle, point, numbers)
     normal = ca.gradient(distance, point)
     d, n = ca.substitute([distance, normal], [point], [p])
     axial = ca.dot(n, R[:, 2])

@@ -20,6 +20,7 @@ from softnlp.model.rod import Loads
 from softnlp.model.section import SectionRadii as SectionRadii
 from softnlp.nlp.solver import EquationResidual, Ipopt
 from softnlp.statics.body import Fit, fit_of
+from softnlp.statics.obstacle_contact import ObstacleContact as ObstacleContact
 
 Array = NDArray[np.float64]
 
@@ -226,35 +227,6 @@ class Contact:
     def elasticities(self) -> dict[str, float]:
         """The elasticity of the force to each weight by its name [1]."""
         return {line.weight: line.elasticity for line in self.sensitivity}
-
-
-@dataclass(frozen=True, eq=False)
-class ObstacleContact:
-    """One obstacle and what it does to the robot in one step, world frame.
-
-    Attributes
-    ----------
-    obstacle
-        Its name.
-    force
-        (3,) on the robot, of all points where it touches [N].
-    start, end
-        The first and the last of these points, fractions of the length, None where it does not touch [1].
-    gap
-        Least distance to the body, negative where they overlap between nodes [m].
-    arc
-        (n,) where it touches, fractions of the length [1].
-    forces
-        (n, 3) on the robot there [N].
-    """
-
-    obstacle: str
-    force: Array
-    start: float | None
-    end: float | None
-    gap: float
-    arc: Array
-    forces: Array
 
 
 @dataclass(frozen=True, eq=False)
