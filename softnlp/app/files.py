@@ -12,6 +12,7 @@ from nicegui import events, ui
 
 from softnlp.app.controls import dismiss_refusals, plain_words, refuse
 from softnlp.app.document import Document
+from softnlp.app.examples import example_choice
 from softnlp.app.parts import while_open
 from softnlp.app.session import LARGEST_FILE, Session
 from softnlp.base.errors import InputError, SoftnlpError
@@ -80,6 +81,7 @@ def open_dialog(session: Session) -> ui.dialog:
             multiple=True, auto_upload=True, max_file_size=LARGEST_FILE, on_multi_upload=taken, on_rejected=refused
         )
         upload.props('flat bordered accept=".toml,.csv,.txt" data-testid=open-upload').classes("w-full")
+        example_choice(session, dialog)
         ui.button("Cancel", on_click=dialog.close).props("flat no-caps data-testid=open-cancel")
     return dialog
 

@@ -17,6 +17,7 @@ from softnlp.app.panels.results import ResultsPanel
 from softnlp.app.panels.robot import robot_panel
 from softnlp.app.session import Session, Stage
 from softnlp.app.tabs.blocked import blocked_tab
+from softnlp.app.tabs.design import design_tab
 from softnlp.app.tabs.identify import identify_tab
 from softnlp.app.tabs.inverse import inverse_tab
 from softnlp.app.tabs.scenario import scenario_tab
@@ -31,6 +32,7 @@ STUDIES = {
     "workspace": ("Workspace", "workspace", workspace_tab),
     "inverse": ("Inverse", "inverse", inverse_tab),
     "identify": ("Identification", "identify", identify_tab),
+    "design": ("Design", "design", design_tab),
 }
 """The tabs: label, study of the scenario while it is open, and what builds it."""
 _TAB_OF = {study: name for name, (_, study, _) in STUDIES.items()}

@@ -102,7 +102,7 @@ class RunRow:
         begun = self.progress.fraction > 0
         self._bar.props(remove="indeterminate") if begun else self._bar.props("indeterminate")
         self._bar.set_value(self.progress.fraction)
-        self.say("Stopping after this step…" if self.progress.stopping else self.progress.text or "Working…")
+        self.say("Stopping after this step…" if self.progress.stopping else self.progress.words() or "Working…")
         if self._watch is not None:
             self._watch()
 

@@ -210,6 +210,10 @@ class Session:
         looked = self.document.study
         return looked if looked in self._used or {looked, self._last_used} <= _POSES else self._last_used
 
+    def is_used(self, study: str) -> bool:
+        """Whether the file was of a study, or it was run or changed; a look at it is not enough."""
+        return study in self._used
+
     def use(self) -> None:
         """Make the study on the screen that of the file."""
         self._last_used = self.document.study
