@@ -17,7 +17,6 @@ from softnlp.app.panels.results import ResultsPanel
 from softnlp.app.panels.robot import robot_panel
 from softnlp.app.session import Session, Stage
 from softnlp.app.tabs.blocked import blocked_tab
-from softnlp.app.tabs.design import design_tab
 from softnlp.app.tabs.identify import identify_tab
 from softnlp.app.tabs.inverse import inverse_tab
 from softnlp.app.tabs.scenario import scenario_tab
@@ -26,16 +25,38 @@ from softnlp.app.tabs.workspace import workspace_tab
 from softnlp.app.theme import style_page
 from softnlp.app.view import RobotView
 
-STUDIES = {
+
+
+def _design(stage: Stage) -> None:
+    from softnlp.app.tabs.design import design_tab  # these three when they are opened: the page is there sooner
+
+    design_tab(stage)
+
+
+def _compare(stage: Stage) -> None:
+    from softnlp.app.tabs.compare import compare_tab
+
+    compare_tab(stage)
+
+
+def _sensitivity(stage: Stage) -> None:
+    from softnlp.app.tabs.sensitivity import sensitivity_tab
+
+    sensitivity_tab(stage)
+
+
+STUDIES: dict[str, tuple[str, str | None, Callable[[Stage], None]]] = {
     "kinematics": ("Kinematics", "forward", sequence_tab),
     "blocked": ("Blocked force", "blocked-force", blocked_tab),
     "workspace": ("Workspace", "workspace", workspace_tab),
     "inverse": ("Inverse", "inverse", inverse_tab),
     "identify": ("Identification", "identify", identify_tab),
-    "design": ("Design", "design", design_tab),
+    "design": ("Design", "design", _design),
+    "compare": ("Compare", None, _compare),
+    "sensitivity": ("Sensitivity", None, _sensitivity),
 }
-"""The tabs: label, study of the scenario while it is open, and what builds it."""
-_TAB_OF = {study: name for name, (_, study, _) in STUDIES.items()}
+"""The tabs: label, study of the scenario while it is open (None: any), and what builds it."""
+_TAB_OF = {study: name for name, (_, study, _) in STUDIES.items() if study is not None}
 SCENARIO = "scenario"
 _LINE = "border-neutral-300 dark:border-neutral-700"
 _HEADER = f"h-12 px-3 py-0 items-center no-wrap gap-2 border-b softnlp-surface {_LINE}"

@@ -111,12 +111,12 @@ def study_row(
     marker: str,
     label: str,
     asked: Callable[[], Callable[[Progress], T]],
-    done: Callable[[T], None],
+    done: Callable[[T], Awaitable[None] | None],
     watch: Callable[[], None] | None = None,
 ) -> RunRow:
     """Show the row of a study: the button does the work that `asked` returns, `done` gets its result.
 
-    What is not possible is said. watch : as of `RunRow.do`.
+    What is not possible is said. done : may go on drawing (a coroutine). watch : as of `RunRow.do`.
     """
 
     async def begin() -> None:
@@ -126,8 +126,8 @@ def study_row(
             row.warn(plain_words(error))
             return
         found = await row.do(work, watch)
-        if found is not None:
-            done(found)
+        if found is not None and (drawing := done(found)) is not None:
+            await drawing
 
     row = RunRow(marker, label, begin)
     return row
