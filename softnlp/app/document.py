@@ -53,7 +53,8 @@ class Document:
 
     `text` writes the file of one study: with the tables that this study has, and with its comments.
 
-    offered : tables that a study started with, which nobody has changed. sweeps_wall : whether a workspace pushes against the wall of the blocked force, which may be there for that alone.
+    offered : tables that a study started with, which nobody has changed. sweeps_wall : whether a workspace pushes
+    against the wall of the blocked force, which may be there for that alone.
     """
 
     def __init__(self, text: str = START) -> None:
@@ -80,7 +81,7 @@ class Document:
         return dict(found.unwrap()) if isinstance(found, Table | InlineTable) else {}
 
     def own(self) -> dict[str, Any]:
-        """Return what a person has put into the document, of every study, as plain Python; not which is on the screen."""
+        """Return as plain Python what a person has put into the document, of every study."""
         every: dict[str, Any] = self._tables.unwrap()
         return {key: value for key, value in every.items() if key != "study" and key not in self.offered}
 

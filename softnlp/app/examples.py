@@ -55,4 +55,8 @@ def empty_state(session: Session, study: str, name: str, words: str) -> None:
         ui.label(words).classes("text-sm grow")
         button = ui.button("Open an example", icon="school", on_click=partial(open_example, session, name))
         named(button.props("dense outline no-caps size=sm").classes("px-2 shrink-0"), f"{study}.example")
-    session.follow(lambda: line.set_visibility(not session.is_used(study)))
+
+    def show() -> None:
+        line.set_visibility(not session.is_used(study))
+
+    session.follow(show)

@@ -12,6 +12,8 @@ from softnlp.app.files import mesh_menu, open_dialog, save
 from softnlp.app.live_view import LiveView
 from softnlp.app.panels.equations import coefficients_panel, loads_panel, solver_panel
 from softnlp.app.panels.material import material_panel
+from softnlp.app.panels.past import Past
+from softnlp.app.panels.pins import PinsPanel
 from softnlp.app.panels.pressure import pressure_panel
 from softnlp.app.panels.results import ResultsPanel
 from softnlp.app.panels.robot import robot_panel
@@ -24,7 +26,7 @@ from softnlp.app.tabs.sequence import sequence_tab
 from softnlp.app.tabs.workspace import workspace_tab
 from softnlp.app.theme import style_page
 from softnlp.app.view import RobotView
-
+from softnlp.statics.step import Run
 
 
 def _design(stage: Stage) -> None:
@@ -65,8 +67,8 @@ _MESSAGE = "absolute bottom-2 left-2 right-2 text-sm rounded px-3 py-2 bg-orange
 _NOT_USED = "Not used:"
 
 
-def build_page(session: Session) -> None:
-    """Build one browser tab for a session."""
+def build_page(session: Session, pins: str = "") -> None:
+    """Build one browser tab for a session. pins : those that the browser kept."""
     dark = ui.dark_mode()
     style_page()
     chosen = _TAB_OF.get(session.document.study, SCENARIO)
@@ -83,12 +85,17 @@ def build_page(session: Session) -> None:
             _panels(session)
         with ui.column().classes("grow min-w-0 h-full gap-0 relative"):
             view = RobotView().classes("w-full grow min-h-0").props("data-testid=view")
+            with ui.row().classes("absolute top-2 left-2 gap-1 z-10"):
+                Past(session)
+                pin = button("Pin", "push_pin", "pin", lambda: pinned.pin(), "flat dense no-caps")
+                pin.tooltip("Keep this state beside those to come")
             _view_buttons(view)
             message = ui.label().classes(_MESSAGE).props("data-testid=message role=status").mark("message")
             message.set_visibility(False)
         stage = Stage(session, view)
         with ui.element("div").classes(f"w-[390px] border-l {_COLUMN} {_LINE}"):
             results = ResultsPanel()
+            pinned = PinsPanel(stage, lambda: results.run, pins)
             ui.separator()
             _studies(stage, tabs, chosen)
             ui.separator()
@@ -101,7 +108,11 @@ def build_page(session: Session) -> None:
         message.set_text(words)
         message.set_visibility(bool(words))
 
-    live = LiveView(stage, results.show, say)
+    def found(run: Run) -> None:
+        results.show(run)
+        pinned.show(run)
+
+    live = LiveView(stage, found, say)
     with exports:
         mesh_menu(session, lambda: None if results.run is None else results.run.steps[0].pose)
 

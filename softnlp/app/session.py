@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.app.document import START, Document
+from softnlp.app.history import State
 from softnlp.app.live import LivePoses
 from softnlp.base.errors import InputError, located
 from softnlp.base.reading import LARGEST_TOML, one_line, read_bytes, read_text, shown
@@ -264,7 +265,7 @@ class Session:
     def kept(self) -> str:
         """Return all that is on the screen as text, for `recall`."""
         kept: dict[str, Any] = {"name": self.name, "source": self.document.source(), "study": self.document.study}
-        kept |= {"last_used": self._last_used, "used": sorted(self._used)}
+        kept |= {"last_used": self._last_used, "used": sorted(self._used), "offered": sorted(self.document.offered)}
         sound = None if self.problem is None else self._sound  # what the picture shows meanwhile
         return json.dumps(kept | {"sound": sound, "pressure": None if self.follows_file else self.pressure.tolist()})
 
@@ -292,11 +293,32 @@ class Session:
             self.document = Document(str(source))
             self.document.study = str(study)
             self.reread()
+        self.document.offered |= {str(name) for name in kept.get("offered", [])}
         self._used |= used & set(SCHEMAS)
         self.choose(str(study))
         self._last_used = str(kept["last_used"]) if kept.get("last_used") in self._used else self._last_used
         if pressure is not None and len(pressure) == len(self.pressure):
             self.set_pressure(np.asarray(pressure, dtype=float))
+
+    def state(self) -> State:
+        """Return what is on the screen, for a way back."""
+        pressure = tuple(map(float, self.pressure))
+        return State(self.document.own(), pressure, self.name, self.kept(), self.kept_files())
+
+    def restore(self, state: State) -> None:
+        """Show a state of this session again; the tab on the screen stays, and so do its files."""
+        kept, looked = json.loads(state.kept), self.document.study
+        for name, content in json.loads(state.files).items():
+            (self.folder / plain_name(name)).write_bytes(b64decode(content))
+        document = Document(str(kept["source"]))
+        document.offered, document.sweeps_wall = set(kept["offered"]), self.document.sweeps_wall
+        document.start(looked)
+        self.document, self.name = document, state.name
+        self._used, self._last_used = set(kept["used"]), str(kept["last_used"])
+        self.follows_file = kept["pressure"] is None
+        self.pressure = np.asarray(state.pressure)
+        self.reread()
+        self._tell(self._pressure_listeners)
 
     def asked(self) -> Scenario:
         """Return the scenario of `text`, as a run of the saved file would have it; raises `InputError`."""

@@ -132,8 +132,8 @@ def _scatter(axes: Axes, done: Design) -> None:
             if np.isfinite(value):
                 axes.axvline(value / against.scale, color=INK, linewidth=0.9, linestyle=(0, (5, 3)), zorder=2)
                 axes.text(
-                    value / against.scale, 1.01, f"{words} {value / against.scale:g}", size=SMALL, color=INK, ha="center",
-                    va="bottom", transform=axes.get_xaxis_transform(),
+                    value / against.scale, 1.01, f"{words} {value / against.scale:g}", size=SMALL, color=INK,
+                    ha="center", va="bottom", transform=axes.get_xaxis_transform(),
                 )  # fmt: skip
     plain(axes, _axis(against), _axis(objective))
     if axes.collections:

@@ -174,12 +174,17 @@ def _part(label: str, test: str) -> ui.expansion:
 
 @dataclass(frozen=True)
 class Line:
-    """A number with its name and unit. key : of the JSON document, with the index of an entry, `tip_position_mm.0`."""
+    """A number with its name and unit.
+
+    key : of the JSON document, with the index of an entry, `tip_position_mm.0`. value : in full, or
+    None.
+    """
 
     key: str
     label: str
     text: str
     unit: str
+    value: float | None = None
 
 
 @dataclass(frozen=True)
@@ -204,9 +209,10 @@ def _numbers(run: Run, step: dict[str, Any]) -> list[Line]:
     backbone, length = step[OUTPUTS["backbone_length"].key], longer.shown(run.robot.length)
     elongation = None if backbone is None else backbone - length
     lines = _lines({**step, longer.key: elongation}, [*names, *TABLES["page, wall"]], run)
-    relative = written(None if elongation is None else 100 * elongation / length, ".2f", NOTHING)
+    share = None if elongation is None else 100 * elongation / length
     at = 1 + next(k for k, line in enumerate(lines) if line.key == longer.key)
-    return [*lines[:at], Line(f"{longer.name}_percent", lines[at - 1].label, relative, "% of L₀"), *lines[at:]]
+    percent = Line(f"{longer.name}_percent", lines[at - 1].label, written(share, ".2f", NOTHING), "% of L₀", share)
+    return [*lines[:at], percent, *lines[at:]]
 
 
 def _lines(step: dict[str, Any], names: Sequence[str], run: Run) -> list[Line]:
@@ -216,14 +222,18 @@ def _lines(step: dict[str, Any], names: Sequence[str], run: Run) -> list[Line]:
         found, title = step[output.key], output.title or output.label.capitalize()
         if not output.dims:
             text = written(found, output.page, NOTHING) + _spread(step, output)
-            lines.append(Line(output.key, title, text, output.unit.sign))
+            lines.append(Line(output.key, title, text, output.unit.sign, _float(found)))
             continue
         indices = list("xyz") if output.dims == ("axis",) else [str(n + 1) for n in range(run.robot.chambers)]
         for k, index in enumerate(indices):
             entry = None if found is None or k >= len(found) else found[k]
             text = written(entry, output.page, NOTHING) + _spread(step, output, k)
-            lines.append(Line(f"{output.key}.{k}", title.format(index), text, output.unit.sign))
+            lines.append(Line(f"{output.key}.{k}", title.format(index), text, output.unit.sign, _float(entry)))
     return lines
+
+
+def _float(value: Any) -> float | None:
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
 def _spread(step: dict[str, Any], output: Output, entry: int | None = None) -> str:

@@ -54,7 +54,9 @@ class _Compare:
             "conventions": self._choice("conventions", "Conventions", [*CONVENTIONS]),
             "closures": self._choice("closures", "Closures", [*CLOSURES]),
         }
-        ui.label(f"Nothing chosen is {empty}; several of each are compared with each other.").classes("text-sm opacity-80")
+        ui.label(f"Nothing chosen is {empty}; several of each are compared with each other.").classes(
+            "text-sm opacity-80"
+        )
         self._shape = controls.toggle({"free": "Free shapes", "blocked": "Blocked shapes"}, "compare.shape", "free")
         self._row = study_row("compare", "Compare", self._asked, self._finish)
         self._table = NumberTable("compare.table", height="20rem")

@@ -111,7 +111,11 @@ class _Rows:
 
         field = controls.number(label, name, look="debounce=400", value=get(), on_change=lambda e: entered(e.value))
         field.classes("grow min-w-0 basis-0")
-        self._set.append(lambda: None if field.is_deleted else field.set_value(get()))
+
+        def show() -> None:
+            field.set_value(get())
+
+        self._set.append(show)
 
 
 class _Choices(_Rows):
@@ -154,7 +158,9 @@ class _Choices(_Rows):
         if key in wanted.SIZES:
             words = "list" if wanted.ends(value) is not None else "range"
             icon = "format_list_numbered" if words == "list" else "swap_horiz"
-            other = controls.button("", icon, f"choices.{key}.kind", partial(self._turn, key), "flat dense round size=sm")
+            other = controls.button(
+                "", icon, f"choices.{key}.kind", partial(self._turn, key), "flat dense round size=sm"
+            )
             other.props(f'aria-label="{self.every[key]} as a {words}"').tooltip(f"As a {words}")
 
     def _list(self, key: str) -> None:
@@ -286,7 +292,9 @@ class _Actuation:
 def _objective(session: Session) -> None:
     """Show what is maximised or minimised."""
     controls.heading("What is best")
-    options = {key: f"{o.label} [{o.unit.sign or '-'}]" for key, o in wanted.REQUIRED.items() if o.name != "chamber_gap"}
+    options = {
+        key: f"{o.label} [{o.unit.sign or '-'}]" for key, o in wanted.REQUIRED.items() if o.name != "chamber_gap"
+    }
     way = controls.toggle({"maximise": "Largest", "minimise": "Smallest"}, "objective.way")
     of = controls.select(options, "objective.of", "Of")
 

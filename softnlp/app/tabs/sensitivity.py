@@ -1,4 +1,4 @@
-"""The sensitivity tab: what the pose shown is sensitive to, and what tolerances do to its tip, as the command says it."""
+"""The sensitivity tab: what the pose shown is sensitive to, and what tolerances do to its tip, as the command says."""
 
 from __future__ import annotations
 
@@ -62,7 +62,9 @@ class _Sensitivity:
                     field.props(controls.BOX).without_auto_validation().classes("grow min-w-0")
                     field.on_value_change(lambda e, key=key: self._tolerances.update({key: str(e.value or "")}))
                     remove = partial(self._remove, key)
-                    control = controls.button("", "close", f"tolerance.remove.{key}", remove, "flat dense round size=sm")
+                    control = controls.button(
+                        "", "close", f"tolerance.remove.{key}", remove, "flat dense round size=sm"
+                    )
                     control.props(f'aria-label="remove {key}"')
         self._add.set_options(wanted.free_keys(self._known(), self._tolerances), value=None)
 

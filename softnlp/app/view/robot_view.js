@@ -38,6 +38,9 @@ export default {
     targets(message) {
       this.stage?.marks.setTargets(message);
     },
+    pins(message) {
+      this.stage?.setPins(message?.pins ?? []);
+    },
     reset() {
       this.stage?.reset();
     },

@@ -3,7 +3,7 @@ import { OrbitControls, THREE } from "nicegui-scene";
 import { Arrows, TipFrame } from "./arrows.js";
 import { Body, Ghost, readRobot } from "./body.js";
 import { stationFrames } from "./expand.js";
-import { spread } from "./label.js";
+import { Label, spread } from "./label.js";
 import { Marks } from "./marks.js";
 import { Surroundings } from "./surroundings.js";
 import { followTheme } from "./theme.js";
@@ -86,6 +86,29 @@ export class Stage {
     this.scene.add(this.body.group, this.ghost.group);
   }
 
+  // Bodies that stay, each a ghost of its own robot with a letter at its tip.
+  setPins(messages) {
+    for (const { ghost, label } of this.pins ?? []) {
+      ghost.dispose();
+      this.labels.delete(label);
+      label.dispose();
+    }
+    this.pins = messages.map((message) => {
+      const tube = readTube(message.tube);
+      const ghost = new Ghost(readRobot(message.robot), this.theme, message.colour);
+      ghost.update(tube);
+      const label = new Label({ size: 15, weight: 700, inFront: true, rank: 1 });
+      label.write(message.label, this.theme.ink, this.theme.halo);
+      label.sprite.position.set(...tube.axis.subarray(-7, -4));
+      this.labels.add(label);
+      ghost.group.add(label.sprite);
+      this.scene.add(ghost.group);
+      return { ghost, label, text: message.label };
+    });
+    this.rescale();
+    this.request();
+  }
+
   // Only kept here: of several that come before the next animation frame the last is drawn, and the tip of each.
   show(frame) {
     this.next = { ...frame, body: readTube(frame.body), ghost: readTube(frame.ghost) };
@@ -149,6 +172,10 @@ export class Stage {
     this.scene.background = new THREE.Color(theme.background);
     this.body?.paint(theme);
     this.ghost?.paint(theme);
+    for (const { ghost, label, text } of this.pins ?? []) {
+      ghost.paint(theme);
+      label.write(text, theme.ink, theme.halo);
+    }
     this.marks.paint(theme);
     if (this.frame !== undefined) this.next ??= this.frame;
     this.request();
@@ -249,6 +276,7 @@ export class Stage {
     this.surroundings.clear();
     this.body?.dispose();
     this.ghost?.dispose();
+    this.setPins([]);
     for (const label of this.labels) label.dispose();
     this.renderer.dispose();
     this.renderer.forceContextLoss(); // a browser has few of them
