@@ -7,6 +7,7 @@ from functools import partial
 
 from nicegui import ui
 
+from softnlp.app.asking import sentence
 from softnlp.app.controls import button
 from softnlp.app.files import mesh_menu, open_dialog, save
 from softnlp.app.live_view import LiveView
@@ -64,7 +65,17 @@ _LINE = "border-neutral-300 dark:border-neutral-700"
 _HEADER = f"h-12 px-3 py-0 items-center no-wrap gap-2 border-b softnlp-surface {_LINE}"
 _COLUMN = "softnlp-column shrink-0 h-full overflow-y-auto overflow-x-hidden p-3"
 _MESSAGE = "absolute bottom-2 left-2 right-2 text-sm rounded px-3 py-2 bg-orange-100 text-orange-950"
-_NOT_USED = "Not used:"
+_GREY = "Grey: the last robot that made sense."
+_PANELS = {
+    "robot": "robot",
+    "material": "material",
+    "gravity": "loads",
+    "tip_load": "loads",
+    "stiffening": "coefficients",
+    "corrections": "coefficients",
+    "solver": "solver",
+}
+"""The panel on the left that says what is wrong with a table."""
 
 
 def build_page(session: Session, pins: str = "") -> None:
@@ -82,8 +93,8 @@ def build_page(session: Session, pins: str = "") -> None:
         exports = _files(session, dark)
     with ui.row().classes("w-full no-wrap gap-0").style("height: calc(100vh - 48px)"):
         with ui.element("div").classes(f"w-[330px] border-r {_COLUMN} {_LINE}"):
-            _panels(session)
-        with ui.column().classes("grow min-w-0 h-full gap-0 relative"):
+            panels = _panels(session)
+        with ui.column().classes("softnlp-middle grow min-w-0 h-full gap-0 relative") as middle:
             view = RobotView().classes("w-full grow min-h-0").props("data-testid=view")
             with ui.row().classes("absolute top-2 left-2 gap-1 z-10"):
                 Past(session)
@@ -94,19 +105,22 @@ def build_page(session: Session, pins: str = "") -> None:
             message.set_visibility(False)
         stage = Stage(session, view)
         with ui.element("div").classes(f"w-[390px] border-l {_COLUMN} {_LINE}"):
-            results = ResultsPanel()
+            with ui.element("div").classes("w-full") as shown:
+                results = ResultsPanel()
             pinned = PinsPanel(stage, lambda: results.run, pins)
             ui.separator()
             _studies(stage, tabs, chosen)
             ui.separator()
             results.details()
 
-    def say(words: str) -> None:
-        """Show a line below the view; while something makes no sense, that is said where there is nothing else."""
-        if not words and session.problem is not None and not awaits_data(session):
-            words = f"{_NOT_USED} {session.problem}"
+    def say(words: str, stale: bool = False) -> None:
+        """Show a line below the view, and in grey what is no picture of the controls."""
+        if session.is_stale and not awaits_data(session):
+            words, stale = stale_words(session), True
         message.set_text(words)
         message.set_visibility(bool(words))
+        for part in (middle, shown):
+            part.classes(add="softnlp-stale") if stale else part.classes(remove="softnlp-stale")
 
     def found(run: Run) -> None:
         results.show(run)
@@ -117,8 +131,10 @@ def build_page(session: Session, pins: str = "") -> None:
         mesh_menu(session, lambda: None if results.run is None else results.run.steps[0].pose)
 
     def read_again() -> None:
-        if session.problem is not None or message.text.startswith(_NOT_USED):
+        if session.is_stale or message.text.startswith(_GREY):
             say("")
+        if session.is_stale and session.problem is not None and session.problem.table in _PANELS:
+            panels[_PANELS[session.problem.table]].set_value(True)  # where it is said
         opened = _TAB_OF.get(session.document.study, SCENARIO)
         if tabs.value != opened and tabs.value != SCENARIO:
             tabs.set_value(opened)
@@ -126,6 +142,15 @@ def build_page(session: Session, pins: str = "") -> None:
     session.on_scenario(read_again)
     say("")
     live.request()
+
+
+def stale_words(session: Session) -> str:
+    """Return what to say of a picture that is not of what is on the screen: where it is told, or else what is wrong."""
+    problem = session.problem
+    table = "" if problem is None else problem.table or ""
+    if problem is None or table in _PANELS:
+        return f"{_GREY} See the field marked red on the left."
+    return f"{_GREY} {sentence(problem.message)}"
 
 
 def awaits_data(session: Session) -> bool:
@@ -147,8 +172,9 @@ def _files(session: Session, dark: ui.dark_mode) -> ui.menu:
     return exports
 
 
-def _panels(session: Session) -> None:
-    """Build what describes the robot, its silicone, its loads and the equations."""
+def _panels(session: Session) -> dict[str, ui.expansion]:
+    """Build what describes the robot, its silicone, its loads and the equations; return the panels by name."""
+    panels = {}
     for name, label, opened, build in (
         ("pressures", "Pressures", True, pressure_panel),
         ("robot", "Robot", True, robot_panel),
@@ -162,6 +188,8 @@ def _panels(session: Session) -> None:
         with panel:
             inside = ui.column().classes("w-full gap-2 pb-3")
         _when_open(panel, inside, partial(build, session))
+        panels[name] = panel
+    return panels
 
 
 def _when_open(panel: ui.expansion, inside: ui.element, build: Callable[[], None]) -> None:

@@ -79,7 +79,7 @@ class Session:
         self.problem: InputError | None = None
         self.name = name
         self._start(Document(text))
-        self._sound = ""
+        self._sound, self._stale = "", False
         self.follows_file = True
         self.scenario = self._read()
         self.pressure = self._last_pressure()
@@ -110,7 +110,7 @@ class Session:
         for file, content in given.items():
             (self.folder / file).write_bytes(content)
         self._start(document)
-        self.problem, self._sound = None, document.text()
+        self.problem, self._sound, self._stale = None, document.text(), False
         self.scenario = replace(scenario, path=self.folder / name)
         self.name, self.follows_file = name, True
         self.pressure = self._last_pressure()
@@ -201,6 +201,11 @@ class Session:
         if study != self.document.study:
             self.document.start(study)
             self.reread()
+
+    @property
+    def is_stale(self) -> bool:
+        """Whether `scenario` is an earlier one, since what is on the screen makes no sense."""
+        return self.problem is not None and self._stale
 
     @property
     def study(self) -> str:
@@ -347,10 +352,11 @@ class Session:
             try:
                 text = self.document.text(study)
                 scenario = scenario_from_text(text, self.folder / self.name)
-                self._sound = text
+                self._sound, self._stale = text, False
                 return scenario
             except InputError as error:
                 self.problem = self.problem or type(error)(error.message, table=error.table, key=error.key)
+        self._stale = True
         return None
 
     def _last_pressure(self) -> Array:

@@ -19,6 +19,7 @@ body {{ overflow: hidden; }}
 .body--dark {{ --q-primary: {_SKY} !important; }}
 .body--dark {{ --q-negative: #FF8A80 !important; }}
 @layer overrides {{ .body--dark .bg-primary {{ color: #111 !important; }} }}
+.softnlp-stale .softnlp-view, .softnlp-column .softnlp-stale {{ filter: grayscale(1); opacity: 0.62; }}
 .softnlp-panel .q-item {{ padding: 2px 0; min-height: 32px; }}
 .softnlp-panel .nicegui-expansion-content {{ padding: 0; }}
 """
