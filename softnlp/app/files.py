@@ -74,7 +74,7 @@ def open_dialog(session: Session) -> ui.dialog:
         refuse(f"not opened: expected .toml and .csv files of at most {LARGEST_FILE / 1e6:.0f} MB")
 
     with ui.dialog() as dialog, ui.card().classes("w-96"):
-        ui.label("Open a scenario").classes("text-lg")
+        ui.label("Open a scenario").classes("text-lg").props("role=heading aria-level=2")
         ui.label("A .toml file; drop the CSV and material files that it names together with it.").classes("text-sm")
         # Files that belong together come together only where their handler is given here
         upload = ui.upload(

@@ -74,6 +74,13 @@ async def read_kept(key: str) -> str:
     return "".join(map(str, pieces))
 
 
+async def wants_dark() -> bool:
+    """Return whether a person turned the page dark before, or else whether the browser prefers dark pages."""
+    preferred = "String(matchMedia('(prefers-color-scheme: dark)').matches)"
+    told = await ui.run_javascript(f"return sessionStorage.getItem('softnlp.dark') ?? {preferred}", timeout=10.0)
+    return bool(told == "true")
+
+
 def tell_when_closed() -> None:
     """Let the browser tell when the page of the current slot is closed or another takes its place."""
     ui.run_javascript(_LEAVING)

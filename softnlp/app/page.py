@@ -62,7 +62,7 @@ STUDIES: dict[str, tuple[str, str | None, Callable[[Stage], None]]] = {
 _TAB_OF = {study: name for name, (_, study, _) in STUDIES.items() if study is not None}
 SCENARIO = "scenario"
 _LINE = "border-neutral-300 dark:border-neutral-700"
-_HEADER = f"h-12 px-3 py-0 items-center no-wrap gap-2 border-b softnlp-surface {_LINE}"
+_HEADER = f"softnlp-header min-h-12 px-3 py-0 items-center gap-2 border-b softnlp-surface {_LINE}"
 _COLUMN = "softnlp-column shrink-0 h-full overflow-y-auto overflow-x-hidden p-3"
 _MESSAGE = "absolute bottom-2 left-2 right-2 text-sm rounded px-3 py-2 bg-orange-100 text-orange-950"
 _GREY = "Grey: the last robot that made sense."
@@ -78,23 +78,25 @@ _PANELS = {
 """The panel on the left that says what is wrong with a table."""
 
 
-def build_page(session: Session, pins: str = "") -> None:
-    """Build one browser tab for a session. pins : those that the browser kept."""
-    dark = ui.dark_mode()
+def build_page(session: Session, pins: str = "", is_dark: bool = False) -> None:
+    """Build one browser tab for a session. pins : those that the browser kept. is_dark : whether it begins dark."""
+    dark = ui.dark_mode(is_dark)
     style_page()
     chosen = _TAB_OF.get(session.document.study, SCENARIO)
     with ui.header(elevated=False).classes(_HEADER):
-        ui.label("softnlp").classes("text-lg font-semibold mr-2")
-        with ui.tabs().props("dense no-caps inline-label shrink").classes("min-w-0") as tabs:
+        ui.label("softnlp").classes("text-lg font-semibold mr-2").props("role=heading aria-level=1")
+        with ui.tabs().classes("softnlp-tabs min-w-0") as tabs:
+            tabs.props("dense no-caps inline-label shrink outside-arrows")
             for name, label in (*((name, label) for name, (label, *_) in STUDIES.items()), (SCENARIO, "Scenario")):
                 ui.tab(name, label=label).props(f"data-testid=tab-{name}")
         tabs.set_value(chosen)
         ui.space()
-        exports = _files(session, dark)
-    with ui.row().classes("w-full no-wrap gap-0").style("height: calc(100vh - 48px)"):
-        with ui.element("div").classes(f"w-[330px] border-r {_COLUMN} {_LINE}"):
+        with ui.row().classes("items-center no-wrap gap-1"):
+            exports = _files(session, dark)
+    with ui.row().classes("softnlp-page w-full no-wrap gap-0"):
+        with ui.element("div").classes(f"softnlp-inputs border-r {_COLUMN} {_LINE}"):
             panels = _panels(session)
-        with ui.column().classes("softnlp-middle grow min-w-0 h-full gap-0 relative") as middle:
+        with ui.column().classes("softnlp-middle min-w-0 gap-0 relative") as middle:
             view = RobotView().classes("w-full grow min-h-0").props("data-testid=view")
             with ui.row().classes("absolute top-2 left-2 gap-1 z-10"):
                 Past(session)
@@ -104,8 +106,8 @@ def build_page(session: Session, pins: str = "") -> None:
             message = ui.label().classes(_MESSAGE).props("data-testid=message role=status").mark("message")
             message.set_visibility(False)
         stage = Stage(session, view)
-        with ui.element("div").classes(f"w-[390px] border-l {_COLUMN} {_LINE}"):
-            with ui.element("div").classes("w-full") as shown:
+        with ui.element("div").classes(f"softnlp-results border-l {_COLUMN} {_LINE}"):
+            with ui.element("div").classes("w-full softnlp-shown") as shown:
                 results = ResultsPanel()
             pinned = PinsPanel(stage, lambda: results.run, pins)
             ui.separator()
@@ -163,12 +165,17 @@ def _files(session: Session, dark: ui.dark_mode) -> ui.menu:
     """Build the buttons for files and return the menu of exports."""
     dialog = open_dialog(session)
     look = "flat dense no-caps"
-    button("Open", "folder_open", "open", dialog.open, look)
-    button("Save", "save", "save", partial(save, session), look)
-    with ui.button("Export", icon="view_in_ar").props(f"{look} data-testid=export"), ui.menu() as exports:
-        pass
-    turn = button("", "contrast", "dark", dark.toggle, "flat dense round").tooltip("Light or dark")
-    turn.props('aria-label="light or dark"')
+    button("Open", "folder_open", "open", dialog.open, look).props("aria-label=Open")
+    button("Save", "save", "save", partial(save, session), look).props("aria-label=Save")
+    with ui.button("Export", icon="view_in_ar").props(f"{look} data-testid=export aria-label=Export"):
+        exports = ui.menu()
+
+    def turned() -> None:
+        dark.toggle()
+        ui.run_javascript(f"sessionStorage.setItem('softnlp.dark', '{str(bool(dark.value)).lower()}')")
+
+    turn = button("", "contrast", "dark", turned, "flat dense round").tooltip("Light or dark")
+    turn.props('aria-label="Light or dark"')
     return exports
 
 

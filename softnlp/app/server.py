@@ -16,7 +16,7 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
 from softnlp.app.guard import Guard, root_path, trusted_host
-from softnlp.app.kept import CLOSED, close_all, closed, keep, read_kept, recall, tell_when_closed
+from softnlp.app.kept import CLOSED, close_all, closed, keep, read_kept, recall, tell_when_closed, wants_dark
 from softnlp.app.page import build_page
 from softnlp.app.panels.pins import KEPT as PINS
 from softnlp.app.session import Session
@@ -112,7 +112,7 @@ async def open_tab(client: Client, scenario: Path | None, state: str = "") -> No
         except SoftnlpError as error:  # it was there when the server started
             ui.notify(f"not opened: {error}", type="warning", multi_line=True)
     await recall(session, state)
-    build_page(session, await read_kept(PINS))
+    build_page(session, await read_kept(PINS), await wants_dark())
     keep(session)
     tell_when_closed()
 

@@ -158,13 +158,32 @@ export class Stage {
     this.controls.enableDamping = true;
     const size = this.frame.length;
     const [a, e] = [radians(AZIMUTH), radians(ELEVATION)];
-    const away = 3.5 * size * narrowness(this.camera.aspect);
+    const away = 3.8 * size * narrowness(this.camera.aspect);
     this.controls.target.set(0, 0, 0.45 * size);
     this.camera.position.set(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e) * this.camera.up.z);
     this.camera.position.multiplyScalar(away).add(this.controls.target);
     this.limit(size);
     this.controls.update();
     this.request();
+  }
+
+  // Turn or zoom by a key of the keyboard; false for another one.
+  key(name) {
+    const turns = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+    const away = this.camera.position.clone().sub(this.controls.target);
+    if (name === "Home") this.reset();
+    else if (name === "+" || name === "=" || name === "-") away.multiplyScalar(name === "-" ? 1 / 0.9 : 0.9);
+    else if (turns[name] !== undefined) {
+      const [a, e] = turns[name];
+      const axis = new THREE.Vector3().crossVectors(this.camera.up, away).normalize();
+      const angle = away.angleTo(this.camera.up) + 0.12 * e;
+      away.applyAxisAngle(this.camera.up, 0.12 * a);
+      if (angle > 0.05 && angle < Math.PI - 0.05) away.applyAxisAngle(axis, 0.12 * e);
+    } else return false;
+    if (name !== "Home") this.camera.position.copy(this.controls.target).add(away);
+    this.controls.update();
+    this.request();
+    return true;
   }
 
   paint(theme) {
