@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import csv
+import html
 import io
 import json
 import tomllib
@@ -15,7 +16,7 @@ import pytest
 
 pytest.importorskip("tomlkit", reason="the extra gui is not installed")
 
-from app_stage import done
+from app_stage import NotedView, done
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from nicegui import ui
@@ -26,11 +27,13 @@ from softnlp.app.history import History, changes
 from softnlp.app.links import packed, unpacked
 from softnlp.app.panels.past import Past
 from softnlp.app.panels.pins import difference
-from softnlp.app.panels.results import step_lines
+from softnlp.app.panels.results import certificate_words, step_lines
 from softnlp.app.pins import MOST_PINS, Pin, pin_of, pins_csv, recalled, rows, stored
-from softnlp.app.session import Session
+from softnlp.app.report import report_text
+from softnlp.app.session import Session, Stage
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR, MILLIMETRE
+from softnlp.figures.section import section_figure
 from softnlp.scenario.check import SCHEMAS
 from softnlp.statics.step import Run
 
@@ -177,6 +180,30 @@ def test_four_states_are_pinned_and_a_freed_place_is_taken(session: Session) -> 
         pin_of(run, session.state(), "", pins)
     assert pin_of(run, session.state(), "", pins[:1] + pins[2:]).letter == "B"
     assert [difference(x) for x in (1.5, -0.0001, None)] == ["+1.500", "0", "–"]
+
+
+def test_the_report_has_what_is_on_the_screen(session: Session) -> None:
+    run, pins = shown(session), list[Pin]()
+    pins.append(pin_of(run, session.state(), "before <b>", pins))
+    session.set_pressure(np.array([0.5, 0.0, 0.0]) * BAR)
+    session.change("", "title", "my <i>robot</i>")
+    run = shown(session)
+    stage = Stage(session, NotedView())  # type: ignore[arg-type]
+    stage.figures["Sequence"] = {"": lambda: section_figure(run.robot)}
+    page = asyncio.run(report_text(stage, run, pins))
+    assert page.count('src="data:image/png;base64,') == page.count("<img") == 2
+    assert "http" not in page.replace(session.text(), "")
+    assert "before &lt;b&gt;" in page
+    assert "my &lt;i&gt;robot&lt;/i&gt;" in page
+    for line in step_lines(run).numbers:
+        assert f"<td>{line.label}</td><td>{line.text}</td><td>{line.unit}</td>" in page
+    assert certificate_words(run) in page
+    assert "set 1: 0.8 → 0.5 bar" in page
+    assert "sequence_bar = [[0.5, 0.0, 0.0]]" in page
+    assert '"casadi"' in html.unescape(page)
+    session.change("robot", "length_mm", -1.0)
+    with pytest.raises(InputError, match="length"):
+        asyncio.run(report_text(stage, run, pins))
 
 
 async def _steps_back() -> None:

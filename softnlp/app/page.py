@@ -18,6 +18,7 @@ from softnlp.app.panels.pins import PinsPanel
 from softnlp.app.panels.pressure import pressure_panel
 from softnlp.app.panels.results import ResultsPanel
 from softnlp.app.panels.robot import robot_panel
+from softnlp.app.report import report_menu
 from softnlp.app.session import Session, Stage
 from softnlp.app.tabs.blocked import blocked_tab
 from softnlp.app.tabs.identify import identify_tab
@@ -130,6 +131,7 @@ def build_page(session: Session, pins: str = "", is_dark: bool = False) -> None:
 
     live = LiveView(stage, found, say)
     with exports:
+        report_menu(stage, lambda: results.run, lambda: pinned.pins)
         mesh_menu(session, lambda: None if results.run is None else results.run.steps[0].pose)
 
     def read_again() -> None:

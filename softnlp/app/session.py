@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -24,6 +24,8 @@ from softnlp.scenario.check import SCHEMAS
 from softnlp.scenario.read import Scenario, load_scenario, placed, scenario_from_text
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from softnlp.app.view import RobotView
 
 Array = NDArray[np.float64]
@@ -376,7 +378,11 @@ class Session:
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """What panels and tabs of one page share: its scenario and its 3-D view."""
+    """What panels and tabs of one page share.
+
+    session, view : its scenario and its 3-D view. figures : what draws what tabs have found, by title, for reports.
+    """
 
     session: Session
     view: RobotView
+    figures: dict[str, Mapping[str, Callable[[], Figure]]] = field(default_factory=dict)

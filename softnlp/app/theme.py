@@ -79,7 +79,8 @@ const name = () => {
   for (const editor of document.querySelectorAll(".cm-content:not([aria-label])"))
     editor.setAttribute("aria-label", "Scenario file");
 };
-new MutationObserver(() => { waiting ??= setTimeout(name, 150); }).observe(document.body, {childList: true, subtree: true});
+const later = new MutationObserver(() => { waiting ??= setTimeout(name, 150); });
+later.observe(document.body, {childList: true, subtree: true});
 name();"""
 
 

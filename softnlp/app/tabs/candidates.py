@@ -12,11 +12,11 @@ from nicegui import ui
 from softnlp.app import controls
 from softnlp.app.asking import Progress, Stopped, few_enough, scenario_with, sentence
 from softnlp.app.parts import Chart, NumberTable, downloads, marks, study_row
-from softnlp.app.session import Session
+from softnlp.app.session import Stage
 from softnlp.base.columns import ONE, Output
 from softnlp.base.processes import processors
 from softnlp.base.units import BAR
-from softnlp.figures.design import across
+from softnlp.figures.design import across, design_figure
 from softnlp.figures.style import COLOURS
 from softnlp.results.design import (
     best_scenario,
@@ -75,14 +75,14 @@ def work_of(found: Found) -> Callable[[Progress], Found]:
     return work
 
 
-def candidates_part(session: Session) -> None:
+def candidates_part(stage: Stage) -> None:
     """Build what runs a design and shows it."""
-    _Candidates(session)
+    _Candidates(stage)
 
 
 class _Candidates:
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    def __init__(self, stage: Stage) -> None:
+        self._stage, self._session = stage, stage.session
         self._found: Found | None = None
         self._drawn = 0
         self._chosen: Candidate | None = None
@@ -125,6 +125,7 @@ class _Candidates:
         self._row.say(f"{told} A click on a row chooses one." if len(design.candidates) > 1 else told)
         self._texts["design.json"] = lambda: design_json(design)
         self._files.set_visibility(True)
+        self._stage.figures["Design"] = {"": lambda: design_figure(design)}
         best = best_scenario(design, self._session.document.own())
         if best is not None:
             self._texts["best.toml"] = lambda: best

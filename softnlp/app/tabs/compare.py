@@ -11,7 +11,7 @@ from softnlp.app import controls
 from softnlp.app.asking import Progress, scenario_with
 from softnlp.app.parts import NumberTable, csv_drop, downloads, study_row
 from softnlp.app.pictures import Pictures
-from softnlp.app.session import Session, Stage
+from softnlp.app.session import Stage
 from softnlp.base.errors import InputError
 from softnlp.figures.compare import figure_makers
 from softnlp.model.contact_settings import CLOSURES
@@ -32,11 +32,12 @@ _EXAMPLE = "measured_angles.csv"
 def compare_tab(stage: Stage) -> None:
     """Build the tab in the current slot."""
     with ui.column().classes("w-full gap-3 pt-2"):
-        _Compare(stage.session)
+        _Compare(stage)
 
 
 class _Compare:
-    def __init__(self, session: Session) -> None:
+    def __init__(self, stage: Stage) -> None:
+        self._stage, session = stage, stage.session
         self._session = session
         self._file: str | None = None
         controls.heading("What was measured")
@@ -124,7 +125,8 @@ class _Compare:
         self._texts["rows.csv"] = lambda: rows_text(task, found)
         self._texts["summary.csv"] = lambda: summary_text(found)
         self._files.set_visibility(True)
-        await self._pictures.draw(figure_makers(task, found))
+        self._stage.figures["Compare"] = figure_makers(task, found)
+        await self._pictures.draw(self._stage.figures["Compare"])
 
 
 REST: dict[str, Any] = {"ramp": {"sets": [1], "to_bar": 0.1, "steps": 2}}

@@ -39,7 +39,7 @@ def design_tab(stage: Stage) -> None:
 
         session.follow(refresh)
         ui.separator()
-        candidates_part(session)
+        candidates_part(stage)
 
 
 class _Rows:

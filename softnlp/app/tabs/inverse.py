@@ -12,6 +12,7 @@ from nicegui import ui
 
 from softnlp.app import controls
 from softnlp.app.asking import Progress, bars, run_steps, said, scenario_with, sentence
+from softnlp.app.examples import empty_state
 from softnlp.app.parts import NumberTable, study_row
 from softnlp.app.session import Session, Stage
 from softnlp.base.columns import OUTPUTS
@@ -39,6 +40,12 @@ MOST_EDITED = 25
 def inverse_tab(stage: Stage) -> None:
     """Build the tab in the current slot."""
     with ui.column().classes("w-full gap-3 pt-2"):
+        empty_state(
+            stage.session,
+            "inverse",
+            "inverse/circle",
+            "Say where the tip shall be; the pressures that put it there are found.",
+        )
         _Targets(stage)
         _bounds(stage.session)
         ui.separator()

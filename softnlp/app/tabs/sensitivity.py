@@ -11,7 +11,7 @@ from softnlp.app import controls, wanted
 from softnlp.app.asking import Progress, bars
 from softnlp.app.parts import NumberTable, downloads, study_row
 from softnlp.app.pictures import Pictures
-from softnlp.app.session import Session, Stage
+from softnlp.app.session import Stage
 from softnlp.base.errors import InputError
 from softnlp.figures.sensitivity import sensitivity_figure
 from softnlp.model.quantities import Model
@@ -26,12 +26,12 @@ _TITLES = {"what 1 % more does (0.01 more of what is 0)": "What 1 % more does (0
 def sensitivity_tab(stage: Stage) -> None:
     """Build the tab in the current slot."""
     with ui.column().classes("w-full gap-3 pt-2"):
-        _Sensitivity(stage.session)
+        _Sensitivity(stage)
 
 
 class _Sensitivity:
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    def __init__(self, stage: Stage) -> None:
+        self._stage, self._session = stage, stage.session
         self._tolerances: dict[str, str] = dict(_FIRST)
         controls.heading("Tolerances")
         ui.label("One standard deviation of each, as a number or in per cent.").classes("text-sm opacity-80")
@@ -123,6 +123,7 @@ class _Sensitivity:
                 )
         self._texts["sensitivity.json"] = lambda: document_text(sensitivity_document(report, title, 1, ()))
         self._files.set_visibility(True)
+        self._stage.figures["Sensitivity"] = {"": lambda: sensitivity_figure(report, title)}
         await self._pictures.draw({"sensitivity": lambda: sensitivity_figure(report, title)})
 
 

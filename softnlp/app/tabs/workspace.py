@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from softnlp.app.asking import Progress, Stopped, bars, few_enough, scenario_with
 from softnlp.app.controls import button, heading, named, number, number_field, select, toggle
+from softnlp.app.examples import empty_state
 from softnlp.app.parts import NumberTable, number_text, study_row
 from softnlp.app.session import Session, Stage
 from softnlp.base.columns import ONE, OUTPUTS
@@ -52,6 +53,12 @@ _FIRST = {"levels": 8, "samples": 1000}
 def workspace_tab(stage: Stage) -> None:
     """Build the tab in the current slot."""
     with ui.column().classes("w-full gap-3 pt-2"):
+        empty_state(
+            stage.session,
+            "workspace",
+            "workspace/D25L60_grid",
+            "Every pressure of a grid or of samples; the tips become a cloud in the view.",
+        )
         _source(stage.session)
         _Sweep(stage)
 
