@@ -49,8 +49,19 @@ def example_choice(session: Session, dialog: ui.dialog) -> None:
     box.on_value_change(lambda event: opened(event.value))
 
 
-def empty_state(session: Session, study: str, name: str, words: str) -> None:
+_EMPTY = {
+    "blocked-force": ("blocked/D25L60_curve", "The robot pushes against a wall; its force is found."),
+    "workspace": ("workspace/D25L60_grid", "Every pressure of a grid; the tips become a cloud in the view."),
+    "inverse": ("inverse/circle", "Say where the tip shall be; the pressures that put it there are found."),
+    "identify": ("identify/measured_angles", "Drop what was measured; the constants that fit it are found."),
+    "design": ("design/D25L60_dimensions", "Say what may be chosen and required; the best design is found."),
+}
+"""An example of each study, and what the study does."""
+
+
+def empty_state(session: Session, study: str) -> None:
     """Say what a tab is for while nothing was asked of it, with an example to open."""
+    name, words = _EMPTY[study]
     with named(ui.row().classes("w-full items-center gap-2 no-wrap softnlp-empty"), f"{study}.empty") as line:
         ui.label(words).classes("text-sm grow")
         button = ui.button("Open an example", icon="school", on_click=partial(open_example, session, name))

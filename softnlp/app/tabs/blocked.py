@@ -47,12 +47,7 @@ _OF_A_FORCE = ("offsets_mm", "offset_ramp", "target_force_N", "weight_sensitivit
 def blocked_tab(stage: Stage) -> None:
     """Build the tab in the current slot."""
     with ui.column().classes("w-full gap-3 pt-2"):
-        empty_state(
-            stage.session,
-            "blocked-force",
-            "blocked/D25L60_curve",
-            "The robot pushes against a wall; its force is found.",
-        )
+        empty_state(stage.session, "blocked-force")
         _contact_fields(stage.session)
         ui.separator()
         _Curves(stage.session)

@@ -25,8 +25,7 @@ def design_tab(stage: Stage) -> None:
     """Build the tab in the current slot."""
     session = stage.session
     with ui.column().classes("w-full gap-3 pt-2"):
-        words = "Say what may be chosen and what is required; the best design is found."
-        empty_state(session, STUDY, "design/D25L60_dimensions", words)
+        empty_state(session, STUDY)
         _Choices(session)
         _Requirements(session)
         _Actuation(session)

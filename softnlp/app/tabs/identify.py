@@ -87,12 +87,7 @@ def identify_tab(stage: Stage) -> None:
         use_tensile(session, name, content)
 
     with ui.column().classes("w-full gap-3 pt-2"):
-        empty_state(
-            session,
-            "identify",
-            "identify/measured_angles",
-            "Drop what was measured; the constants that fit it are found.",
-        )
+        empty_state(session, "identify")
         import_part(session, {"tips": use_tips, "tensile": use_test})
         kinds = controls.toggle({"measurements": "Robots", "tensile": "Tensile test"}, "identify.kind", kind())
         boxes: dict[str, ui.column] = {}

@@ -40,12 +40,7 @@ MOST_EDITED = 25
 def inverse_tab(stage: Stage) -> None:
     """Build the tab in the current slot."""
     with ui.column().classes("w-full gap-3 pt-2"):
-        empty_state(
-            stage.session,
-            "inverse",
-            "inverse/circle",
-            "Say where the tip shall be; the pressures that put it there are found.",
-        )
+        empty_state(stage.session, "inverse")
         _Targets(stage)
         _bounds(stage.session)
         ui.separator()

@@ -53,12 +53,7 @@ _FIRST = {"levels": 8, "samples": 1000}
 def workspace_tab(stage: Stage) -> None:
     """Build the tab in the current slot."""
     with ui.column().classes("w-full gap-3 pt-2"):
-        empty_state(
-            stage.session,
-            "workspace",
-            "workspace/D25L60_grid",
-            "Every pressure of a grid or of samples; the tips become a cloud in the view.",
-        )
+        empty_state(stage.session, "workspace")
         _source(stage.session)
         _Sweep(stage)
 
