@@ -1,4 +1,4 @@
-"""The page for everyone, in a real Chromium: axe finds nothing on any tab, nothing is cut off, small or hard to press."""
+"""The page for everyone, in a real Chromium: axe finds nothing on any tab, nothing is cut off or hard to press."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ BOXES = """() => {
     if ([...e.childNodes].some(n => n.nodeType === 3 && n.textContent.trim())) {
       if (parseFloat(getComputedStyle(e).fontSize) < 12) found.push(`small: ${words}`);
       if (box.right > innerWidth + 1 || box.left < -1) found.push(`cut off: ${words}`);
-      if (e.matches('.softnlp-column *') && !e.closest('.q-field, .q-table, .q-btn-toggle')) texts.push([box, words, e]);
+      const loose = e.matches('.softnlp-column *') && !e.closest('.q-field, .q-table, .q-btn-toggle');
+      if (loose) texts.push([box, words, e]);
     }
     if (e.matches('button, a[href], [role=button], [role=tab], [role=switch], [role=slider], [role=checkbox]')) {
       const whole = (e.closest('.q-toggle, .q-slider, .q-field__control') ?? e).getBoundingClientRect();
@@ -58,6 +59,7 @@ BOXES = """() => {
 def _visit(tab: Watched, name: str) -> None:
     tab.page.locator(f"[data-testid=tab-{name}]").scroll_into_view_if_needed()
     tab.press(f"tab-{name}")
+    tab.page.wait_for_function("document.querySelector('.q-tab-panel')?.getBoundingClientRect().height > 60")
     tab.page.wait_for_timeout(400)
     tab.page.wait_for_function("!document.querySelector('.q-uploader__input:not([aria-label])')")
 

@@ -32,7 +32,8 @@ body {{ overflow: hidden; }}
 .q-btn[style*="font-size: 10px"] {{ font-size: 12px !important; min-height: 26px !important; }}
 .q-field--dense .q-field__bottom {{ font-size: 12px; line-height: 1.2; padding: 3px 4px 0; }}
 .q-field--dense.q-field--float .q-field__label {{ transform: translateY(-38%) scale(0.86); }}
-.q-toggle--dense, .q-slider--h {{ min-height: 24px; }}
+.q-toggle--dense {{ min-height: 24px; }}
+.q-slider--h {{ padding: 4px 0; }}
 .q-btn-toggle .q-btn {{ min-width: 30px; min-height: 26px; }}
 .q-chip__icon--remove {{ font-size: 24px; margin-left: 2px; }}
 :focus-visible {{ outline: 2px solid var(--q-primary) !important; outline-offset: 1px; }}
