@@ -81,6 +81,6 @@ def test_a_design_is_pinned_compared_and_reported(tab: Watched, new_tab: Any, tm
     other.shows_again(shown)
     assert "state=" not in other.page.url
     other.page.close()
-    keeps(tab, "softnlp")
+    keeps(tab, "sequence_bar")
     reload(tab)
     assert tab.page.locator("[data-testid='pin.B.name']").count() == 1
