@@ -10,6 +10,7 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable, Table
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.reading import one_line
 from softnlp.model.robot import ROBOTS
@@ -39,7 +40,7 @@ _NEEDED: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "design": {
         "choices": {"robot": {"chamber_diameter_mm": {"from": 3.0, "to": 5.0}}},
         "actuation": {"sets": [1], "pressure_bar": 0.8},
-        "objective": {"maximise": "bending_angle_deg"},
+        "objective": {"maximise": OUTPUTS["bending_angle"].key},
     },
 }
 """Tables without which a study cannot start, as the app first shows them."""

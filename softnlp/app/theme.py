@@ -21,7 +21,9 @@ body {{ overflow: hidden; }}
 @layer overrides {{ .body--dark .bg-primary {{ color: #111 !important; }} }}
 .softnlp-stale .softnlp-view, .softnlp-column .softnlp-stale {{ filter: grayscale(1); opacity: 0.62; }}
 .softnlp-page {{ height: calc(100vh - 49px); }}
-.softnlp-middle {{ flex: 1 1 0; height: 100%; }}
+.softnlp-middle {{ flex: 1 1 0; height: 100%; background: #f6f7f9; }}
+.body--dark .softnlp-middle {{ background: #14171b; }}
+.q-tooltip {{ font-size: 12px; }}
 .softnlp-inputs {{ width: 330px; }}
 .softnlp-results {{ width: 390px; }}
 .softnlp-tabs .q-tab {{ padding: 0 14px; }}

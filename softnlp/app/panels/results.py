@@ -282,18 +282,12 @@ def _spread(step: dict[str, Any], output: Output, entry: int | None = None) -> s
     return "" if found is None else f" ± {written(found, output.page)}"
 
 
-_HEADLINE = (
-    ("blocked_force_N", "backbone_length_mm"),
-    ("tip_position_mm.0", "tip_position_mm.1", "tip_position_mm.2"),
-)
-
-
 def headline(lines: Sequence[Line]) -> list[tuple[str, list[Line]]]:
     """Return what matters first: the bending, the force where the robot pushes, else its length, and the tip."""
     known = {line.key: line for line in lines}
-    second = next(known[key] for key in _HEADLINE[0] if key in known)
-    tip = [known[key] for key in _HEADLINE[1]]
-    bending = known["bending_angle_deg"]
+    second = next(known[key] for key in (OUTPUTS[n].key for n in ("blocked_force", "backbone_length")) if key in known)
+    tip = [known[f"{OUTPUTS['tip_position'].key}.{k}"] for k in range(3)]
+    bending = known[OUTPUTS["bending_angle"].key]
     return [(bending.label, [bending]), (second.label, [second]), ("Tip x, y, z", tip)]
 
 

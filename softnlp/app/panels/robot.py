@@ -95,7 +95,7 @@ class _RobotPanel:
         self.lines: dict[str, ui.label] = {}
         with ui.column().classes("w-full gap-2").props("data-testid=robot-panel") as self.root:
             self._choice()
-            self.picture = dashed(ui.html(sanitize=False).classes("w-full"), "robot.section")
+            self.picture = dashed(ui.html(sanitize=False).classes("w-full max-w-80 mx-auto"), "robot.section")
             self.caption = dashed(ui.label().classes("text-xs opacity-80 w-full"), "robot.caption")
             self.stretched = self._switch(_STRETCHED, "robot.stretched", lambda _: self._draw())
             with ui.element("div").classes("grid grid-cols-2 gap-x-2 gap-y-2 w-full items-start"):

@@ -12,6 +12,7 @@ from softnlp.app.asking import Progress, scenario_with
 from softnlp.app.parts import NumberTable, csv_drop, downloads, study_row
 from softnlp.app.pictures import Pictures
 from softnlp.app.session import Stage
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.figures.compare import figure_makers
 from softnlp.model.contact_settings import CLOSURES
@@ -21,11 +22,12 @@ from softnlp.results.comparison import STATISTICS, comparison_document, rows_tex
 from softnlp.results.document import document_text
 from softnlp.scenario.compare import ALL, Asked, CompareTask, compare_task, run_compare
 from softnlp.scenario.examples import shipped_folder
+from softnlp.scenario.measured_rows import MEASURED_COLUMNS
 from softnlp.studies.comparison import OBSERVABLES, Comparison
 from softnlp.studies.variants import NAMED, OWN
 
 Compared = tuple[CompareTask, Comparison]
-_FORCE = "blocked_force_N"
+_FORCE = OUTPUTS["blocked_force"].key
 _EXAMPLE = "measured_angles.csv"
 
 
@@ -41,7 +43,7 @@ class _Compare:
         self._session = session
         self._file: str | None = None
         controls.heading("What was measured")
-        words = "p1_bar, p2_bar … and x_mm, y_mm, z_mm, bending_angle_deg, elongation_mm, tilt_deg or blocked_force_N"
+        words = f"p1_bar, p2_bar … and some of {', '.join(MEASURED_COLUMNS)}"
         csv_drop("compare.drop", "Drop a CSV file here, or click +", self._take)
         ui.label(f"Columns: {words}.").classes("text-sm opacity-80")
         with ui.row().classes("w-full items-center no-wrap gap-2"):
