@@ -65,7 +65,8 @@ async def _visit() -> None:
         enter(user, "objective.of", "bending_angle_deg")
         await ran(user, "design", "candidates feasible")
         table = field(user, "design.table")
-        assert [row["c5"] for row in table.rows] == ["yes", "best"]
+        assert [row["c1"] for row in table.rows] == ["best", "yes"]
+        assert [row["c0"] for row in table.rows] == ["2", "1"]
         chart = field(user, "design.chart").figure["data"]
         assert [trace["name"] for trace in chart] == ["feasible", "best"]
         # the numbers are those of the study alone
@@ -75,7 +76,7 @@ async def _visit() -> None:
         # the other one becomes the robot on the screen
         for listener in table._event_listeners.values():
             if listener.type == "rowClick":
-                listener.handler(type("Click", (), {"args": [None, {"row": 0}, 1]}))
+                listener.handler(type("Click", (), {"args": [None, {"row": 1}, 1]}))
         assert "Candidate 1" in field(user, "design.why").text
         user.find(marker="design.use").click()
         assert session.problem is None

@@ -107,6 +107,8 @@ class LiveView:
     def _show(self, scenario: Scenario, pressure: Array, step: Step, pose: Pose, ghost: Pose | None) -> None:
         if self._last is None or not np.array_equal(self._last[1], pressure) or self._last[0] is not scenario:
             self._said("")
+        if self._last is not None and vars(self._last[0].robot) != vars(scenario.robot):
+            self._stage.view.clear_trail()  # of another robot
         self._last, loads, contact = (scenario, pressure), scenario.loads, step.contact
         stands = contact is not None and contact.normal.any()  # else the chambers alone are held
         self._stage.view.show(

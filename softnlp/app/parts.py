@@ -308,7 +308,7 @@ def csv_drop(marker: str, label: str, take: Callable[[str, bytes], None]) -> ui.
         except SoftnlpError as error:
             ui.notify(plain_words(error), type="warning", multi_line=True)
 
-    ui.add_css(_DROP)
+    ui.add_css(DROP)
     box = ui.upload(
         label=label,
         on_upload=arrived,
@@ -337,7 +337,7 @@ def downloads(*files: tuple[str, str, str]) -> dict[str, Callable[[], str]]:
 
 
 # The list of files is empty at once: a dropped one is named by the tab.
-_DROP = """
+DROP = """
 .softnlp-drop .q-uploader__list, .softnlp-drop .q-uploader__subtitle { display: none }
 .softnlp-drop .q-uploader__header { background: transparent !important; color: inherit !important }
 .softnlp-drop .q-uploader__title { font-size: 0.85rem; font-weight: 400; line-height: 1.3 }

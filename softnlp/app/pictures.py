@@ -61,5 +61,11 @@ class Pictures:
         picture = ui.element("img").classes("w-full rounded bg-white")
         named(picture, f"{self._marker}.{caption}")
         picture.props["src"], picture.props["alt"] = url, caption
+        with ui.dialog().props("maximized") as whole, ui.card().classes("items-center overflow-auto p-2"):
+            large = ui.element("img").classes("w-full max-w-6xl bg-white rounded")
+            large.props["src"], large.props["alt"] = url, caption
+            button("Close", "close", f"{self._marker}.close.{caption}", whole.close)
         take = partial(ui.download.content, png, f"{caption.replace(' ', '_')}.png", "image/png")
-        button(f"{caption}.png", "download", f"{self._marker}.take.{caption}", take)
+        with ui.row().classes("gap-1"):
+            button("Enlarge", "zoom_in", f"{self._marker}.enlarge.{caption}", whole.open)
+            button(f"{caption}.png", "download", f"{self._marker}.take.{caption}", take)

@@ -62,7 +62,7 @@ _FIELDS = {
     "chamber_wall_mm": ("Chamber wall", 0.05),
     "length_mm": ("Length", 1.0),
     "chamber_sets": ("Chamber sets", 1.0),
-    "chambers_per_set": ("Chambers a set", 1.0),
+    "chambers_per_set": ("Chambers per set", 1.0),
     "chamber_angle_deg": ("Chamber angle", 1.0),
     _WALL: ("Thinnest wall", 0.1),
 }

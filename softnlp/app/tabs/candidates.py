@@ -86,6 +86,7 @@ class _Candidates:
         self._found: Found | None = None
         self._drawn = 0
         self._chosen: Candidate | None = None
+        self._order: list[Candidate] = []
         self._row = study_row("design", "Find the best design", self._asked, self._finish, self._watch)
         self._why = controls.named(ui.label("").classes("text-sm break-words whitespace-pre-line w-full"), "design.why")
         self._use = controls.use_button("Use this design", "design.use", self._take)
@@ -122,7 +123,7 @@ class _Candidates:
         told = f"{len(design.feasible)} of {len(design.candidates)} candidates feasible."
         if len(design.candidates) < total:
             told = f"Stopped after {len(design.candidates)} of {total} candidates. {told}"
-        self._row.say(f"{told} A click on a row chooses one." if len(design.candidates) > 1 else told)
+        self._row.say(f"{told} A click on a row chooses one and says why." if len(design.candidates) > 1 else told)
         self._texts["design.json"] = lambda: design_json(design)
         self._files.set_visibility(True)
         self._stage.figures["Design"] = {"": lambda: design_figure(design)}
@@ -133,20 +134,18 @@ class _Candidates:
 
     def _show(self, design: Design) -> None:
         columns = shown_outputs(design)
-        header = ["", "candidate", *(_axis(o) for o in columns), "feasible"]
-        rows = [
-            [c.number, label(design, c), *(_value(c, o) for o in columns), verdict(design, c)]
-            for c in design.candidates
-        ]
-        failed = [not c.is_feasible for c in design.candidates]
+        header = ["no.", "feasible", "candidate", *(_axis(o) for o in columns)]
+        self._order = in_order(design)
+        rows = [[c.number, verdict(design, c), label(design, c), *(_value(c, o) for o in columns)] for c in self._order]
+        failed = [not c.is_feasible for c in self._order]
         self._table.show(header, rows, "candidates.csv", csv=design_csv(design), failed=failed)
         x, y = across(design), design.task.objective
         self._chart.show(traces(design, x, y), x_label=_axis(x), y_label=_axis(y))
 
     def _choose(self, row: int) -> None:
         design = None if self._found is None else self._found.design()
-        if design is not None and row < len(design.candidates):
-            self._choose_candidate(design, design.candidates[row])
+        if design is not None and row < len(self._order):
+            self._choose_candidate(design, self._order[row])
 
     def _choose_candidate(self, design: Design, candidate: Candidate) -> None:
         """Say what holds a candidate back or why it is not feasible, and offer it."""
@@ -174,13 +173,18 @@ class _Candidates:
         ui.notify(f"the robot is that of candidate {chosen.number}", type="positive")
 
 
+def in_order(design: Design) -> list[Candidate]:
+    """Return the candidates, the best first, those that are not feasible last."""
+    return [*design.feasible, *(c for c in design.candidates if not c.is_feasible)]
+
+
 def verdict(design: Design, candidate: Candidate) -> str:
-    """Return in a few words whether a candidate is feasible, or why not."""
+    """Return in a word whether a candidate is feasible."""
     if candidate is design.best:
         return "best"
     if candidate.is_feasible:
         return "yes" if candidate.optimal is not False else "yes, not optimal"
-    return f"{'failed' if candidate.status == 'failed' else 'no'}: {candidate.reasons[0] if candidate.reasons else ''}"
+    return "failed" if candidate.status == "failed" else "no"
 
 
 def why(design: Design, candidate: Candidate) -> str:

@@ -117,7 +117,7 @@ class _Compare:
     async def _finish(self, compared: Compared) -> None:
         task, found = compared
         self._table.show(*statistics_rows(found), "summary.csv", csv=summary_text(found))
-        told = [f"{len(task.columns.rows)} rows, {len(found.variants)} models."]
+        told = [f"{len(task.columns.rows)} rows, {len(found.variants)} model{'s' * (len(found.variants) > 1)}."]
         if found.best is not None and len(found.variants) > 1:
             told.append(f"Least error: {found.labels[found.best]}.")
         told += [f"{found.lost(v)} rows of {found.labels[v]} have no solution." for v in range(len(found.variants))

@@ -70,7 +70,7 @@ def _source(session: Session) -> None:
         levels, samples, *_ = (
             number_field(session, "workspace", key, label, step=step)
             for key, label, step in (
-                ("levels", "Levels a set", 1),
+                ("levels", "Levels per set", 1),
                 ("samples", "Samples", 100),
                 ("from_bar", "From", 0.1),
                 ("to_bar", "To", 0.1),
