@@ -158,7 +158,7 @@ export class Stage {
     this.controls.enableDamping = true;
     const size = this.frame.length;
     const [a, e] = [radians(AZIMUTH), radians(ELEVATION)];
-    const away = 3.8 * size * narrowness(this.camera.aspect);
+    const away = 4.1 * size * narrowness(this.camera.aspect);
     this.controls.target.set(0, 0, 0.45 * size);
     this.camera.position.set(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e) * this.camera.up.z);
     this.camera.position.multiplyScalar(away).add(this.controls.target);
