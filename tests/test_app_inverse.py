@@ -12,6 +12,7 @@ pytest.importorskip("nicegui", reason="the extra gui is not installed")
 
 from app_stage import NotedView, done, enter, field, opened, ran
 
+from softnlp.app.asking import Progress, run_steps, scenario_with
 from softnlp.app.session import Session
 from softnlp.app.tabs.inverse import (
     KINDS,
@@ -19,6 +20,7 @@ from softnlp.app.tabs.inverse import (
     count_of,
     inverse_tab,
     kind_of,
+    offer_target,
     rows_of,
     with_added,
     with_kind,
@@ -50,6 +52,23 @@ def test_the_only_target_stays_and_a_new_one_is_like_the_last() -> None:
     assert rows_of(table, POSITION) == [[1.0, 2.0, 60.0], [3.0, 4.0, 5.0]]
     assert rows_of(without(table, 0), POSITION) == [[3.0, 4.0, 5.0]]
     assert without(without(table, 0), 0) == without(table, 0)
+
+
+@pytest.mark.parametrize("robot", ["D10L40", "laparoscope-9"])
+def test_the_first_target_is_one_that_the_robot_reaches(robot: str) -> None:
+    session = Session()
+    session.change_all("robot", {"name": robot})
+    session.choose("inverse")
+    offer_target(session)
+    assert "target" in session.document.offered  # and is no change of the file
+    (step,) = run_steps(scenario_with(session, "inverse"), Progress()).steps
+    assert step.status.has_solution
+    assert step.aimed is not None
+    assert step.aimed.distance < 1e-3 * MILLIMETRE
+    session.change("target", "tip_position_mm", [[1.0, 2.0, 60.0]])
+    offer_target(session)  # a person's own stays
+    assert session.document.get("target", POSITION) == [[1.0, 2.0, 60.0]]
+    session.close()
 
 
 async def _visit() -> None:

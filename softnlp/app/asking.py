@@ -90,7 +90,10 @@ def scenario_with(session: Session, study: str, tables: Tables | None = None) ->
         document.replace(name, values)
     asked = scenario_from_text(document.text(study), session.folder / session.name)
     if study == session.document.study:
+        first = not session.is_used(study)
         session.use()
+        if first:
+            session.reread()  # what is said of a study that nobody asked goes
     return asked
 
 
