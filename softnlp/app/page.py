@@ -153,7 +153,7 @@ def stale_words(session: Session) -> str:
     problem = session.problem
     table = "" if problem is None else problem.table or ""
     if problem is None or table in _PANELS:
-        return f"{_GREY} See the field marked red on the left."
+        return f"{_GREY} See the field marked red."
     return f"{_GREY} {sentence(problem.message)}"
 
 

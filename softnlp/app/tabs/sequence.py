@@ -51,7 +51,7 @@ class _Source:
         controls.heading("Pressure sequence")
         self._kind = controls.toggle({"list": "List", "ramp": "Ramp", "file": "CSV file"}, "pressure.source")
         with ui.column().classes("w-full gap-1") as self._list:
-            self._text = ui.textarea("One line per step: the pressure of each set [bar]").classes("w-full font-mono")
+            self._text = ui.textarea("One line per step: each set's pressure [bar]").classes("w-full font-mono")
             controls.named(self._text, "pressure.sequence_bar").props("dense outlined debounce=600 rows=5")
             controls.button("Add the pressures shown", "add", "pressure.add", self._add)
         with ui.column().classes("w-full gap-2") as self._ramp:
