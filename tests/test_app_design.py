@@ -96,9 +96,14 @@ def test_a_design_on_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_stopped_design_keeps_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(candidates, "workers", lambda: 1)
     asked = load_scenario(SCENARIOS / "design" / "laparoscope_paper.toml")
-    progress, found = candidates.Progress(), candidates.Found(asked)
-    progress.stop()  # after the first of 15
-    whole = candidates.work_of(found)(progress).whole
+
+    class StopsAfterOne(candidates.Progress):
+        def __call__(self, done: float, total: float, text: str = "") -> None:
+            super().__call__(done, total, text)
+            self.stop()
+
+    found = candidates.Found(asked)  # of 15
+    whole = candidates.work_of(found)(StopsAfterOne()).whole
     assert whole is not None
     assert len(whole.candidates) == 1
     assert candidates.verdict(whole, whole.candidates[0]) in ("best", "yes") or whole.candidates[0].reasons

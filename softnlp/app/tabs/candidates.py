@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from threading import Event, Thread
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ from softnlp.studies.design_candidate import Candidate
 STUDY = "design"
 MOST_CANDIDATES = 5000
 _GREY = "#8a8f98"
+_LOOK_S = 0.2  # between two looks whether a person stops
 
 
 @dataclass
@@ -56,20 +58,36 @@ def workers() -> int:
 
 
 def work_of(found: Found) -> Callable[[Progress], Found]:
-    """Return the work of a design; stopped, it keeps the candidates that are done."""
+    """Return the work of a design. Stopped, it ends at once and keeps the candidates that are done."""
 
     def work(progress: Progress) -> Found:
-        total = found.asked.step_count
+        ended, problems, total = Event(), list[Exception](), found.asked.step_count
 
         def done(number: int, candidate: Candidate) -> None:
+            if progress.stopping:
+                raise Stopped
             found.candidates.append(candidate)
             if number < total:
                 progress(number, total, f"{number} of {total} candidates")
 
-        try:
-            found.whole = run_design(found.asked, done, workers())
-        except Stopped:
-            found.whole = finished_design(found.asked, found.candidates)
+        def run() -> None:
+            try:
+                found.whole = run_design(found.asked, done, workers())
+            except Stopped:
+                pass
+            except Exception as error:
+                problems.append(error)
+            finally:
+                ended.set()
+
+        # In a thread of its own: the candidate at work when a person stops is not waited for, and is thrown away.
+        Thread(target=run, name="design", daemon=True).start()
+        while not ended.wait(_LOOK_S) and not progress.stopping:
+            pass
+        if problems:
+            raise problems[0]
+        if found.whole is None:
+            found.whole = finished_design(found.asked, tuple(found.candidates))
         return found
 
     return work
