@@ -159,6 +159,16 @@ class Section(Protocol):
         """Whether pressures enter the imbalance by their sum alone and only add to stiffnesses; batches are quicker."""
         return False
 
+    @property
+    def coupled(self) -> bool:
+        """Whether stretch and curvature without a load are found together, by `unloaded`."""
+        return False
+
+    @property
+    def splits_pressure(self) -> bool:
+        """Whether what the fluid carries is left out of the n and m that are shown, as the paper's are."""
+        return True
+
     def check(self, numbers: Mapping[str, Any] | None = None) -> None:
         """Raise `RobotError` for a section that cannot be made.
 
@@ -196,6 +206,41 @@ class Section(Protocol):
             As said.
         """
         ...
+
+    def unloaded(self, numbers: Mapping[str, Any], pressures: Any, strains: Any) -> tuple[Sequence[Any], Sequence[Any]]:
+        """Return the generalised forces without a load; of a section that is `coupled`.
+
+        Parameters
+        ----------
+        numbers, pressures
+            As of `at`.
+        strains
+            (3,) v_3, and two curvatures times a length of the section [1].
+
+        Returns
+        -------
+        tuple
+            (3,) forces, which are gradients of an energy and linear in the pressures [N], and the upper part of their
+            slopes, row by row (6,) [N]; none of another section.
+        """
+        return (), ()
+
+    def lengthening(self, own: Sequence[Any], centres: Sequence[tuple[Any, Any]], v: Any, u: Any) -> list[Any]:
+        """Return the rate of each chamber's length by s, Eq. (13).
+
+        Parameters
+        ----------
+        own, centres
+            (entries,) of `SectionState.own` and (N, 2) d_i, in any consistent system of units [SI].
+        v, u
+            (3,) of `strains` [1], [1/m].
+
+        Returns
+        -------
+        list
+            (N,) [1].
+        """
+        return [ca.norm_2(v + ca.cross(u, ca.vertcat(d_x, d_y, 0))) for d_x, d_y in centres]
 
     def strains(self, section: RodSection, own: Sequence[Any], force: Any, moment: Any) -> tuple[Any, Any]:
         """Return the strains under what wall and fluid carry together, Eq. (5): R^T M + M_P = K u.

@@ -68,6 +68,13 @@ class RodFunctions:
         """The number of entries of x."""
         return int(self.field.size1_in(0))
 
+    def resultants(self, x: Any, c: Any) -> tuple[Any, Any]:
+        """Return n and m as they are shown, of a scaled state p, R, N, M and the constants of the load case."""
+        if self.model.section.splits_pressure:
+            return rod.wall_resultants(x, unpack_section(c))
+        _, _, N, M = rod.unpack(x)
+        return N, M
+
     @property
     def tip_unknowns(self) -> int:
         """The number of entries of y."""
@@ -121,7 +128,7 @@ def rod_functions(
     own = [ca.SX.sym("own") for _ in probed.own]
     c = ca.vertcat(*section, *line.symbols[:1], *flat, chamber, *own, *line.symbols[1:])
     v, u = model.section.strains(section, own, *rod.in_body(x))
-    rates = [ca.norm_2(v + ca.cross(u, ca.vertcat(d_x, d_y, 0))) for d_x, d_y in centres]
+    rates = model.section.lengthening(own, centres, v, u)
     along = ca.vertcat(*rates, ca.norm_2(u[:2]), ca.norm_2(v))
     lengths = ca.Function("lengths", [x, c], [section.length * along], {"cse": True})
     field = ca.vertcat(rod.field(x, v, u, *line.wrench(x, section)), along[:with_lengths])

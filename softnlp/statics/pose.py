@@ -45,8 +45,7 @@ def shape_function(functions: RodFunctions) -> ca.Function:
     end = x
     for _ in range(_SUBSTEPS):
         end = step(end, c, h / _SUBSTEPS)
-    section = unpack_section(c)
-    every = ca.vertcat(end, *functions.strains(end[: rod.STATE_SIZE], c), *rod.wall_resultants(end, section))
+    every = ca.vertcat(end, *functions.strains(end[: rod.STATE_SIZE], c), *functions.resultants(end, c))
     return ca.Function("shape", [x, c, h], [every])
 
 

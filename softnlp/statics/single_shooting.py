@@ -15,12 +15,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.model import rod
 from softnlp.model.quantities import LOADS
 from softnlp.model.rod import STATE_SIZE
 from softnlp.native.kernels import Kernels, Step
 from softnlp.native.shooting import Compiled, shooting
-from softnlp.statics.loadcase import RodFunctions, unpack_section, whole_weight
+from softnlp.statics.loadcase import RodFunctions, whole_weight
 from softnlp.statics.reduced import MOMENT, POSITION, ROTATION, STATE, base_state, function, reduced_rod
 from softnlp.statics.stretches import Stretches, stretch_maps
 
@@ -180,8 +179,9 @@ def single_shooting(functions: RodFunctions) -> SingleShooting | None:
     with_integrals = ca.SX.sym("x", size + functions.lengths.size1_out(0))
     along = [functions.field(with_integrals[:size], c), functions.lengths(with_integrals[:size], c)]
     state = ca.SX.sym("x", size + nc)
-    section = unpack_section(state[size:])
-    strains = ca.vertcat(*functions.strains(state[:size], state[size:]), *rod.wall_resultants(state[:size], section))
+    strains = ca.vertcat(
+        *functions.strains(state[:size], state[size:]), *functions.resultants(state[:size], state[size:])
+    )
     maps = stretch_maps(functions)
     given = ca.SX.sym("given", maps["section"].size1_in(0))
     arc = functions.arc(given[:-1], given[-1], 1.0)
