@@ -31,6 +31,7 @@ from softnlp.model.stretch_curve import (
     derived,
     evaluated,
     liner_scale,
+    resting,
 )
 
 SQUARE, CIRCLE = "rings.square", "rings.circle"
@@ -109,18 +110,19 @@ class EnergySection(Section):
         """Return the potential of these numbers, by the keys of `quantities`, at pressures (sets,) [Pa]."""
         robot = self._robot(numbers)
         material, c_m = self._material(numbers), numbers[FACTOR]
-        r_co, r_ci, r_cp = robot.chamber_radius, robot.bore_radius, robot.chamber_circle_radius
-        r_r, r_i, N = robot.outer_radius, robot.lumen_radius, robot.chambers
+        r_co, r_ci = robot.chamber_radius, robot.bore_radius
+        r_r, r_i = robot.outer_radius, robot.lumen_radius
         fibre, plane = fibre_energy(material), energy_of(material).density
         body, liner, slip = [], [], []
         A_0 = _area(robot)
-        J_0 = ca.pi * (r_r**4 - r_i**4) / 2 - N * ca.pi * (r_ci**4 / 2 + r_ci**2 * r_cp**2)
+        J_0 = _polar_moment(robot)
         rest = shear_modulus(material, 1.0)
         for k, stretch in enumerate(STRETCHES):
             body.append(c_m * fibre(2 / stretch * numbers[SQUARE][k], stretch))
             slip.append(rest / shear_modulus(material, stretch))
         pole = 1 - r_ci**2 / r_co**2
-        for stretch in liner_scale(pole).stretches():
+        scale = liner_scale(pole)
+        for stretch in scale.stretches():
             through = 0.0
             for part, weight in _THROUGH:
                 R2 = r_ci**2 + part * (r_co**2 - r_ci**2)
@@ -128,8 +130,8 @@ class EnergySection(Section):
                 through += weight * plane(hoop2 + 1 / (stretch**2 * hoop2), stretch)
             liner.append(c_m * ca.pi * (r_co**2 - r_ci**2) * through)
         return Potential(
-            body=derived(coefficients(body)),
-            liner=derived(coefficients(liner)),
+            body=resting(derived(coefficients(body)), BODY),
+            liner=resting(derived(coefficients(liner)), scale),
             arms=coefficients([numbers[CIRCLE][k] for k in range(BODY_SIZE)]),
             slip=coefficients(slip),
             GA=c_m * rest * A_0,
@@ -190,6 +192,11 @@ class EnergySection(Section):
             chamber_stiffness=c_m * material.tangent_modulus(stretch) * ca.pi * robot.chamber_radius**2,
             own=own,
         )
+
+    def bending_at_rest(self, numbers: Mapping[str, Any]) -> Any:
+        """Return that of body and liners in uniaxial stress."""
+        robot = self._robot(numbers)
+        return numbers[FACTOR] * self._material(numbers).tangent_modulus(1.0) * _polar_moment(robot) / 2
 
     def _material(self, numbers: Mapping[str, Any]) -> Material:
         constants = {c.name: numbers[f"material.{c.name}"] for c in self.material.law.constants}
@@ -290,6 +297,12 @@ def _near(chambers: int) -> ca.Function:
 def _area(robot: Robot) -> Any:
     """Return A_0 of body and liners [m^2]."""
     return ca.pi * (robot.outer_radius**2 - robot.lumen_radius**2 - robot.chambers * robot.bore_radius**2)
+
+
+def _polar_moment(robot: Robot) -> Any:
+    """Return J_0 of body and liners [m^4]."""
+    bore = robot.bore_radius**4 / 2 + robot.bore_radius**2 * robot.chamber_circle_radius**2
+    return ca.pi * ((robot.outer_radius**4 - robot.lumen_radius**4) / 2 - robot.chambers * bore)
 
 
 def _is_zero(pressures: Any) -> bool:

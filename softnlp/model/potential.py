@@ -13,13 +13,14 @@ of the section as cast: v_3 is the whole stretch.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import nan
 from typing import Any, NamedTuple
 
 import casadi as ca
 
 from softnlp.model.quadrature import Disc, Sums, at_point, over_disc, value_over
-from softnlp.model.stretch_curve import BODY, Place, evaluated, liner_scale, slopes_of
+from softnlp.model.stretch_curve import BODY, BODY_SIZE, LINER_SIZE, Place, evaluated, liner_scale, slopes_of
 
 OUTER, LUMEN, CHAMBER = 6, 4, 3
 """Points of the rules over the outer disc, the lumen and a chamber."""
@@ -54,8 +55,8 @@ NOTHING = Pull(0.0, 0.0, 0.0, 0.0, 0.0)
 class Tangent(NamedTuple):
     """First derivatives of U less the pull, and second ones, by v_3, b_1 and b_2."""
 
-    g: tuple[Any, Any, Any]
-    H: tuple[Any, Any, Any, Any, Any, Any]  # vv, v1, v2, 11, 12, 22
+    g: tuple[Any, ...]  # (3,)
+    H: tuple[Any, ...]  # vv, v1, v2, 11, 12, 22
 
 
 class Answer(NamedTuple):
@@ -122,6 +123,14 @@ class Potential:
 
     def tangent(self, at: Strains, pull: Pull) -> Tangent:
         """Return the derivatives of U at strains, with the shear and the twist that the pull makes there."""
+        given = [self.body, self.liner, self.arms, self.slip, *(getattr(self, name) for name in _NUMBERS)]
+        flat = [x for centre in self.centres for x in centre]
+        found = _tangent(len(self.centres))(ca.vertcat(*given, *flat, *self.push, *at, *pull))
+        g, H = (tuple(found[k] for k in rows) for rows in (range(3), range(3, 9)))
+        return Tangent(g, H)
+
+    def _tangent(self, at: Strains, pull: Pull) -> Tangent:
+        """Return the same, operation by operation."""
         here = BODY.place(at.v)
         a, a1, a2 = evaluated(self.arms, here)
         b = (at.b_1, at.b_2)
@@ -242,6 +251,23 @@ class Potential:
         return total + (v_1**2 + v_2**2) / (2 * s) + u_3**2 / (2 * t)
 
 
+_NUMBERS = ("GA", "gyration", "outer", "lumen", "chamber", "pole")
+
+
+@lru_cache(maxsize=8)
+def _tangent(chambers: int) -> ca.Function:
+    """Return `Potential._tangent` of a section of so many chambers; a call copies it, which is quick."""
+    sizes = [BODY_SIZE - 1, LINER_SIZE - 1, BODY_SIZE, BODY_SIZE, len(_NUMBERS), 2 * chambers, chambers, 3, 5]
+    given = ca.SX.sym("given", sum(sizes))
+    parts = ca.vertsplit(given, [sum(sizes[:k]) for k in range(len(sizes) + 1)])
+    numbers, flat, push, at, pull = ([part[k] for k in range(part.numel())] for part in parts[4:])
+    centres = tuple(zip(flat[::2], flat[1::2], strict=True))
+    every: list[Any] = [*parts[:4], *numbers, centres, tuple(push)]
+    potential = Potential(*every)
+    found = potential._tangent(Strains(*at), Pull(*pull))
+    return ca.Function("tangent", [given], [ca.vertcat(*found.g, *found.H)], {"cse": True})
+
+
 def _summed(derivative: Any, at: Place) -> Any:
     """Return the energy whose derivative by y has these coefficients, but for a constant."""
     p = 0.0
@@ -262,7 +288,7 @@ def _solved(tangent: Tangent) -> tuple[Any, Any, Any]:
     return _times(tuple(c / det for c in C), tangent.g)
 
 
-def _times(C: tuple[Any, ...], g: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
+def _times(C: tuple[Any, ...], g: tuple[Any, ...]) -> tuple[Any, Any, Any]:
     """Return a symmetric 3x3 matrix, its upper part row by row, times a vector."""
     return (
         C[0] * g[0] + C[1] * g[1] + C[2] * g[2],

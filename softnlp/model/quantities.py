@@ -55,10 +55,9 @@ def section_function(declared: Mapping[str, Quantity], build: Callable[[Any, Any
 
 
 def force_unit(model: Model, numbers: Mapping[str, Any] | None = None) -> Any:
-    """Return EI / L_0^2 [N], with EI the mean bending stiffness of the section without pressure.
+    """Return EI / L_0^2 [N], with EI the mean bending stiffness of the section without pressure, or near to it.
 
     numbers : of the section by key, symbols perhaps; None are the model's own.
     """
     own = model.numbers if numbers is None else numbers
-    rest = model.section.at(own, [0.0] * model.sets, 1.0)
-    return (rest.bending_stiffness[0] + rest.bending_stiffness[1]) / 2 / own["robot.length"] ** 2
+    return model.section.bending_at_rest(own) / own["robot.length"] ** 2

@@ -26,6 +26,7 @@ _COEFFICIENT_NAMES = {
     "inertia": "corrections.inertia",
     "bore_fraction": "corrections.bore_fraction",
 }
+_ROUNDING = 1e-9  # of a stretch that is found by iterations
 FACTOR = "corrections.modulus_factor"
 OF_COEFFICIENTS = {**_COEFFICIENT_NAMES, "modulus_factor": FACTOR}
 """Keys of coefficients, of which a section has its own."""
@@ -190,7 +191,7 @@ def chamber_warnings(robot: Robot, material: Material, stretch: float) -> list[s
     """Say where the silicone was not fitted, and where neighbouring chambers touch."""
     found = []
     low, high = material.fitted_stretch
-    if not low <= stretch <= high:
+    if not low - _ROUNDING <= stretch <= high:
         found.append(f"stretch {stretch:.3f} is outside {low:g} to {high:g}, where {material.name} was fitted")
     limit = touching_stretch(robot)
     if stretch > limit:

@@ -242,6 +242,22 @@ class Section(Protocol):
         """
         return [ca.norm_2(v + ca.cross(u, ca.vertcat(d_x, d_y, 0))) for d_x, d_y in centres]
 
+    def bending_at_rest(self, numbers: Mapping[str, Any]) -> Any:
+        """Return the mean bending stiffness without pressure, of which the unit of force is made.
+
+        Parameters
+        ----------
+        numbers
+            By key.
+
+        Returns
+        -------
+        number
+            EI, or what is near to it [N m^2].
+        """
+        rest = self.at(numbers, [0.0] * self.sets, 1.0)
+        return (rest.bending_stiffness[0] + rest.bending_stiffness[1]) / 2
+
     def strains(self, section: RodSection, own: Sequence[Any], force: Any, moment: Any) -> tuple[Any, Any]:
         """Return the strains under what wall and fluid carry together, Eq. (5): R^T M + M_P = K u.
 

@@ -117,6 +117,14 @@ def derived(curve: Any) -> Any:
     return ca.vertcat(*(k * curve[k] for k in range(1, curve.numel())))
 
 
+def resting(derivative: Any, scale: Scale) -> Any:
+    """Return the coefficients of `derived` with a slope of exactly 0 at stretch 1, which round-off keeps from it."""
+    y, value = scale.place(1.0).y, 0.0
+    for k in range(derivative.numel() - 1, -1, -1):
+        value = value * y + derivative[k]
+    return ca.vertcat(derivative[0] - value, derivative[1:])
+
+
 def slopes_of(derivative: Any, at: Place) -> tuple[Any, Any]:
     """Return the first and second derivatives by the stretch of the curve that `derived` is of."""
     last = derivative.numel() - 1

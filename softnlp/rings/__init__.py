@@ -12,6 +12,8 @@ from softnlp.rings.outline import of_robot as of_robot
 from softnlp.rings.response import RingResponse as RingResponse
 from softnlp.rings.response import ring_response as ring_response
 from softnlp.rings.response import robot_response as robot_response
+from softnlp.rings.section_values import ALL_CONVENTIONS as ALL_CONVENTIONS
+from softnlp.rings.section_values import ENERGY as ENERGY
 from softnlp.rings.surrogate import RingSurrogate as RingSurrogate
 from softnlp.rings.surrogate import proportions as proportions
 from softnlp.rings.surrogate import ranges as ranges

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from softnlp.model.conventions import UNIAXIAL, Conventions
+from softnlp.model.conventions import CONVENTIONS, UNIAXIAL, Conventions
 from softnlp.model.robot import Robot
 from softnlp.rings.outline import Array
 from softnlp.rings.response import robot_response
@@ -26,3 +26,6 @@ def ring_values(robot: Robot, stretches: Sequence[float]) -> tuple[Array, Array]
 
 ENERGY: Conventions = replace(UNIAXIAL, rings=ring_values)
 """The energy section, with the rings of its thread."""
+
+ALL_CONVENTIONS = {**CONVENTIONS, ENERGY.name: ENERGY}
+"""By the name that a scenario has for them."""
