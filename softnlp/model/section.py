@@ -212,8 +212,10 @@ class Section(Protocol):
 
         Parameters
         ----------
-        numbers, pressures
-            As of `at`.
+        numbers
+            By key.
+        pressures
+            (sets,) gauge [Pa].
         strains
             (3,) v_3, and two curvatures times a length of the section [1].
 

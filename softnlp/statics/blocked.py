@@ -29,7 +29,7 @@ from softnlp.statics.loadcase import RodFunctions
 from softnlp.statics.pose_grid import iteration_cost
 from softnlp.statics.solver import SEARCHED_BY, PoseSolver
 from softnlp.statics.step import Step
-from softnlp.statics.wall import Situation, Wall, keeps_plane, require_closure, slipping_pressure
+from softnlp.statics.wall import Situation, Wall, keeps_plane, slipping_pressure, with_closure
 
 Array = NDArray[np.float64]
 
@@ -61,10 +61,9 @@ class BlockedSolver:
         poses: PoseSolver | None = None,
         equations: RodEquations | None = None,
     ) -> None:
-        require_closure(model, contact)
         self.model = model
         self.numerics = numerics
-        self.contact = contact
+        self.contact = with_closure(model, contact)
         self.has_wall = wall
         # Without loads the free lengths and tip are taken from the closed form, so the grid need not show it.
         self.poses = poses or PoseSolver(model, numerics, unloaded_accuracy=numerics.accuracy)

@@ -58,13 +58,14 @@ def _wall_at(offset: float, rest: Array, furthest: Array) -> Wall:
     return Wall(np.array([offset, 0.0, 0.0]), np.array([-np.sign(moved), 0.0, 0.0]))
 
 
-def require_closure(model: Model, contact: ContactSettings) -> None:
-    """Raise `InputError` for a closure that the model's section does not have."""
+def with_closure(model: Model, contact: ContactSettings) -> ContactSettings:
+    """Return the settings, or raise `InputError` for a closure that the model's section does not have."""
     if model.section.coupled and contact.closure != NO_CLOSURE:
         text = f"{contact.closure_name!r} is not used with conventions energy; expected 'none'"
         raise InputError(text, key="closure")
     if contact.closure == NO_CLOSURE and not model.section.coupled:
         raise InputError("expected 'none' only with conventions energy", key="closure")
+    return contact
 
 
 def checked_contact(
