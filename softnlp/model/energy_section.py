@@ -18,7 +18,7 @@ from softnlp.base.quantity import Quantity, quantity
 from softnlp.model.conventions import Coefficients, Conventions
 from softnlp.model.energies import energy_of, fibre_energy, shear_modulus
 from softnlp.model.materials import Material
-from softnlp.model.potential import NOTHING, Answer, Potential, Pull, Strains
+from softnlp.model.potential import NOTHING, PASSES, Answer, Potential, Pull, Strains, rounded
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.round_chambers import FACTOR, SIZES, chamber_warnings, of_model, radii
 from softnlp.model.section import RodSection, Section, SectionRadii, SectionState
@@ -204,15 +204,27 @@ class EnergySection(Section):
 
     def strains(self, section: RodSection, own: Sequence[Any], force: Any, moment: Any) -> tuple[Any, Any]:
         """Return the strains whose gradients of U are the force and the moment, per length without loads."""
+        potential, pull, at, _ = self._near(own, force, moment)
+        found, _ = potential.polished(at, pull)
+        return _as_strains(potential, found, force, moment)
+
+    def quick_strains(self, section: RodSection, own: Sequence[Any], force: Any, moment: Any) -> tuple[Any, Any]:
+        """Return the same to round-off by what is called alone; the derivative by the force is good for iterations."""
+        potential, pull, _, found = self._near(own, force, moment)
+        r, GA = potential.outer, potential.GA
+        last = [rounded(found[k]) for k in range(_FOUND)]
+        at = Strains(last[6], last[7] / r, last[8] / r)
+        units = (1, r, r, r**2, r**2, r**2)
+        inverse = tuple(last[k] / (GA * unit) for k, unit in enumerate(units))
+        return _as_strains(potential, potential.followed(at, inverse, last[9], pull), force, moment)
+
+    def _near(self, own: Sequence[Any], force: Any, moment: Any) -> tuple[Potential, Pull, Strains, Any]:
+        """Return the potential, the pull, strains near to those under it, and what `_refine` found last."""
         potential = _known(own, self.robot.chambers)
-        unit = potential.start[0]
         pull = Pull(force[2], -moment[1], moment[0], force[0] ** 2 + force[1] ** 2, moment[2] ** 2)
+        found = _near(self.robot.chambers)(ca.vertcat(*own, *pull))
         r = potential.outer
-        v, x, y = ca.vertsplit(_near(self.robot.chambers)(ca.vertcat(*own, *pull)))
-        at, _ = potential.polished(Strains(v, x / r, y / r), pull)
-        s, t = potential.compliance(at.v)
-        v = ca.vertcat(force[0] * s, force[1] * s, at.v)
-        return v / unit, ca.vertcat(at.b_2, -at.b_1, moment[2] * t) / unit
+        return potential, pull, Strains(found[6], found[7] / r, found[8] / r), found
 
     def lengthening(self, own: Sequence[Any], centres: Sequence[tuple[Any, Any]], v: Any, u: Any) -> list[Any]:
         """Return lambda_i over v_3 without loads: the pressures' work goes with the part along e3."""
@@ -228,6 +240,18 @@ class EnergySection(Section):
     def warnings(self, stretch: float) -> list[str]:
         """Say where the silicone was not fitted, and where neighbouring chambers touch."""
         return chamber_warnings(self.robot, self.material, stretch)
+
+
+_FOUND = 10
+"""Numbers of what `_refine` takes and returns."""
+
+
+def _as_strains(potential: Potential, at: Strains, force: Any, moment: Any) -> tuple[Any, Any]:
+    """Return v and u per length without loads."""
+    s, t = potential.compliance(at.v)
+    unit = potential.start[0]
+    v = ca.vertcat(force[0] * s, force[1] * s, at.v)
+    return v / unit, ca.vertcat(at.b_2, -at.b_1, moment[2] * t) / unit
 
 
 def _sizes(chambers: int) -> tuple[int, ...]:
@@ -284,13 +308,30 @@ def _bent(chambers: int) -> ca.Function:
 
 
 @lru_cache(maxsize=8)
+def _refine(chambers: int) -> ca.Function:
+    """Return [own numbers, pull, found] -> found, which is [GA H^-1 in (v, r b), strains (v, r b), last change]."""
+    sizes = (sum(_sizes(chambers)), len(Pull._fields), _FOUND)
+    given = [ca.SX.sym(name, size) for name, size in zip(("own", "pull", "at"), sizes, strict=True)]
+    own, pull, at = ([part[k] for k in range(part.numel())] for part in given)
+    potential = _known(own, chambers)
+    r = potential.outer
+    found, inverse, change = potential.refined(Strains(at[6], at[7] / r, at[8] / r), Pull(*pull))
+    scaled = [c * potential.GA * unit for c, unit in zip(inverse, (1, r, r, r**2, r**2, r**2), strict=True)]
+    rows = ca.vertcat(*scaled, found.v, found.b_1 * r, found.b_2 * r, change)
+    return ca.Function("refine", [ca.vertcat(*given)], [rows], _CALLED)
+
+
+@lru_cache(maxsize=8)
 def _near(chambers: int) -> ca.Function:
-    """Return [own numbers, pull] -> `Potential.near`; called and not copied where it is used, as it is long."""
+    """Return [own numbers, pull] -> found, see `_refine`; called where it is used, as it is long."""
     own = ca.SX.sym("own", sum(_sizes(chambers)))
     pull = ca.SX.sym("pull", len(Pull._fields))
     potential = _known([own[k] for k in range(own.numel())], chambers)
-    at = potential.near(Pull(*(pull[k] for k in range(pull.numel()))))
-    found = ca.vertcat(at.v, at.b_1 * potential.outer, at.b_2 * potential.outer)
+    at = potential.started(Pull(*(pull[k] for k in range(pull.numel()))))
+    r = potential.outer
+    found = ca.vertcat(ca.SX.zeros(6), at.v, at.b_1 * r, at.b_2 * r, 1.0)
+    for _ in range(PASSES):
+        found = _refine(chambers)(ca.vertcat(own, pull, found))
     return ca.Function("near", [ca.vertcat(own, pull)], [found], _CALLED)
 
 

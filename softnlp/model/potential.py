@@ -25,7 +25,8 @@ from softnlp.model.stretch_curve import BODY, BODY_SIZE, LINER_SIZE, Place, eval
 OUTER, LUMEN, CHAMBER = 6, 4, 3
 """Points of the rules over the outer disc, the lumen and a chamber."""
 _LONGEST = 0.35  # change of a fibre's stretch that one pass may make
-_PASSES = 3  # before the last
+PASSES = 3
+"""Of Newton's method before the last one; those that are not needed may be left out."""
 _BENT_PASSES = 5  # the same where nothing is known yet
 _GRAIN = 2.0**-44  # to which a start is rounded
 _SETTLED = 1e-5  # change of a stretch in the last pass from which the strains are not believed
@@ -167,18 +168,37 @@ class Potential:
             total = total + at_point((x, y), first - push, second)
         return total
 
-    def near(self, pull: Pull) -> Strains:
-        """Return strains so near to those under a pull that one pass is left, see `polished`."""
-        r, at = self.outer, Strains(*self.start)
-        if self.answer is not None:
-            v, x, y = self.answer.strains(pull.n, pull.h_1 / r, pull.h_2 / r)
-            at = Strains(at.v + v, at.b_1 + x / r, at.b_2 + y / r)
-        for _ in range(_PASSES):
-            change = _solved(self.tangent(at, pull))
-            reach = ca.fabs(change[0]) + self.outer * (ca.fabs(change[1]) + ca.fabs(change[2]))
-            part = ca.fmin(1.0, _LONGEST / (reach + 1e-30))
-            at = Strains(*(value - part * d for value, d in zip(at, change, strict=True)))
-        return at
+    def started(self, pull: Pull) -> Strains:
+        """Return the strains under a pull to second order."""
+        r = self.outer
+        assert self.answer is not None
+        v, x, y = self.answer.strains(pull.n, pull.h_1 / r, pull.h_2 / r)
+        return Strains(self.start[0] + v, self.start[1] + x / r, self.start[2] + y / r)
+
+    def refined(self, at: Strains, pull: Pull) -> tuple[Strains, tuple[Any, ...], Any]:
+        """Return strains nearer to those under a pull, H^-1 (6,) at the given ones, and the largest fibre's change."""
+        tangent = self.tangent(at, pull)
+        C, det = adjugate(tangent.H)
+        inverse = tuple(c / det for c in C)
+        change = _times(inverse, tangent.g)
+        reach = ca.fabs(change[0]) + self.outer * (ca.fabs(change[1]) + ca.fabs(change[2]))
+        part = ca.fmin(1.0, _LONGEST / (reach + 1e-30))
+        return Strains(*(value - part * d for value, d in zip(at, change, strict=True))), inverse, reach
+
+    def followed(self, near: Strains, inverse: tuple[Any, ...], change: Any, pull: Pull) -> Strains:
+        """Return strains that are found already, with their derivative by the pull; nan where they are not.
+
+        inverse, change : of the last `refined`.
+        """
+        lost = ca.if_else(change < _SETTLED, 0.0, nan)
+        moved = _times(
+            inverse,
+            tuple(
+                f - self.GA * unit * rounded(f / (self.GA * unit))
+                for f, unit in zip(pull[:3], (1.0, self.outer, self.outer), strict=True)
+            ),
+        )
+        return Strains(*(value + d + lost for value, d in zip(near, moved, strict=True)))
 
     def polished(self, near: Strains, pull: Pull) -> tuple[Strains, Tangent]:
         """Return the strains next to near ones in one pass of Newton's method, and the tangent there; nan if not near.
@@ -187,7 +207,7 @@ class Potential:
         derivative is exact at the solution.
         """
         unit = (1.0, self.outer, self.outer)
-        at = Strains(*(_rounded(value * one) / one for value, one in zip(near, unit, strict=True)))
+        at = Strains(*(rounded(value * one) / one for value, one in zip(near, unit, strict=True)))
         tangent = self.tangent(at, pull)
         change = _solved(tangent)
         reach = ca.fabs(change[0]) + self.outer * (ca.fabs(change[1]) + ca.fabs(change[2]))
@@ -221,7 +241,7 @@ class Potential:
 
         The slope of its first entry by the stretch is that with the bending that follows.
         """
-        at = Strains(near.v, *(_rounded(b * self.outer) / self.outer for b in (near.b_1, near.b_2)))
+        at = Strains(near.v, *(rounded(b * self.outer) / self.outer for b in (near.b_1, near.b_2)))
         _, d_1, d_2 = self._bending(at)
         at = Strains(near.v, at.b_1 - d_1, at.b_2 - d_2)
         return at, self.tangent(at, NOTHING)
@@ -278,7 +298,8 @@ def _summed(derivative: Any, at: Place) -> Any:
     return p + (slope - second * x) * x + second * x**2 / 2
 
 
-def _rounded(value: Any) -> Any:
+def rounded(value: Any) -> Any:
+    """Return a value whose derivative is zero."""
     return ca.floor(value / _GRAIN) * _GRAIN
 
 

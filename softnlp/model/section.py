@@ -281,6 +281,23 @@ class Section(Protocol):
         v = ca.vertcat(force[0] / section.shear, force[1] / section.shear, force[2] / section.axial + 1)
         return v, ca.vertcat(m[0] / section.bending_x, m[1] / section.bending_y, m[2] / section.torsion)
 
+    def quick_strains(self, section: RodSection, own: Sequence[Any], force: Any, moment: Any) -> tuple[Any, Any]:
+        """Return `strains` as machine code takes them, whose derivatives need not be exact; by default the same.
+
+        Parameters
+        ----------
+        section, own
+            As of `strains` (entries,) [SI].
+        force, moment
+            (3,) R^T N and R^T M [SI].
+
+        Returns
+        -------
+        tuple
+            (3,) v [1] and (3,) u [1/m].
+        """
+        return self.strains(section, own, force, moment)
+
     def outline(self, numbers: Mapping[str, Any], stretch: Any) -> SectionRadii:
         """Return the section's deformed radii.
 

@@ -173,6 +173,7 @@ def _pushes_back(R: Array, turned: Array, J: Array) -> bool:
 def single_shooting(functions: RodFunctions) -> SingleShooting | None:
     """Compile what finds poses of a rod with dead loads; None where there is nothing to compile with."""
     reduced = reduced_rod(functions)
+    functions = functions.in_kernels
     size, nc = functions.state_size, functions.field.size1_in(1)
     x, data, s = ca.SX.sym("x", size), ca.SX.sym("data", nc + 1), ca.SX.sym("s")
     c, h = data[:nc], data[nc]
