@@ -204,27 +204,25 @@ class EnergySection(Section):
 
     def strains(self, section: RodSection, own: Sequence[Any], force: Any, moment: Any) -> tuple[Any, Any]:
         """Return the strains whose gradients of U are the force and the moment, per length without loads."""
-        potential, pull, at, _ = self._near(own, force, moment)
-        found, _ = potential.polished(at, pull)
+        potential, pull, at, inverse, change = self._near(own, force, moment)
+        found = potential.followed(at, inverse, change, potential.gradient(at, pull))
         return _as_strains(potential, found, force, moment)
 
     def quick_strains(self, section: RodSection, own: Sequence[Any], force: Any, moment: Any) -> tuple[Any, Any]:
-        """Return the same to round-off by what is called alone; the derivative by the force is good for iterations."""
-        potential, pull, _, found = self._near(own, force, moment)
-        r, GA = potential.outer, potential.GA
-        last = [rounded(found[k]) for k in range(_FOUND)]
-        at = Strains(last[6], last[7] / r, last[8] / r)
-        units = (1, r, r, r**2, r**2, r**2)
-        inverse = tuple(last[k] / (GA * unit) for k, unit in enumerate(units))
-        return _as_strains(potential, potential.followed(at, inverse, last[9], pull), force, moment)
+        """Return the same with a derivative by the force and the moment alone."""
+        potential, pull, at, inverse, change = self._near(own, force, moment)
+        found = potential.followed(at, inverse, change, (-pull.n, -pull.h_1, -pull.h_2))
+        return _as_strains(potential, found, force, moment)
 
-    def _near(self, own: Sequence[Any], force: Any, moment: Any) -> tuple[Potential, Pull, Strains, Any]:
-        """Return the potential, the pull, strains near to those under it, and what `_refine` found last."""
+    def _near(self, own: Sequence[Any], force: Any, moment: Any) -> tuple[Potential, Pull, Strains, Any, Any]:
+        """Return the potential, the pull, and strains under it as numbers, with H^-1 (6,) and their last change."""
         potential = _known(own, self.robot.chambers)
         pull = Pull(force[2], -moment[1], moment[0], force[0] ** 2 + force[1] ** 2, moment[2] ** 2)
-        found = _near(self.robot.chambers)(ca.vertcat(*own, *pull))
-        r = potential.outer
-        return potential, pull, Strains(found[6], found[7] / r, found[8] / r), found
+        called = _near(self.robot.chambers)(ca.vertcat(*own, *pull))
+        found = [rounded(called[k]) for k in range(_FOUND)]
+        r, GA = potential.outer, potential.GA
+        inverse = tuple(found[k] / (GA * unit) for k, unit in enumerate((1, r, r, r**2, r**2, r**2)))
+        return potential, pull, Strains(found[6], found[7] / r, found[8] / r), inverse, found[9]
 
     def lengthening(self, own: Sequence[Any], centres: Sequence[tuple[Any, Any]], v: Any, u: Any) -> list[Any]:
         """Return lambda_i over v_3 without loads: the pressures' work goes with the part along e3."""

@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from softnlp.model.quadrature import Disc, Sums, at_point, over_disc, value_over
-from softnlp.model.stretch_curve import BODY, BODY_SIZE, LINER_SIZE, Place, evaluated, liner_scale, slopes_of
+from softnlp.model.quadrature import Disc, Sums, at_point, first_over_disc, over_disc, value_over
+from softnlp.model.stretch_curve import BODY, BODY_SIZE, LINER_SIZE, Place, evaluated, liner_scale, slope_of, slopes_of
 
 OUTER, LUMEN, CHAMBER = 6, 4, 3
 """Points of the rules over the outer disc, the lumen and a chamber."""
@@ -185,35 +185,37 @@ class Potential:
         part = ca.fmin(1.0, _LONGEST / (reach + 1e-30))
         return Strains(*(value - part * d for value, d in zip(at, change, strict=True))), inverse, reach
 
-    def followed(self, near: Strains, inverse: tuple[Any, ...], change: Any, pull: Pull) -> Strains:
-        """Return strains that are found already, with their derivative by the pull; nan where they are not.
+    def followed(self, near: Strains, inverse: tuple[Any, ...], change: Any, off: tuple[Any, ...]) -> Strains:
+        """Return strains that are found already, with a derivative; nan where they are not.
 
-        inverse, change : of the last `refined`.
+        inverse, change : of the last `refined`. off : what vanishes at the strains (3,), whose derivative they follow.
         """
         lost = ca.if_else(change < _SETTLED, 0.0, nan)
-        moved = _times(
-            inverse,
-            tuple(
-                f - self.GA * unit * rounded(f / (self.GA * unit))
-                for f, unit in zip(pull[:3], (1.0, self.outer, self.outer), strict=True)
-            ),
-        )
-        return Strains(*(value + d + lost for value, d in zip(near, moved, strict=True)))
+        units = (self.GA, self.GA * self.outer, self.GA * self.outer)
+        moved = tuple(g - unit * rounded(g / unit) for g, unit in zip(off, units, strict=True))
+        found = _times(inverse, moved)
+        return Strains(*(value - d + lost for value, d in zip(near, found, strict=True)))
 
-    def polished(self, near: Strains, pull: Pull) -> tuple[Strains, Tangent]:
-        """Return the strains next to near ones in one pass of Newton's method, and the tangent there; nan if not near.
+    def gradient(self, at: Strains, pull: Pull) -> tuple[Any, ...]:
+        """Return the first derivatives of `tangent` alone, of fibres within the range of their law (3,)."""
+        a, a1, _ = evaluated(self.arms, BODY.place(at.v))
+        k = (a * at.b_1, a * at.b_2)
+        by_v, by_k = 0.0, [0.0, 0.0]
+        liner = liner_scale(self.pole)
+        parts = [first_over_disc(disc, self._slope, at.v, k) for disc in self.discs]
+        for (x, y), push in zip(self.centres, self.push, strict=True):
+            first = slope_of(self.liner, liner.place(at.v + k[0] * x + k[1] * y)) - push
+            parts.append((first, (x * first, y * first)))
+        for v, (k_1, k_2) in parts:
+            by_v, by_k = by_v + v, [by_k[0] + k_1, by_k[1] + k_2]
+        _, s1, _ = (value / self.GA for value in evaluated(self.slip, BODY.place(at.v)))
+        s = evaluated(self.slip, BODY.place(at.v)).value / self.GA
+        t1 = (s + at.v * s1) / self.gyration**2
+        along = a1 * (at.b_1 * by_k[0] + at.b_2 * by_k[1]) - (pull.shear2 * s1 + pull.twist2 * t1) / 2
+        return by_v + along - pull.n, a * by_k[0] - pull.h_1, a * by_k[1] - pull.h_2
 
-        The start is rounded: its derivative is zero, so that what is differentiated is this pass alone, whose
-        derivative is exact at the solution.
-        """
-        unit = (1.0, self.outer, self.outer)
-        at = Strains(*(rounded(value * one) / one for value, one in zip(near, unit, strict=True)))
-        tangent = self.tangent(at, pull)
-        change = _solved(tangent)
-        reach = ca.fabs(change[0]) + self.outer * (ca.fabs(change[1]) + ca.fabs(change[2]))
-        lost = ca.if_else(reach < _SETTLED, 0.0, nan)
-        found = Strains(*(value - d + lost for value, d in zip(at, change, strict=True)))
-        return found, tangent
+    def _slope(self, stretch: Any) -> Any:
+        return slope_of(self.body, BODY.place(stretch))
 
     def answering(self, at: Strains) -> Answer:
         """Return how the strains answer to a load, at those without one."""

@@ -94,6 +94,20 @@ def over_disc(disc: Disc, slopes: Callable[[Any], tuple[Any, Any]], v: Any, k: t
     )
 
 
+def first_over_disc(disc: Disc, slope: Callable[[Any], Any], v: Any, k: tuple[Any, Any]) -> tuple[Any, tuple[Any, Any]]:
+    """Return the first derivatives alone, by v and k. slope(stretch) : of the energy of a fibre [Pa]."""
+    r, (x, y) = disc.radius, disc.centre
+    size = ca.sqrt(k[0] ** 2 + k[1] ** 2 + _LEAST / r**2)
+    middle, reach = v + k[0] * x + k[1] * y, r * size
+    A = B = 0.0
+    for place, weight in chords(disc.points):
+        first = slope(middle + place * reach)
+        A += weight * first
+        B += weight * place * first
+    a, out = disc.area, r / size * B
+    return a * A, (a * (x * A + k[0] * out), a * (y * A + k[1] * out))
+
+
 def at_point(centre: tuple[Any, Any], first: Any, second: Any) -> Sums:
     """Return what one fibre gives, of its energy's derivatives [N]."""
     x, y = centre

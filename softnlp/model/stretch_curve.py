@@ -125,6 +125,14 @@ def resting(derivative: Any, scale: Scale) -> Any:
     return ca.vertcat(derivative[0] - value, derivative[1:])
 
 
+def slope_of(derivative: Any, at: Place) -> Any:
+    """Return the first derivative by the stretch of the curve that `derived` is of, within its range."""
+    q = 0.0
+    for k in range(derivative.numel() - 1, -1, -1):
+        q = q * at.y + derivative[k]
+    return q * at.slope
+
+
 def slopes_of(derivative: Any, at: Place) -> tuple[Any, Any]:
     """Return the first and second derivatives by the stretch of the curve that `derived` is of."""
     last = derivative.numel() - 1
