@@ -18,10 +18,11 @@ from softnlp.base.status import Status
 from softnlp.model.contact_settings import ClosureWeights, ContactSettings
 from softnlp.model.quantities import Model
 from softnlp.nlp.solver import Solution
-from softnlp.statics import blocked, weighted
+from softnlp.statics import blocked, blocked_refine, grid_size, weighted
 from softnlp.statics import joint as joint_problems
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked, BlockedGrid
+from softnlp.statics.blocked_refine import stepwise
 from softnlp.statics.blocked_resume import Ended
 from softnlp.statics.blocked_step import solved_step
 from softnlp.statics.free_shape import FreeShapes
@@ -169,13 +170,35 @@ def test_a_fold_is_found_on_a_coarse_grid_and_a_shape_solved_on_its_own(monkeypa
     sizes.clear()
     reference = solve(solver, 1.5)[0]
     assert sizes[0] > 8
-    monkeypatch.setattr(blocked, "_SEARCHED_ON", 8)
+    monkeypatch.setattr(grid_size, "_SEARCHED_ON", 8)
     sizes.clear()
     step, found = solve(solver, 1.5)
     assert sizes == [8]
     assert found is not None
     assert step.intervals == reference.intervals
     assert force(step) == pytest.approx(force(reference), rel=1e-9)
+
+
+def test_a_fold_is_believed_on_a_grid_between_the_coarse_one_and_that_of_the_user(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    solver, followed, sizes = of(Numerics(intervals=320)), BlockedSolver._followed, list[int]()
+
+    def watched(self: BlockedSolver, grid: BlockedGrid, *rest: Any) -> Any:
+        sizes.append(grid.intervals)
+        return followed(self, grid, *rest)
+
+    monkeypatch.setattr(BlockedSolver, "_followed", watched)
+    monkeypatch.setattr(blocked, "_SURE", 1e-6)
+    folded = solve(solver, 6.0)[0]
+    assert (folded.status, sizes) == (Status.FOLD, [20, 80])
+    monkeypatch.setattr(blocked, "_SURE", 0.0)
+    assert solve(solver, 6.0)[0].status is Status.FOLD
+    assert sizes[2:] == [20, 80]  # both lose it at one place
+    monkeypatch.setattr(blocked, "_SAME_PLACE", -1.0)
+    again = solve(solver, 6.0)[0]
+    assert sizes[4:] == [20, 80, 320]
+    assert last_bar(again) == pytest.approx(last_bar(folded), rel=1e-3)
 
 
 def test_without_a_finer_solution_the_coarse_one_says_how_wrong_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -192,14 +215,43 @@ def test_without_a_finer_solution_the_coarse_one_says_how_wrong_it_is(monkeypatc
     assert force(better) != force(step)
 
 
-def test_a_finer_grid_that_leads_elsewhere_is_not_believed() -> None:
+def test_a_finer_grid_that_leads_elsewhere_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
     found, elsewhere = found_at(0.8), found_at(0.4)
     finer = shared().grid(16, shared().plane(found.situation))
     moved = replace(found, solution=replace(found.solution, x=elsewhere.solution.x))
-    assert shared()._refined(moved, finer) is None
+    again = shared()._refined(moved, finer)  # far, but Newton's first step goes nearly all of the way
     right = shared()._refined(found, finer)
+    assert again is not None
     assert right is not None
+    assert again.solution.x == pytest.approx(right.solution.x, abs=1e-9)
+    turned = replace(moved, determinants=(-moved.determinants[0], 1.0))
+    assert shared()._refined(turned, finer) is None
+    monkeypatch.setattr(blocked_refine, "_CONTRACTION", 0.0)
+    assert shared()._refined(moved, finer) is None
     assert right.refinement_error < found.refinement_error / 4
+
+
+def test_a_coarse_solution_far_from_its_limit_is_refined_by_grids_between(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = found_at(1.2)
+    plane, asked = shared().plane(found.situation), list[int]()
+    fine = shared().grid(80, plane)
+    straight = shared()._refined(found, fine)
+    assert straight is not None
+    small = 30 * straight.refinement_error
+    monkeypatch.setattr(blocked_refine, "_FINE", small)
+
+    def refine(at: Blocked, grid: BlockedGrid) -> Blocked | None:
+        asked.append(grid.intervals)
+        if grid.intervals > 1.3 * at.grid.intervals and at.refinement_error > small:
+            return None
+        return shared()._refined(at, grid)
+
+    by_steps = stepwise(found, fine, lambda size: shared().grid(size, plane), refine)
+    assert by_steps is not None
+    assert asked[0] == asked[-1] == 80
+    assert len(asked) > 4
+    assert by_steps.solution.x == pytest.approx(straight.solution.x, abs=1e-9)
+    assert stepwise(found, fine, lambda size: shared().grid(size, plane), lambda *_: None) is None
 
 
 def test_a_step_that_went_another_way_is_followed_instead(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,7 +17,7 @@ EVERY = {
     "inverse": ["run", "inverse/direction.toml"],
     "tensile": ["identify", "identify/tensile.toml"],
     "own law": ["identify", "identify/tensile_own_law.toml"],
-    "identify": ["identify", "identify/measured_forces_and_angles.toml"],
+    "identify": ["identify", "identify/measured_forces.toml"],
     "tips": ["identify", "identify/tracked_tips.toml"],
     "design": ["design", "design/D25L60_dimensions.toml"],
     "candidates": ["design", "design/laparoscope_paper.toml"],

@@ -113,7 +113,8 @@ def test_a_robot_beside_segments_and_a_single_table_are_refused(tmp_path: Path) 
     file = tmp_path / "scenario.toml"
     beside = '[robot]\nname = "D25L60"\n[material]\nname = "Ecoflex 00-50"\nmodel = "mooney-rivlin"\n'
     file.write_text(scenario([segment(), segment()], SIX, beside))
-    with pytest.raises(InputError, match=r"\[robot\]: expected either \[\[segment\]\] or .*, got both \(and 1 more: --all-errors\)"):
+    said = r"\[robot\]: expected either \[\[segment\]\] or .*, got both \(and 1 more: --all-errors\)"
+    with pytest.raises(InputError, match=said):
         load_scenario(file)
     file.write_text(scenario([segment().replace("[[segment]]", "[segment]")], SIX))
     with pytest.raises(InputError, match=r"expected one table \[\[segment\]\], in two brackets"):

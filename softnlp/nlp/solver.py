@@ -142,6 +142,14 @@ class Engine:
 
     @cached_property
     def _solver(self) -> ca.Function:
+        return self._ipopt_to(self.tolerance)
+
+    @cached_property
+    def _closing(self) -> ca.Function:
+        """IPOPT for what round-off left above the tolerance: it would factorise again and again for the last digit."""
+        return self._ipopt_to(self.tolerance * _SLACK)
+
+    def _ipopt_to(self, tolerance: float) -> ca.Function:
         nlp = self.problem.nlp
         options: dict[str, Any] = {
             "print_time": False,
@@ -151,8 +159,8 @@ class Engine:
             "ipopt": {
                 "print_level": 0,
                 "sb": "yes",
-                "tol": self.tolerance,
-                "constr_viol_tol": self.tolerance,
+                "tol": tolerance,
+                "constr_viol_tol": tolerance,
                 "acceptable_iter": 0,
                 "honor_original_bounds": "yes",  # IPOPT relaxes bounds by 1e-8 of a scaled unknown while it solves
                 "nlp_scaling_method": "none",
@@ -203,7 +211,8 @@ class Engine:
 
     def closed(self, solution: Solution) -> Solution:
         """Return IPOPT's solution of the whole program from that of Newton's method, judged anew."""
-        found = self._ipopt(solution.p, solution.x)
+        rounded = self.problem.is_square and self.tolerance < solution.residual <= self.tolerance * _SLACK
+        found = self._ipopt(solution.p, solution.x, solver=self._closing if rounded else self._solver)
         return replace(found, iterations=solution.iterations, kkt=found.kkt or solution.kkt)
 
     def _newton(self, linear: LinearSolver, p: Array, x_start: Array, most: int) -> Solution:
@@ -235,13 +244,16 @@ class Engine:
         """Send IPOPT's log, where it is asked for, to standard error: standard output is for results."""
         return redirect_stdout(sys.stderr) if self._options.get("print_level") else nullcontext()
 
-    def _ipopt(self, p: Array, x_start: Array, room: Array | float = np.inf) -> Solution:
+    def _ipopt(
+        self, p: Array, x_start: Array, room: Array | float = np.inf, solver: ca.Function | None = None
+    ) -> Solution:
         problem = self.problem
+        solver = self._solver if solver is None else solver
         around = np.full(x_start.size, np.inf)
         around[: problem.free_size] = room
         with self._lock, self._log():
             try:
-                result = self._solver(
+                result = solver(
                     x0=x_start,
                     p=p,
                     lbx=np.maximum(problem.lower_x, x_start - around),
@@ -252,7 +264,7 @@ class Engine:
             except RuntimeError as error:  # the engine gave up on a number that is not finite
                 word = str(error).splitlines()[-1]
                 return Solution(x_start, p, float("inf"), 0, word, ipopt=Ipopt(word, 0, float("nan")))
-            stats = self._solver.stats()
+            stats = solver.stats()
         x, *lam = (np.asarray(result[key], dtype=float).ravel() for key in ("x", "lam_x", "lam_g"))
         kkt = kkt_error(problem.slopes, problem.bounds, p, x_start, x, *lam) if problem.has_objective else 0.0
         status, iterations = str(stats["return_status"]), int(stats["iter_count"])

@@ -18,13 +18,22 @@ from softnlp.model.rod import Loads
 from softnlp.model.tip import TipContact
 from softnlp.nlp.continuation import follow
 from softnlp.nlp.solver import Solution
-from softnlp.statics.blocked_grid import Blocked, BlockedGrid, kept_grid, transferred, unjudged
-from softnlp.statics.blocked_resume import LARGEST_JUMP, MOST_STEPS, Ended, Reached, point_before, resumed
+from softnlp.statics.blocked_grid import Blocked, BlockedGrid, kept_grid, transferred
+from softnlp.statics.blocked_refine import examined, refined, stepwise
+from softnlp.statics.blocked_resume import (
+    LARGEST_JUMP,
+    MOST_STEPS,
+    Ended,
+    Reached,
+    point_before,
+    resumed,
+    sound_error,
+)
 from softnlp.statics.blocked_step import failed_step, solved_step, touching_step
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.compiled import RodEquations, rod_equations
 from softnlp.statics.free_shape import Free, FreeShapes, Route, free_shape, from_zero, route_from
-from softnlp.statics.grid_size import MOST_INTERVALS
+from softnlp.statics.grid_size import MOST_INTERVALS, search_grids
 from softnlp.statics.loadcase import RodFunctions
 from softnlp.statics.pose_grid import iteration_cost
 from softnlp.statics.solver import SEARCHED_BY, PoseSolver
@@ -36,9 +45,10 @@ Array = NDArray[np.float64]
 TOUCHING = 1e-9  # of the length: a free contact point nearer to the wall than this touches it
 _NEAR_FOLD = 0.2  # of the largest in-plane determinant on the way: below it a branch that ends has turned
 _FINEST_FIRST = 55  # intervals of a first grid, however far the free shape curls: the wall keeps the rod from that
-_SEARCHED_ON = 20  # intervals, at most, of the grid on which a branch is followed first
 _MOST_STEPS_MINIMUM = 24  # to a point of a path where that is a minimum, see `MOST_STEPS`
 _MOST_WORK, _LEAST = 20_000, 100  # to follow a branch, in intervals of Newton's iterations; iterations on any grid
+_LEAST_WORK = 40_000  # the same of these iterations: on the finest grids they are fewer
+_SAME_PLACE = 0.01  # of the way: two grids that lose the branch as near to each other lose it there
 _SOUND = 0.5  # of the largest determinant: nearer to a fold an error is that of the place of the fold
 _NEAR_END = 0.98  # of a path: a fold that a coarse grid finds beyond it may lie behind the end
 _SURE = 1e-3  # estimated error of a shape on that grid below which the end of the branch after it is believed
@@ -178,24 +188,28 @@ class BlockedSolver:
         spent, route = 0, self._route(situation, free, near)
         own, given, left = self.numerics.transcription, self.numerics.intervals is not None, _MOST_WORK
         like = first if own == SEARCHED_BY else 2 * first  # intervals of shooting that show as much
-        tried = [(first, own)] if given or near is not None else [(first, own), (2 * first, own)]
-        if own != SEARCHED_BY:
-            tried = [(_SEARCHED_ON, SEARCHED_BY), (max(like, 2 * _SEARCHED_ON), SEARCHED_BY), (first, own)]
-        elif first > _SEARCHED_ON:
-            tried.insert(0, (_SEARCHED_ON, own))
-        before: Reached | None = None
+        tried = search_grids(first, own, SEARCHED_BY, once=given or near is not None)
+        before, lost = None, 0.0
+
+        def searched(size: int) -> BlockedGrid:
+            return self.grid(size, plane, SEARCHED_BY)
+
         for size, name in tried:
             cost, shown = iteration_cost(size, name), name == own and size >= first
             grid = self.grid(size, plane, name)
-            most = max(left // cost, _LEAST)
+            most = max(left // cost, min(_LEAST, _LEAST_WORK // size))
             found = self._followed(grid, route, situation, pressed, free, plane, near, most, before)
             before = found.before if isinstance(found, Ended) else None
             more = found.solution.iterations if isinstance(found, Blocked) else found.iterations
             spent, left = spent + more, left - more * cost
             if isinstance(found, Ended) and found.folded and (shown or size >= like or found.error <= _SURE):
                 break
+            if isinstance(found, Ended):
+                if lost > 0 and not found.stopped and abs(found.fraction - lost) <= _SAME_PLACE:
+                    break  # a finer grid loses it where the last one did
+                lost = found.fraction
             if isinstance(found, Blocked):
-                finer = found if shown else self._refined(found, self.grid(first, plane))
+                finer = found if shown else stepwise(found, self.grid(first, plane), searched, self._refined)
                 if finer is not None:
                     return finer, spent + (0 if finer is found else finer.solution.iterations)
         return found, spent
@@ -212,12 +226,9 @@ class BlockedSolver:
     def _leads_to(self, near: Blocked, situation: Situation, pressed: Array, plane: Array | None) -> bool:
         """Whether the sequence only rises from a solution to a situation, so that its branch is the followed one."""
         here = near.situation
-        walls = here.wall is not None and situation.wall is not None
-        same_wall = not walls or (here.wall is not None and situation.wall is not None
-                                  and bool(np.all(here.wall.normal == situation.wall.normal)))  # fmt: skip
         rises = bool(np.all(situation.pressure >= here.pressure))
         same_plane = (self.plane(here) is None) == (plane is None)
-        return rises and same_wall and same_plane and bool(np.all(near.pressed == pressed))
+        return rises and here.turned_as(situation) and same_plane and bool(np.all(near.pressed == pressed))
 
     def values(self, situation: Situation, pressed: Array, free_lengths: Array) -> dict[str, Any]:
         """Return the quantities that a blocked pose sets."""
@@ -274,7 +285,7 @@ class BlockedSolver:
         slips = near.slips if near is not None else None
         if slips is None:
             slips = slipping_pressure(begin, end, [(u, aside) for u, (_, aside) in trace])
-        return self._examined(grid, final, end, pressed, (slips, trace[-1][1]), free)
+        return examined(grid, final, end, pressed, (slips, trace[-1][1]), free)
 
     def _route(self, end: Situation, free: Free, near: Blocked | None) -> Route:
         """Return the way to `end` from `near`, or from where contact begins on the way from zero pressure."""
@@ -314,7 +325,7 @@ class BlockedSolver:
             return grid.problem.pack(self.values(begin.towards(end, u), pressed, lengths))
 
         trace: list[tuple[float, tuple[float, float]]] = []
-        sound: list[Solution] = []
+        sound: list[tuple[float, Solution]] = []
         begun, first = resumed(grid, self.equations.shape, path, plane, before), 0.0
         if begun is not None and before is not None:
             first, trace = before.fraction, list(before.trace)
@@ -339,7 +350,7 @@ class BlockedSolver:
             trace.append((u, determinants))
             points.append(solution)
             if abs(determinants[0]) >= _SOUND * max(abs(size) for _, (size, _) in trace):
-                sound.append(solution)
+                sound.append((u, solution))
             return True
 
         if begun.holds(10 * grid.stepper.tolerance):
@@ -370,31 +381,11 @@ class BlockedSolver:
         sizes = [abs(size) for _, (size, _) in trace]
         stopped = followed.iterations >= most
         folded = not stopped and len(sizes) > 1 and (grid.is_minimum or sizes[-1] < _NEAR_FOLD * max(sizes))
-        error = max(grid.refinement(sound[-1])) if folded and sound and fraction < _NEAR_END else 1.0
-        before = point_before(grid, trace, points, fraction, (begin, end), pressed, free) or before
-        return Ended(reached, folded, spent, error, stopped, before)
+        error = sound_error(grid, self.equations.shape, path, sound, before) if folded and fraction < _NEAR_END else 1.0
+        before = point_before(grid, trace, points, sound, fraction, (begin, end), pressed, free) or before
+        return Ended(reached, folded, spent, error, stopped, before, fraction)
 
     def _refined(self, found: Blocked, grid: BlockedGrid) -> Blocked | None:
         """Return a solution solved again on a finer grid, or None where that leads elsewhere."""
         p = grid.problem.pack(self.values(found.situation, found.pressed, found.free.lengths))
-        guess = transferred(found, grid.case, self.equations.shape)
-        solution = grid.engine.solve(p, guess)
-        if not solution.holds(self.numerics.tolerance) or grid.distance(solution.x - guess) > 0.05:
-            return None
-        return self._examined(
-            grid, solution, found.situation, found.pressed, (found.slips, found.determinants), found.free
-        )
-
-    def _examined(
-        self,
-        grid: BlockedGrid,
-        solution: Solution,
-        situation: Situation,
-        pressed: Array,
-        aside: tuple[float | None, tuple[float, float]],
-        free: Free,
-    ) -> Blocked:
-        """Return a solution with its discretisation error."""
-        position, rotation, force = grid.refinement(solution)
-        found = unjudged(grid, solution, situation, pressed, aside, free)
-        return replace(found, error=position, refinement_error=max(position, rotation / 5, force / 5))
+        return refined(found, grid, p, self.equations.shape, self.numerics.tolerance, self.plane(found.situation))

@@ -27,19 +27,23 @@ _BACK = 0.9  # of where a grid lost the branch: the next one goes on from there
 
 @dataclass(frozen=True, eq=False)
 class Reached:
-    """A point of a branch: the fraction of the way, its solution, the determinants up to there and the last step."""
+    """A point of a branch: the fraction of the way, its solution, the determinants up to there and the last step.
+
+    sound : the same for the last point that was far from a fold, where the error of a shape is its own.
+    """
 
     fraction: float
     solution: Blocked
     trace: Trace
     step: float
+    sound: tuple[float, Blocked] | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Ended:
     """Where a branch was lost, whether it had turned, the iterations, the error there and whether work ran out.
 
-    before : a point well before that, from which a finer grid may go on.
+    before : a point well before that, from which a finer grid may go on. fraction : of the way, where it was lost.
     """
 
     situation: Situation
@@ -48,12 +52,14 @@ class Ended:
     error: float = 0.0
     stopped: bool = False
     before: Reached | None = None
+    fraction: float = 0.0
 
 
 def point_before(
     grid: BlockedGrid,
     trace: Trace,
     points: list[Solution | None],
+    sound: list[tuple[float, Solution]],
     lost: float,
     way: tuple[Situation, Situation],
     pressed: Array,
@@ -69,9 +75,35 @@ def point_before(
     k = known[-1]
     (u, determinants), solution = trace[k], points[k]
     assert solution is not None
-    there = way[0].towards(way[1], u)
-    point = unjudged(grid, solution, there, pressed, (None, determinants), free)
-    return Reached(u, point, trace[: k + 1], u - trace[k - 1][0])
+
+    def at(u: float, solution: Solution) -> Blocked:
+        return unjudged(grid, solution, way[0].towards(way[1], u), pressed, (None, determinants), free)
+
+    far = sound[-1] if sound else None
+    return Reached(u, at(u, solution), trace[: k + 1], u - trace[k - 1][0], far and (far[0], at(*far)))
+
+
+def sound_error(
+    grid: BlockedGrid,
+    shape: Mapped,
+    path: Callable[[float], Array],
+    sound: list[tuple[float, Solution]],
+    before: Reached | None,
+) -> float:
+    """Return the error of the last shape that was far from a fold; 1 where none is known.
+
+    It is one of this grid, or that of the grid before, solved again on this one.
+    """
+    if sound:
+        return max(grid.refinement(sound[-1][1]))
+    if before is None or before.sound is None:
+        return 1.0
+    u, there = before.sound
+    x = transferred(there, grid.case, shape)
+    again = grid.stepper.solve(path(u), x, MOST_STEPS)
+    if not again.holds(10 * grid.stepper.tolerance) or not grid.distance(again.x - x) <= LARGEST_JUMP:
+        return 1.0
+    return max(grid.refinement(again))
 
 
 def resumed(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.model.numerics import Numerics
+from softnlp.model.numerics import Numerics, Transcribing
 from softnlp.nlp.transcription import method_named
 from softnlp.statics.loadcase import unpack_section
 from softnlp.statics.pose_grid import next_size
@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 MOST_INTERVALS = 1810
 FIRST_INTERVALS = {"multiple-shooting": 10, "collocation": 5}
 _MOST_COLLOCATION = 320  # as many points; order 8 needs no more
+_SEARCHED_ON = 20  # intervals, at most, of the grid on which a branch is followed first
+_BETWEEN = 4  # times as many, before a grid that has half as many again or more
 _TURN = 0.25  # largest angle [rad] of the unloaded arc within one RK4 interval of a first grid
 
 
@@ -53,3 +55,19 @@ def next_intervals(numerics: Numerics, error: float, intervals: int, target: flo
     order = method_named(numerics.transcription, 1).order
     factor = 1.1 * (error / target) ** (1 / order)
     return next_size(max(factor, 1.3) * intervals)
+
+
+def search_grids(first: int, own: Transcribing, by: Transcribing, *, once: bool) -> list[tuple[int, Transcribing]]:
+    """Return the grids on which a branch is followed one after another, until one is believed: intervals and kind.
+
+    first : intervals of the first grid of the kind `own`. by : the kind whose steps are cheap. once : whether a grid
+    twice as fine as `first` is not tried.
+    """
+    like = first if own == by else max(2 * first, 2 * _SEARCHED_ON)  # intervals that show as much
+    coarse = [_SEARCHED_ON] if like > _SEARCHED_ON else []
+    if 2 * like >= 3 * _BETWEEN * _SEARCHED_ON:
+        coarse.append(_BETWEEN * _SEARCHED_ON)
+    tried = [(size, by) for size in (*coarse, like)]
+    if own != by:
+        return [*tried, (first, own)]
+    return tried if once else [*tried, (2 * first, own)]

@@ -113,6 +113,11 @@ class Situation:
     loads: Loads
     wall: Wall | None
 
+    def turned_as(self, other: Situation) -> bool:
+        """Whether both walls have one normal, or one of them is not there."""
+        a, b = self.wall, other.wall
+        return a is None or b is None or bool(np.all(a.normal == b.normal))
+
     def towards(self, other: Situation, t: float) -> Situation:
         """Return the situation a fraction t of the way to another one; the wall keeps the other's normal."""
         if t >= 1.0:
