@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-BODY_SIZE, LINER_SIZE = 17, 21
+BODY_SIZE, LINER_SIZE = 17, 25
 """Numbers of curves of a body's fibre and of a liner: the order of the polynomial and one."""
 
 
