@@ -18,7 +18,7 @@ from softnlp.base.quantity import Quantity, quantity
 from softnlp.model.conventions import Coefficients, Conventions
 from softnlp.model.energies import energy_of, fibre_energy, shear_modulus
 from softnlp.model.materials import Material
-from softnlp.model.potential import NOTHING, PASSES, Answer, Potential, Pull, Strains, rounded
+from softnlp.model.potential import MOST_PASSES, NOTHING, PASSES, Answer, Potential, Pull, Strains, rounded
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.round_chambers import FACTOR, SIZES, chamber_warnings, of_model, radii
 from softnlp.model.section import RodSection, Section, SectionRadii, SectionState
@@ -204,21 +204,26 @@ class EnergySection(Section):
 
     def strains(self, section: RodSection, own: Sequence[Any], force: Any, moment: Any) -> tuple[Any, Any]:
         """Return the strains whose gradients of U are the force and the moment, per length without loads."""
-        potential, pull, at, inverse, change = self._near(own, force, moment)
+        potential, pull, at, inverse, change = self._near(own, force, moment, PASSES)
         found = potential.followed(at, inverse, change, potential.gradient(at, pull))
         return _as_strains(potential, found, force, moment)
 
     def quick_strains(self, section: RodSection, own: Sequence[Any], force: Any, moment: Any) -> tuple[Any, Any]:
         """Return the same with a derivative by the force and the moment alone."""
-        potential, pull, at, inverse, change = self._near(own, force, moment)
-        found = potential.followed(at, inverse, change, (-pull.n, -pull.h_1, -pull.h_2))
+        potential, pull, at, inverse, change = self._near(own, force, moment, MOST_PASSES)
+        units = (potential.GA, potential.GA * potential.outer, potential.GA * potential.outer)
+        moves = zip((pull.n, pull.h_1, pull.h_2), units, strict=True)
+        off = tuple(unit * rounded(f / unit) - f for f, unit in moves)
+        found = potential.followed(at, inverse, change, off)
         return _as_strains(potential, found, force, moment)
 
-    def _near(self, own: Sequence[Any], force: Any, moment: Any) -> tuple[Potential, Pull, Strains, Any, Any]:
+    def _near(
+        self, own: Sequence[Any], force: Any, moment: Any, passes: int
+    ) -> tuple[Potential, Pull, Strains, Any, Any]:
         """Return the potential, the pull, and strains under it as numbers, with H^-1 (6,) and their last change."""
         potential = _known(own, self.robot.chambers)
         pull = Pull(force[2], -moment[1], moment[0], force[0] ** 2 + force[1] ** 2, moment[2] ** 2)
-        called = _near(self.robot.chambers)(ca.vertcat(*own, *pull))
+        called = _near(self.robot.chambers, passes)(ca.vertcat(*own, *pull))
         found = [rounded(called[k]) for k in range(_FOUND)]
         r, GA = potential.outer, potential.GA
         inverse = tuple(found[k] / (GA * unit) for k, unit in enumerate((1, r, r, r**2, r**2, r**2)))
@@ -320,7 +325,7 @@ def _refine(chambers: int) -> ca.Function:
 
 
 @lru_cache(maxsize=8)
-def _near(chambers: int) -> ca.Function:
+def _near(chambers: int, passes: int) -> ca.Function:
     """Return [own numbers, pull] -> found, see `_refine`; called where it is used, as it is long."""
     own = ca.SX.sym("own", sum(_sizes(chambers)))
     pull = ca.SX.sym("pull", len(Pull._fields))
@@ -328,9 +333,9 @@ def _near(chambers: int) -> ca.Function:
     at = potential.started(Pull(*(pull[k] for k in range(pull.numel()))))
     r = potential.outer
     found = ca.vertcat(ca.SX.zeros(6), at.v, at.b_1 * r, at.b_2 * r, 1.0)
-    for _ in range(PASSES):
+    for _ in range(passes):
         found = _refine(chambers)(ca.vertcat(own, pull, found))
-    return ca.Function("near", [ca.vertcat(own, pull)], [found], _CALLED)
+    return ca.Function(f"near_{passes}", [ca.vertcat(own, pull)], [found], _CALLED)
 
 
 def _area(robot: Robot) -> Any:

@@ -25,11 +25,11 @@ from softnlp.model.stretch_curve import BODY, BODY_SIZE, LINER_SIZE, Place, eval
 OUTER, LUMEN, CHAMBER = 6, 4, 3
 """Points of the rules over the outer disc, the lumen and a chamber."""
 _LONGEST = 0.35  # change of a fibre's stretch that one pass may make
-PASSES = 3
-"""Of Newton's method before the last one; those that are not needed may be left out."""
+PASSES, MOST_PASSES = 4, 6
+"""Of Newton's method before the last step; machine code leaves out those that are not needed, and may take more."""
 _BENT_PASSES = 5  # the same where nothing is known yet
 _GRAIN = 2.0**-44  # to which a start is rounded
-_SETTLED = 1e-5  # change of a stretch in the last pass from which the strains are not believed
+_SETTLED = 1e-4  # change of a stretch in the last pass from which the strains are not believed
 
 
 class Strains(NamedTuple):
@@ -186,14 +186,12 @@ class Potential:
         return Strains(*(value - part * d for value, d in zip(at, change, strict=True))), inverse, reach
 
     def followed(self, near: Strains, inverse: tuple[Any, ...], change: Any, off: tuple[Any, ...]) -> Strains:
-        """Return strains that are found already, with a derivative; nan where they are not.
+        """Return strains a step further with the last inverse, whose derivative is that of the step; nan if not near.
 
-        inverse, change : of the last `refined`. off : what vanishes at the strains (3,), whose derivative they follow.
+        inverse, change : of the last `refined`. off : what vanishes at the strains (3,).
         """
         lost = ca.if_else(change < _SETTLED, 0.0, nan)
-        units = (self.GA, self.GA * self.outer, self.GA * self.outer)
-        moved = tuple(g - unit * rounded(g / unit) for g, unit in zip(off, units, strict=True))
-        found = _times(inverse, moved)
+        found = _times(inverse, off)
         return Strains(*(value - d + lost for value, d in zip(near, found, strict=True)))
 
     def gradient(self, at: Strains, pull: Pull) -> tuple[Any, ...]:

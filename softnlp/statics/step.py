@@ -223,7 +223,7 @@ class Contact:
 
     @property
     def told_reaction(self) -> Array | None:
-        """The reactions; None where the section has no closure, so that there are none."""
+        """The reactions (N,); None where the section has no closure, so that there are none [N]."""
         return None if self.closure == NO_CLOSURE else self.chamber_reaction
 
     @property
