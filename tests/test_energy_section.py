@@ -179,3 +179,10 @@ def test_a_stretch_beyond_the_law_ends_the_branch():
     found = stretch_on_branch(branch_function(model), column, P)
     assert found.status.value == "no_equilibrium"
     assert "goes beyond a stretch of 2.1" in found.message
+
+
+def test_fibres_beyond_their_law_are_told_of():
+    section = Model(robot("D25L60"), material("Ecoflex 00-50"), Coefficients(), UNIAXIAL).section
+    v, u = np.array([[0.0, 0.0, 1.0]]), np.array([[40.0, 0.0, 0.0]])
+    assert section.warnings_along(1.2, v, u) == []
+    assert "from 0.51 to 1.89" in section.warnings_along(1.2, v, 1.26 * u)[0]

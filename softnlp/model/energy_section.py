@@ -240,6 +240,18 @@ class EnergySection(Section):
         """Return `softnlp.model.round_chambers.radii` of these numbers."""
         return radii(self._robot(numbers), stretch)
 
+    def warnings_along(self, stretch: float, v: Any, u: Any) -> list[str]:
+        """Say where fibres of the body are beyond the stretches at which their law is taken."""
+        middle = np.asarray(v)[:, 2] * stretch
+        bend = np.hypot(np.asarray(u)[:, 0], np.asarray(u)[:, 1]) * stretch * self.robot.outer_radius * middle**-0.5
+        low, high = float((middle - bend).min()), float((middle + bend).max())
+        if BODY.low <= low and high <= BODY.high:
+            return []
+        return [
+            f"fibres of the body are at stretches from {low:.3g} to {high:.3g}; outside {BODY.low:g} to {BODY.high:g} "
+            "the law is taken to second order"
+        ]
+
     def warnings(self, stretch: float) -> list[str]:
         """Say where the silicone was not fitted, and where neighbouring chambers touch."""
         return chamber_warnings(self.robot, self.material, stretch)

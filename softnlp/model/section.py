@@ -315,6 +315,23 @@ class Section(Protocol):
         """
         ...
 
+    def warnings_along(self, stretch: float, v: Any, u: Any) -> list[str]:
+        """Return what to know of the section where loads strain it.
+
+        Parameters
+        ----------
+        stretch
+            lambda without loads [1].
+        v, u
+            (M, 3) strains at points of the rod, as of `strains` [1], [1/m].
+
+        Returns
+        -------
+        list
+            One line each.
+        """
+        return []
+
     def warnings(self, stretch: float) -> list[str]:
         """Return what to know of the section at a stretch.
 

@@ -165,7 +165,9 @@ def pose_of(
 
 def pose_warnings(model: Model, pose: Pose) -> tuple[str, ...]:
     """Return what a designer should know of a solved pose: fitted range, touching chambers, stability, its body."""
-    return (*model.section.warnings(pose.stretch), *shape_warnings(pose))
+    own, shape = model.section, pose.shape
+    along = own.warnings_along(pose.stretch, shape.shear_extension, shape.curvature)
+    return (*own.warnings(pose.stretch), *along, *shape_warnings(pose))
 
 
 def shape_warnings(pose: Pose) -> tuple[str, ...]:
