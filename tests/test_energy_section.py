@@ -15,10 +15,13 @@ from softnlp.model.energies import fibre_energy, shear_modulus
 from softnlp.model.materials import Material
 from softnlp.model.model import Model
 from softnlp.model.potential import NOTHING, Potential, Strains
+from softnlp.model.quantities import quantities
+from softnlp.model.round_chambers import FACTOR
 from softnlp.model.stretch_curve import BODY, STRETCHES, coefficients, derived, evaluated, slopes_of
 from softnlp.rings import robot_response
 from softnlp.rings.section_values import ENERGY, ring_values
 from softnlp.statics.branch import branch_function, stretch_on_branch
+from softnlp.statics.loadcase import rod_functions
 from softnlp.statics.unloaded_branch import followed
 
 LAWS = ("linear", "neo-hookean", "mooney-rivlin", "yeoh", "ogden")
@@ -186,3 +189,33 @@ def test_fibres_beyond_their_law_are_told_of():
     v, u = np.array([[0.0, 0.0, 1.0]]), np.array([[40.0, 0.0, 0.0]])
     assert section.warnings_along(1.2, v, u) == []
     assert "from 0.51 to 1.89" in section.warnings_along(1.2, v, 1.26 * u)[0]
+
+
+def test_what_follows_from_a_number_has_its_derivative():
+    """The unloaded bend, by way of the stretch that is found and of the strains that are iterated, by differences."""
+    model = Model(robot("D25L60"), material("Ecoflex 00-50"), Coefficients(modulus_factor=1.3), UNIAXIAL)
+    functions, branch, declared = rod_functions(model), branch_function(model), quantities(model)
+    places = dict(zip(declared, np.cumsum([0, *(q.size for q in declared.values())]), strict=False))
+    column = np.concatenate([q.nominal for q in declared.values()])
+    column[:3] = BAR, 0.0, 0.0
+    at_rest = ca.DM(np.concatenate([np.zeros(3), np.eye(3).ravel(), np.zeros(6)]))
+
+    def bend(given: object, stretch: object) -> tuple[object, object]:
+        constants, balance, _ = functions.section(given, stretch)
+        return balance, functions.strains(at_rest, constants)[1] * stretch
+
+    def found(given: np.ndarray) -> np.ndarray:
+        return np.asarray(bend(given, stretch_on_branch(branch, given, given[:3]).stretch)[1]).ravel()
+
+    p, s = ca.MX.sym("p", column.size), ca.MX.sym("s")
+    balance, u = bend(p, s)
+    slopes = [ca.jacobian(one, by) for one in (balance, u) for by in (p, s)]
+    b_p, b_s, u_p, u_s = ca.Function("slopes", [p, s], slopes)(
+        column, stretch_on_branch(branch, column, column[:3]).stretch
+    )
+    whole = np.asarray(u_p - u_s @ b_p / b_s)
+    steps = {FACTOR: 1e-4, "pressure": 10.0, "material.C01": 1.0, "robot.chamber_diameter": 1e-7}
+    for name, step in steps.items():
+        moved = np.eye(column.size)[places[name]] * step
+        slope = (found(column + moved) - found(column - moved)) / (2 * step)
+        assert np.allclose(whole[:, places[name]], slope, rtol=1e-6, atol=1e-9 * np.abs(slope).max())
