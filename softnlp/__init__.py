@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from softnlp.results import save as save
     from softnlp.results import to_dataset as to_dataset
     from softnlp.results import to_json as to_json
+    from softnlp.rings.section_values import ENERGY as ENERGY
     from softnlp.scenario.design import run_design as run_design
     from softnlp.scenario.read import load_scenario as load_scenario
     from softnlp.scenario.run import run_scenario as run_scenario
@@ -125,6 +126,7 @@ _HOMES = {
     "nlp.constraint": ("Constraint",),
     "nlp.transcription": ("Collocation", "MultipleShooting"),
     "results": ("save", "to_dataset", "to_json"),
+    "rings.section_values": ("ENERGY",),
     "scenario.read": ("load_scenario",),
     "scenario.run": ("run_scenario",),
     "scenario.design": ("run_design",),

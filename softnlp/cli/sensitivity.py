@@ -62,7 +62,7 @@ def sensitivity(
     folder = results_folder(out, json, scenario.stem)
     pressure = asked.pressures[chosen - 1]
     model = (asked.robot, asked.material, asked.coefficients)
-    tolerances = named_tolerances(tolerance, *model, pressure)
+    tolerances = named_tolerances(tolerance, *model, pressure, asked.conventions)
     with progress(max(samples, 1) if tolerances else 1, asked.title) as (advance, _):
         report = sensitivity_report(
             asked.robot,

@@ -43,7 +43,9 @@ def design_document(done: Design) -> dict[str, Any]:
         found[f"{FORCE}_free_closure_{OUTPUTS[FORCE].unit}"] = done.free_closure_force
     return {
         **document_head(done.title, "design", setting.conventions.name),
-        **asked_tables(Model(setting.robot, setting.material, setting.coefficients), setting.loads),
+        **asked_tables(
+            Model(setting.robot, setting.material, setting.coefficients, setting.conventions), setting.loads
+        ),
         **({"contact": contact_table(setting.contact)} if task.needs_force else {}),
         "objective": {"maximise" if task.maximise else "minimise": task.objective.key},
         "requirements": limits,

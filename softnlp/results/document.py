@@ -37,7 +37,7 @@ def run_document(run: Run) -> dict[str, Any]:
     """Return a run as `softnlp.to_json` does."""
     return {
         **document_head(run.title, run.study, run.conventions.name),
-        **asked_tables(Model(run.robot, run.material, run.coefficients), run.loads),
+        **asked_tables(Model(run.robot, run.material, run.coefficients, run.conventions), run.loads),
         **({} if run.contact is None else {"contact": contact_table(run.contact)}),
         **({"uncertainty": dict(run.uncertainty)} if run.uncertainty else {}),
         **({"obstacles": obstacle_tables(run.obstacles)} if run.obstacles else {}),

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.status import Status
-from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.contact_settings import NO_CLOSURE, ContactSettings
 from softnlp.model.conventions import Coefficients, Conventions
 from softnlp.model.materials import Material
 from softnlp.model.obstacles import Obstacle
@@ -222,6 +222,11 @@ class Contact:
     def wall(self) -> Contact | None:
         """Itself; None where the chambers alone are constrained, whose contact has no normal."""
         return self if self.normal.any() else None
+
+    @property
+    def told_reaction(self) -> Array | None:
+        """The reactions (N,); None where the section has no closure, so that there are none [N]."""
+        return None if self.closure == NO_CLOSURE else self.chamber_reaction
 
     @property
     def elasticities(self) -> dict[str, float]:
