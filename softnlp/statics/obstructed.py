@@ -158,6 +158,11 @@ class ObstructedCase:
         return ca.vertcat(first, inner, last, contact)
 
     @property
+    def once_differentiable(self) -> bool:
+        """Whether strains are found by iterations, whose derivative is the last one's."""
+        return self.functions.model.section.coupled
+
+    @property
     def whole_length(self) -> ca.MX:
         """L_0 [m]."""
         return self.length_unit
