@@ -43,6 +43,12 @@ if TYPE_CHECKING:
     from softnlp.model.materials import load_materials as load_materials
     from softnlp.model.materials import material as material
     from softnlp.model.numerics import Numerics as Numerics
+    from softnlp.model.obstacles import Capsule as Capsule
+    from softnlp.model.obstacles import Cylinder as Cylinder
+    from softnlp.model.obstacles import Plane as Plane
+    from softnlp.model.obstacles import Sphere as Sphere
+    from softnlp.model.obstacles import Trocar as Trocar
+    from softnlp.model.obstacles import Tube as Tube
     from softnlp.model.robot import ROBOTS as ROBOTS
     from softnlp.model.robot import Robot as Robot
     from softnlp.model.robot import robot as robot
@@ -114,6 +120,7 @@ _HOMES = {
     "model.numerics": ("Numerics",),
     "model.robot": ("ROBOTS", "Robot", "robot"),
     "model.segments": ("segmented_robot",),
+    "model.obstacles": ("Capsule", "Cylinder", "Plane", "Sphere", "Trocar", "Tube"),
     "model.rod": ("Loads",),
     "model.section": ("Section", "SectionRadii", "SectionState"),
     "nlp.constraint": ("Constraint",),

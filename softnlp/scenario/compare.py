@@ -23,7 +23,7 @@ from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.model.segments import require_one_segment
 from softnlp.rings import ALL_CONVENTIONS
-from softnlp.scenario.data import Scenario
+from softnlp.scenario.data import Scenario, require_no_obstacles
 from softnlp.scenario.laboratory import import_notes, laboratory_columns
 from softnlp.scenario.measured_rows import (
     ALIASES,
@@ -197,6 +197,7 @@ def _require_study(scenario: Scenario) -> None:
     source = str(scenario.path)
     with located(source=source):
         require_one_segment(scenario.robot, "a comparison with measurements")
+        require_no_obstacles(scenario, "a comparison with measurements")
     if scenario.study not in STUDIES:
         raise InputError(f"expected {choices(STUDIES)}, got {scenario.study!r}", source=source, key="study")
     task = scenario.task

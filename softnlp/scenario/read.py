@@ -20,6 +20,7 @@ from softnlp.model.body import Segment
 from softnlp.model.conventions import COEFFICIENT_SETS, Coefficients
 from softnlp.model.materials import Material, material_from_table
 from softnlp.model.numerics import Numerics
+from softnlp.model.obstacles import Obstacle
 from softnlp.model.quantities import Model
 from softnlp.model.robot import DIMENSIONS, MOST_CHAMBERS, Robot, Violation, violations
 from softnlp.model.rod import Loads
@@ -33,6 +34,7 @@ from softnlp.scenario.design import design_task
 from softnlp.scenario.energy import misplaced
 from softnlp.scenario.identify import identify_task
 from softnlp.scenario.inverse import inverse_task
+from softnlp.scenario.obstacles import obstacles_of
 from softnlp.scenario.pressures import PressurePath, pressure_path
 from softnlp.scenario.schema import ScenarioFile
 from softnlp.scenario.segments import OF_SEGMENTS, read_segments
@@ -115,6 +117,9 @@ def _scenario(text: str, path: Path) -> Scenario:
     file, errors, bad = parse_parts(data)  # what does not fit is in no table of the file
     errors += misplaced(data)
     made, chosen, unlikely = _robot(file, data, path.parent, errors, bad)
+    alone: list[Any] = getattr(file, "segment", None) or []
+    if len(alone) == 1:  # a robot like any other, of which studies read what they read elsewhere
+        file = file.model_copy(update={"robot": alone[0].robot, "material": alone[0].material})
     steps = contact = task = numerics = None
     if "pressure" not in bad and (made is not None or not bad & {"robot", "segment"}):
         with suppress(InputError, AttributeError):  # of a robot that is not described, which was said
@@ -146,6 +151,9 @@ def _scenario(text: str, path: Path) -> Scenario:
         scatter = _attempt(
             errors, "uncertainty", lambda: uncertainty_of(said, model, silicone, path.parent, pressed, task)
         )
+    obstacles: tuple[Obstacle, ...] = ()
+    if "obstacle" not in bad and (asked_for := getattr(file, "obstacle", [])):
+        obstacles = _attempt(errors, "obstacle", lambda: obstacles_of(file, asked_for)) or ()
     if errors or made is None or chosen is None or steps is None or numerics is None:
         raise first_of(errors, HOW)
     robot, warnings = made
@@ -167,6 +175,7 @@ def _scenario(text: str, path: Path) -> Scenario:
         warnings=(*warnings, *unlikely, *file_unit_note(data), *steps.notes),
         registration=getattr(file, "registration", None) if "registration" in data else None,
         uncertainty=scatter,
+        obstacles=obstacles,
     )
 
 

@@ -376,7 +376,7 @@ class UncertaintyTable(Table):
 
 
 class ForwardFile(ScenarioFile):
-    """A whole scenario of `forward`."""
+    """What scenarios of `forward` and `blocked-force` may hold."""
 
     uncertainty: UncertaintyTable | None = None
     registration: RegistrationTable = RegistrationTable()

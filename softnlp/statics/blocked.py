@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from softnlp.model.tip import TipContact
 from softnlp.nlp.continuation import follow
 from softnlp.nlp.solver import Solution
 from softnlp.statics.blocked_grid import Blocked, BlockedGrid, kept_grid, transferred
-from softnlp.statics.blocked_refine import examined, refined, stepwise
+from softnlp.statics.blocked_refine import examined, refined, stepwise, to_accuracy
 from softnlp.statics.blocked_resume import (
     LARGEST_JUMP,
     MOST_STEPS,
@@ -29,11 +30,11 @@ from softnlp.statics.blocked_resume import (
     resumed,
     sound_error,
 )
-from softnlp.statics.blocked_step import failed_step, solved_step, touching_step
+from softnlp.statics.blocked_step import failed_step, inaccurate_step, solved_step, touching_step
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.compiled import RodEquations, rod_equations
 from softnlp.statics.free_shape import Free, FreeShapes, Route, free_shape, from_zero, route_from
-from softnlp.statics.grid_size import MOST_INTERVALS, search_grids
+from softnlp.statics.grid_size import search_grids
 from softnlp.statics.loadcase import RodFunctions
 from softnlp.statics.pose_grid import iteration_cost
 from softnlp.statics.solver import SEARCHED_BY, PoseSolver
@@ -133,6 +134,8 @@ class BlockedSolver:
             return failed_step(
                 situation.pressure, found.situation.pressure, found.folded, found.stopped, spent, began
             ), None
+        if self._is_rough(found):
+            return inaccurate_step(situation.pressure, found, spent, began), None
         try:
             found = self._closed(found)
         except DisputedError as error:
@@ -164,19 +167,25 @@ class BlockedSolver:
             if not isinstance(found, Blocked):
                 found, more = self._searched(situation, pressed, free, plane, intervals, start)
                 spent += more
-        target = self.poses.numerics.accuracy / 3
-        while isinstance(found, Blocked):
-            intervals = found.grid.intervals
-            wanted = self.poses.next_intervals(found.refinement_error, intervals, target)
-            if wanted is None or intervals >= MOST_INTERVALS:
-                break
-            finer = self._refined(found, self.grid(min(wanted, MOST_INTERVALS), plane))
-            if finer is None:
-                break
-            spent += finer.solution.iterations
-            found = finer
         assert found is not None
+        found, more = self._to_accuracy(found, plane)
+        spent += more
+        if usable and self._is_rough(found):  # the neighbour's grid was too coarse for this shape: its word is no good
+            found, more = self._searched(situation, pressed, free, plane, first, None)
+            found, further = self._to_accuracy(found, plane)
+            spent += more + further
         return found, spent
+
+    def _is_rough(self, found: Blocked | Ended) -> bool:
+        """Whether a solution misses the accuracy on grids that nobody chose."""
+        return isinstance(found, Blocked) and self.numerics.intervals is None and found.error > self.numerics.accuracy
+
+    def _to_accuracy(self, found: Blocked | Ended, plane: Array | None) -> tuple[Blocked | Ended, int]:
+        """Return a solution on a grid that meets the accuracy, or the finest that has it, and the iterations."""
+        if isinstance(found, Ended):
+            return found, 0
+        wanted = partial(self.poses.next_intervals, target=self.poses.numerics.accuracy / 3)
+        return to_accuracy(found, wanted, lambda there, size: self._refined(there, self.grid(size, plane)))
 
     def _searched(
         self, situation: Situation, pressed: Array, free: Free, plane: Array | None, first: int, near: Blocked | None

@@ -12,6 +12,7 @@ from softnlp.nlp.solver import Solution
 from softnlp.statics.blocked_grid import Blocked, BlockedGrid, transferred, unjudged
 from softnlp.statics.blocked_resume import LARGEST_JUMP
 from softnlp.statics.free_shape import Free
+from softnlp.statics.grid_size import MOST_INTERVALS
 from softnlp.statics.pose import Mapped
 from softnlp.statics.wall import Situation
 
@@ -81,3 +82,23 @@ def stepwise(
         else:
             ratio = ratio**0.5
     return at
+
+
+def to_accuracy(
+    found: Blocked,
+    wanted: Callable[[float, int], int | None],
+    refine: Callable[[Blocked, int], Blocked | None],
+) -> tuple[Blocked, int]:
+    """Return a solution on a grid that meets the accuracy, or on the finest that has it, and the iterations.
+
+    wanted : the intervals for an error on so many, None where they do. refine : a solution on so many intervals.
+    """
+    spent = 0
+    while found.grid.intervals < MOST_INTERVALS:
+        intervals = wanted(found.refinement_error, found.grid.intervals)
+        finer = None if intervals is None else refine(found, min(intervals, MOST_INTERVALS))
+        if finer is None:
+            break
+        spent += finer.solution.iterations
+        found = finer
+    return found, spent
