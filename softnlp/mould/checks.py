@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 VOLUME, DISTANCE, OVERLAP = 1e-3, 0.05, 0.01
 """Largest relative error of the void's volume, its distance from the body [mm], and overlap of two parts [mm^3]."""
-_FACING = -0.9  # of two normals: faces of one wall look away from each other within 26 degrees
+_FACING = -0.97  # of two normals: faces of one wall look away from each other within 14 degrees
 _RAYS, _ROUND_OFF = 1500, 2e-3
 _SAME_FACETS = 12  # parts of a turn after which the facets of core and thread are where they were
 _OFFSETS = (0.002, 0.02, 0.11, 0.37, 0.83)  # of the length, by which parts are drawn

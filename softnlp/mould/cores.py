@@ -22,6 +22,7 @@ from softnlp.mould.solids import FINE, MIDDLE, box, helix, loft, swept
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
+_RAMP = 0.5  # from the ground of a pin's groove to its full thickness: a step would leave a thin edge [mm]
 _APART = 1.6  # of the body's length, by which cores are drawn out of it in pictures
 
 
@@ -105,9 +106,14 @@ def _loft(sizes: Sizes, hole: Hole, less: float, top: float) -> Manifold:
     """Return a core without groove. less : by how much it is thinner between the plates. top : where it ends."""
     shape = sizes.shape
     low, high = sizes.spigot(hole, 0), sizes.spigot(hole, -1)
-    z = [-sizes.foot, 0.0, *shape.z, shape.length, top]
-    r = [low, low, *(hole.core + sizes.inset - less), high, high]
-    x = [hole.circle[0]] * 2 + [*hole.circle] + [hole.circle[-1]] * 2
+    z, r, x = [*shape.z], [*(hole.core + sizes.inset - less)], [*hole.circle]
+    if sizes.method == "pin" and sizes.depth > 0:  # nothing below the groove may be thicker than its ground
+        start = sizes.thread_ends[0] + sizes.settings.thread_diameter_mm / 2 + SMOOTH
+        ground = r[0] - sizes.depth - SMOOTH
+        z, r, x = [0.0, start, start + _RAMP, *z[1:]], [ground, ground, r[0], *r[1:]], [x[0]] * 3 + x[1:]
+    z = [-sizes.foot, 0.0, *z, shape.length, top]
+    r = [low, low, *r, high, high]
+    x = [hole.circle[0]] * 2 + x + [hole.circle[-1]] * 2
     return loft(z, r, x, MIDDLE)
 
 

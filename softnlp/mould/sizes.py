@@ -177,7 +177,7 @@ class Sizes:
             min(self.spigot(hole, 0), self.spigot(hole, -1), float(hole.core.min()) + self.inset - self.depth)
             for hole in self.shape.holes
         )
-        return max(least, off, min(0.5 * thin, 1.5)), 2 * (thin - least)
+        return max(least, off, min(0.5 * thin, 1.5)), 2 * (0.97 * thin - least)
 
     @property
     def tube_hole(self) -> float:

@@ -249,7 +249,7 @@ def best_scenario(done: Design, asked: Mapping[str, Any]) -> str | None:
         "study": "blocked-force" if force else "forward",
         "robot": robot,
         "material": material,
-        **{key: asked[key] for key in ("stiffening", "corrections", "gravity", "tip_load", "solver") if key in asked},
+        **{key: asked[key] for key in ("stiffening", "corrections", "gravity", "tip_load", "solver", "mould") if key in asked},
         **({"contact": asked["contact"]} if force and "contact" in asked else {}),
         "pressure": {"ramp": {"sets": [k + 1 for k in done.task.sets], "to_bar": highest, "steps": 11}},
     }

@@ -19,6 +19,7 @@ from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
+from softnlp.scenario.mould import MouldTable
 from softnlp.scenario.pressures import PressurePath
 from softnlp.scenario.schema import RegistrationTable
 from softnlp.statics.step import Run, Step
@@ -66,6 +67,8 @@ class Scenario:
         Of measured tips that the scenario is compared with, where it says so.
     uncertainty
         What scatters, where it says so.
+    mould
+        What a maker chooses of the moulds, for `softnlp mould`.
     """
 
     path: Path
@@ -85,6 +88,7 @@ class Scenario:
     warnings: tuple[str, ...]
     registration: RegistrationTable | None = None
     uncertainty: Uncertainty | None = None
+    mould: MouldTable = MouldTable()
 
     @property
     def model(self) -> Model:
