@@ -48,7 +48,7 @@ def mould(scenario: Path, /, *, out: Path | None = None, design: bool = False, a
     try:
         _write(asked, name, folder)
     except InputError as error:
-        raise error if error.source else placed(error, str(scenario)) from None
+        raise error if error.source else placed(error, str(asked.path)) from None
     return SOLVED
 
 

@@ -13,7 +13,7 @@ from softnlp.figures.mesh import require
 from softnlp.model.robot import Robot
 from softnlp.model.segments import SegmentedRobot
 from softnlp.mould.cap import connector, cup
-from softnlp.mould.cores import Core, core_of, lumen_rod
+from softnlp.mould.cores import Core, core_of, lean, lumen_rod
 from softnlp.mould.parts import Part
 from softnlp.mould.plates import above, channel, plates, vents
 from softnlp.mould.shape import shapes_of
@@ -98,7 +98,9 @@ class SegmentMould:
         for core in self.cores:
             for end, low, high in ((0, -LAND, 0.0), (-1, L + CHANNEL, L + CHANNEL + LAND)):
                 radius = [float(core.hole.bore[end]) + _TOUCH] * 2
-                plug = loft([low, high], radius, float(core.hole.circle[end]), MIDDLE)
+                leant = lean(self.sizes, core.hole) if end == 0 else 0.0
+                x = [float(core.hole.circle[end]) + leant * z for z in (low, 0.0)]
+                plug = loft([low, high], radius, x, MIDDLE)
                 found += [turned(plug, turn) for turn in core.turns]
         return found
 

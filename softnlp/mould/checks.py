@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 VOLUME, DISTANCE, OVERLAP = 1e-3, 0.05, 0.01
 """Largest relative error of the void's volume, its distance from the body [mm], and overlap of two parts [mm^3]."""
 _FACING = -0.97  # of two normals: faces of one wall look away from each other within 14 degrees
-_RAYS, _ROUND_OFF = 1500, 2e-3
+_RAYS, _ROUND_OFF = 700, 2e-3
 _SAME_FACETS = 12  # parts of a turn after which the facets of core and thread are where they were
 _OFFSETS = (0.002, 0.02, 0.11, 0.37, 0.83)  # of the length, by which parts are drawn
 
@@ -168,7 +168,7 @@ def surface_distance(void: Manifold, shape: Shape) -> float:
     """
     (_, _, low), (_, _, high) = bounds(void)
     worst = max(abs(low), abs(high - shape.length))
-    for z in shape.length * np.array([0.0005, 0.07, 0.21, 0.35, 0.5, 0.65, 0.79, 0.93, 0.9995]):
+    for z in shape.length * np.array([0.0005, 0.13, 0.35, 0.5, 0.65, 0.87, 0.9995]):
         exact = [(0.0, 0.0, np.interp(z, shape.z, shape.outer)), (0.0, 0.0, np.interp(z, shape.z, shape.lumen))]
         for hole in shape.holes:
             rho = np.interp(z, shape.z, hole.circle)
@@ -188,7 +188,7 @@ def _section_distance(section: CrossSection, exact: Array) -> float:
     middle = np.concatenate([a, (a + b) / 2])
     off = np.abs(np.linalg.norm(middle[:, None] - exact[None, :, :2], axis=2) - exact[:, 2])
     there = float(off.min(axis=1).max())
-    points = np.concatenate([(x, y) + r * circle(90) for x, y, r in exact])
+    points = np.concatenate([(x, y) + r * circle(64) for x, y, r in exact])
     along = b - a
     t = np.einsum("ijk,jk->ij", points[:, None] - a, along) / np.maximum(np.einsum("jk,jk->j", along, along), 1e-30)
     nearest = a + np.clip(t, 0, 1)[..., None] * along
@@ -204,22 +204,23 @@ def _area(loop: Array) -> float:
 def drawn(mould: SegmentMould, core: Core) -> Iterator[tuple[str, float]]:
     """Yield each part of a core, in the order in which they are drawn, with what it shares with others on its way.
 
-    In the way are the silicone around the first of these chambers, the thread, and the parts not drawn yet; plates are
-    off. A key goes along the chamber; a side moves off the thread first; a grooved pin turns by its pitch. The second
+    In the way are the silicone around the first of these chambers, the thread, the parts not drawn yet and the base
+    plate; the top plate is off. A key goes along the chamber; a side moves off the thread first; a grooved pin turns by its pitch. The second
     rod goes through the finished bore.
     """
     sizes, L = mould.sizes, mould.sizes.shape.length
     axis, hole = axis_of(sizes, core.hole), core.hole
     reach = float(hole.core.max()) + 1.0
     x = (float(hole.circle.min()) - reach, float(hole.circle.max()) + reach)
-    near = box(x, (-reach, reach), (-1.0, L + 1.0))
-    silicone = (turned(mould.first, -core.turns[0]) ^ near) + core.thread
+    near = box(x, (-reach, reach), (-sizes.stand - 1.0, L + 1.0))
+    bases = [turned(mould.plates[name].solid, -core.turns[0]) ^ near for name in ("base-1", "base-2")]
+    silicone = union([turned(mould.first, -core.turns[0]) ^ near, core.thread, bases[0]])
     left, step = list(core.parts), sizes.settings.thread_pitch_mm / _SAME_FACETS
     for part in core.parts:
         left.remove(part)
         obstacles = union([silicone, *(other.solid for other in left)])
         shift = moved_in(sizes, part)
-        obstacle = union([silicone]) if any(shift) else obstacles
+        obstacle = silicone if any(shift) else obstacles
         worst = 0.0
         for off in (0.0, *(L * share for share in _OFFSETS)) if any(shift) else [L * share for share in _OFFSETS]:
             solid = part.solid.translate(shift)
@@ -231,7 +232,7 @@ def drawn(mould: SegmentMould, core: Core) -> Iterator[tuple[str, float]]:
             moved = solid.translate(tuple(float(off * c) for c in axis))
             worst = max(worst, float((moved ^ obstacle).volume()))
         yield part.name, worst
-    body = turned(mould.cast, -core.turns[0]) ^ near
+    body = union([turned(mould.cast, -core.turns[0]) ^ near, bases[1]])
     moves = [core.rod.solid.translate(tuple(float(L * share * c) for c in axis)) for share in _OFFSETS]
     yield core.rod.name, max(float((solid ^ body).volume()) for solid in moves)
 
@@ -243,15 +244,17 @@ def parted(mould: SegmentMould) -> Iterator[tuple[str, float]]:
     yield mould.lumen.name, max(float((solid ^ body).volume()) for solid in moves)
     for part in mould.shells:
         x, y, _ = part.down
-        moves = [part.solid.translate((x * off, y * off, 0.0)) for off in (0.05, 1.0, 4.0, 15.0)]
+        moves = [part.solid.translate((x * off, y * off, 0.0)) for off in (0.05, 2.0, 12.0)]
         others = union([body, *(other.solid for other in mould.shells if other is not part)])
         yield part.name, max(float((solid ^ others).volume()) for solid in moves)
     for name, plate in mould.plates.items():
         up = 1.0 if name.startswith("top") else -1.0
         step = mould.step(int(name[-1]))
-        rods = [one for part in step if part.kind in ("rod", "core", "key") for one in part.every]
+        # Cores and second rods are drawn before a base plate is taken off, but after a top plate.
+        there = ("rod", "core", "key") if up > 0 else ()
+        rods = [one for part in step if part.kind in there for one in part.every]
         obstacles = union([*rods, *(part.solid for part in mould.shells), body])
-        moves = [plate.solid.translate((0.0, 0.0, up * off)) for off in (0.05, 1.0, 5.0, 12.0)]
+        moves = [plate.solid.translate((0.0, 0.0, up * off)) for off in (0.05, 4.0)]
         yield plate.name, max(float((solid ^ obstacles).volume()) for solid in moves)
 
 

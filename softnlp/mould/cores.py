@@ -48,6 +48,11 @@ def axis_of(sizes: Sizes, hole: Hole) -> Array:
     return along
 
 
+def lean(sizes: Sizes, hole: Hole) -> float:
+    """Return how far a chamber moves outwards for a rise of 1; its core leans on below the body, and is upright above."""
+    return float(hole.circle[-1] - hole.circle[0]) / sizes.shape.length
+
+
 def lumen_rod(sizes: Sizes) -> Part:
     """Return the rod of the lumen, with shoulders that bear on the plates."""
     shape = sizes.shape
@@ -103,17 +108,21 @@ def _wound(sizes: Sizes, hole: Hole, profile: Array) -> Manifold:
 
 
 def _loft(sizes: Sizes, hole: Hole, less: float, top: float) -> Manifold:
-    """Return a core without groove. less : by how much it is thinner between the plates. top : where it ends."""
+    """Return a core without groove. less : by how much it is thinner between the plates. top : where it ends.
+
+    A thinner one is a key, which is nowhere wider than above.
+    """
     shape = sizes.shape
     low, high = sizes.spigot(hole, 0), sizes.spigot(hole, -1)
-    z, r, x = [*shape.z], [*(hole.core + sizes.inset - less)], [*hole.circle]
+    core = hole.core if less == 0 else np.minimum.accumulate(hole.core[::-1])[::-1]
+    z, r, x = [*shape.z], [*(core + sizes.inset - less)], [*hole.circle]
     if sizes.method == "pin" and sizes.depth > 0:  # nothing below the groove may be thicker than its ground
         start = sizes.thread_ends[0] + sizes.settings.thread_diameter_mm / 2 + SMOOTH
         ground = r[0] - sizes.depth - SMOOTH
         z, r, x = [0.0, start, start + _RAMP, *z[1:]], [ground, ground, r[0], *r[1:]], [x[0]] * 3 + x[1:]
     z = [-sizes.foot, 0.0, *z, shape.length, top]
     r = [low, low, *r, high, high]
-    x = [hole.circle[0]] * 2 + x + [hole.circle[-1]] * 2
+    x = [hole.circle[0] + z[0] * lean(sizes, hole), hole.circle[0], *x, *[hole.circle[-1]] * 2]
     return loft(z, r, x, MIDDLE)
 
 
@@ -138,10 +147,10 @@ def _three(
     rings = []
     for z in (bottom, 0.0, shape.length, top):
         half = (low + (high - low) * (z - bottom) / (top - bottom)) / 2
-        x = float(np.interp(z, shape.z, hole.circle))
+        x = float(np.interp(z, shape.z, hole.circle)) + min(z, 0.0) * lean(sizes, hole)
         rings.append([(x - reach, -half, z), (x + reach, -half, z), (x + reach, half, z), (x - reach, half, z)])
     slab = swept(np.array(rings))
-    key = _loft(sizes, hole, 0.0 if groove is None else sizes.depth + SMOOTH, top) ^ slab
+    key = _loft(sizes, hole, sizes.depth + SMOOTH, top) ^ slab
     grooved = whole if groove is None else whole - groove
     sides = sorted((grooved - slab).decompose(), key=lambda one: one.bounding_box()[4])
     draft = atan2((high - low) / 2, top - bottom)
@@ -158,7 +167,7 @@ def _second_rod(sizes: Sizes, hole: Hole, turns: tuple[float, ...], tag: str) ->
     shape = sizes.shape
     z = [-sizes.socket, *shape.z, sizes.top_end]
     r = [hole.bore[0], *hole.bore, hole.bore[-1]]
-    x = [hole.circle[0], *hole.circle, hole.circle[-1]]
+    x = [hole.circle[0] + z[0] * lean(sizes, hole), *hole.circle, hole.circle[-1]]
     made = loft(z, r, x, MIDDLE)
     return Part(f"liner-rod{tag}", "rod", made, turns, apart=(0.0, 0.0, _APART * shape.length))
 

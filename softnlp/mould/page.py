@@ -121,16 +121,16 @@ def steps(mould: SegmentMould) -> Iterator[Step]:
     )
     if three:
         draw = (
-            "Take off both plates; the shell stays closed. Draw each key upwards by its end. Press the two sides "
+            "Take off the top plate; shell and base plate stay. Draw each key upwards by its end. Press the two sides "
             "together, off the thread, and draw them as well, one after the other."
         )
     elif sizes.depth > 0:
         draw = (
-            "Take off both plates; the shell stays closed. Turn each pin by its flats, anticlockwise seen from above: it "
+            "Take off the top plate; shell and base plate stay. Turn each pin by its flats, anticlockwise seen from above: it "
             "leaves its thread like a screw and rises by one pitch a turn."
         )
     else:
-        draw = "Take off both plates; the shell stays closed. Draw each pin straight upwards."
+        draw = "Take off the top plate; shell and base plate stay. Draw each pin straight upwards."
     yield Step(
         "Draw the cores",
         [f"{draw} The thread stays in the silicone. The lumen rod stays where it is. Cut off what stands in the vents."],
@@ -139,11 +139,11 @@ def steps(mould: SegmentMould) -> Iterator[Step]:
     yield Step(
         "Second pour: the liners",
         [
-            "Put on base-2. Fill each chamber with silicone from its lower end upwards, with a syringe and a blunt "
+            "Take off base-1 and put base-2 on. Fill each chamber with silicone from its lower end upwards, with a syringe and a blunt "
             "needle, and push its liner rod in down to the socket: what it displaces rises. Lower top-2 over the rods and "
             "join the plates. Fill up through one of the three holes until silicone stands in the other two. "
-            f"{ml['second pour, liners']} are enough. After curing take off the plates, draw the rods, and cut off the "
-            "ring flush with the body's end.",
+            f"{ml['second pour, liners']} are enough. After curing take off top-2, draw the rods, take off "
+            "base-2, and cut off the ring flush with the body's end.",
         ],
         lambda: exploded(mould, 2),
     )

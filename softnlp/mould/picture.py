@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 _LIGHT = np.array([0.35, -0.5, 0.8]) / np.linalg.norm([0.35, -0.5, 0.8])
 _TWICE = 2  # drawn so many times larger and averaged
-_GRAIN = 1 << 16  # triangles are sorted into pixels in portions of so many candidates
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,43 +71,55 @@ def _draw(corners: Array, thing: Drawn, seen: Array, image: Array, depth: Array,
     corners, unit = corners[front], normal[front] / length[front, None]
     light = 0.35 + 0.65 * np.clip(unit @ _LIGHT, 0, 1) + 0.12 * np.clip(unit @ seen[2], 0, 1)
     shade = np.clip(np.array(thing.colour) * light[:, None], 0, 1)
-    low = np.clip(np.floor(corners[..., :2].min(axis=1)), 0, np.array(size) - 1).astype(int)
-    high = np.clip(np.ceil(corners[..., :2].max(axis=1)), 0, np.array(size) - 1).astype(int)
-    span = high - low + 1
-    counts = span.prod(axis=1)
-    ends = np.cumsum(counts)
-    first = 0
-    while first < len(counts):
-        base = ends[first - 1] if first else 0
-        last = max(first + 1, int(np.searchsorted(ends, base + _GRAIN, side="right")))
-        _portion(corners[first:last], shade[first:last], low[first:last], span[first:last], image, depth, size[0])
-        first = last
-
-
-def _portion(
-    corners: Array, shade: Array, low: Faces, span: Faces, image: Array, depth: Array, width: int
-) -> None:
-    counts = span.prod(axis=1)
+    # Pixels whose middle is inside, row by row: first the rows of each triangle, then the pixels of each row.
+    y = corners[..., 1]
+    low = np.clip(np.ceil(y.min(axis=1) - 0.5), 0, size[1]).astype(int)
+    high = np.clip(np.floor(y.max(axis=1) - 0.5), -1, size[1] - 1).astype(int)
+    counts = np.maximum(high - low + 1, 0)
     which = np.repeat(np.arange(len(counts)), counts)
-    place = np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts)
-    x = low[which, 0] + place % span[which, 0]
-    y = low[which, 1] + place // span[which, 0]
-    a, b, c = (corners[which, k] for k in range(3))
-    px, py = x + 0.5, y + 0.5
-    whole = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (b[:, 1] - a[:, 1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        u = ((px - a[:, 0]) * (c[:, 1] - a[:, 1]) - (c[:, 0] - a[:, 0]) * (py - a[:, 1])) / whole
-        v = ((b[:, 0] - a[:, 0]) * (py - a[:, 1]) - (px - a[:, 0]) * (b[:, 1] - a[:, 1])) / whole
-    inside = (u >= 0) & (v >= 0) & (u + v <= 1)
-    which, u, v = which[inside], u[inside], v[inside]
-    at = y[inside] * width + x[inside]
-    z = corners[which, 0, 2] * (1 - u - v) + corners[which, 1, 2] * u + corners[which, 2, 2] * v
-    order = np.argsort(z, kind="stable")  # the nearest is written last
-    at, z, which = at[order], z[order], which[order]
-    seen = z > depth[at]
-    at, z, which = at[seen], z[seen], which[seen]
-    depth[at] = z
-    image[at] = shade[which]
+    row = low[which] + _within(counts)
+    left, right = _span(corners[which], row + 0.5)
+    first = np.clip(np.ceil(left - 0.5), 0, size[0]).astype(int)
+    last = np.clip(np.floor(right - 0.5), -1, size[0] - 1).astype(int)
+    counts = np.maximum(last - first + 1, 0)
+    x = np.repeat(first, counts) + _within(counts)
+    which, row = np.repeat(which, counts), np.repeat(row, counts)
+    z = _planes(corners)[which]
+    height = z[:, 0] * (x + 0.5) + z[:, 1] * (row + 0.5) + z[:, 2]
+    at = row * size[0] + x
+    order = np.argsort(height)  # the nearest is written last
+    at, height, which = at[order], height[order], which[order]
+    near = height > depth[at]
+    depth[at[near]] = height[near]
+    image[at[near]] = shade[which[near]]
+
+
+def _within(counts: Faces) -> Faces:
+    """Return 0, 1, ... up to each count, one after the other."""
+    return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+def _span(corners: Array, y: Array) -> tuple[Array, Array]:
+    """Return between which x each triangle is at a height; corners : (m, 3, 3). y : (m,)."""
+    left, right = np.full(len(y), np.inf), np.full(len(y), -np.inf)
+    for k in range(3):
+        a, b = corners[:, k], corners[:, (k + 1) % 3]
+        crosses = (a[:, 1] - y) * (b[:, 1] - y) <= 0
+        rise = b[:, 1] - a[:, 1]
+        t = np.divide(y - a[:, 1], rise, out=np.zeros_like(y), where=rise != 0)
+        x = a[:, 0] + t * (b[:, 0] - a[:, 0])
+        left = np.where(crosses, np.minimum(left, x), left)
+        right = np.where(crosses, np.maximum(right, x), right)
+    return np.where(np.isfinite(left), left, 0.0), np.where(np.isfinite(right), right, -1.0)
+
+
+def _planes(corners: Array) -> Array:
+    """Return a, b, c of the plane z = a x + b y + c of each triangle; flat for one that is seen from its side."""
+    p, q = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    n = np.cross(p, q)
+    whole = np.where(np.abs(n[:, 2]) > 1e-9, n[:, 2], np.inf)
+    a, b = -n[:, 0] / whole, -n[:, 1] / whole
+    return np.column_stack([a, b, corners[:, 0, 2] - a * corners[:, 0, 0] - b * corners[:, 0, 1]])
 
 
 def _edges(image: Array, depth: Array) -> Array:

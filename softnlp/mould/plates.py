@@ -9,12 +9,12 @@ from __future__ import annotations
 from math import degrees, pi
 from typing import TYPE_CHECKING
 
-from softnlp.mould.cores import Core
+from softnlp.mould.cores import Core, lean
 from softnlp.mould.parts import Part
 from softnlp.mould.shape import Shape
 from softnlp.mould.shell import plate_outline
 from softnlp.mould.sizes import CHANNEL, GAP, LAND, LIP, SEAT, Sizes
-from softnlp.mould.solids import FINE, MIDDLE, box, cylinder, hull, loft, prism, turned, union, without
+from softnlp.mould.solids import COARSE, FINE, MIDDLE, box, cylinder, hull, loft, prism, turned, union, without
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -42,9 +42,12 @@ def plates(sizes: Sizes, cores: list[Core]) -> dict[str, Part]:
         hole = core.hole
         x, top = float(hole.circle[0]), float(hole.circle[-1])
         fitting = float(hole.bore[0]), float(hole.bore[-1])
-        first = cylinder(sizes.spigot(hole, 0) + c, -depth, 1.0, x)
+        leant = lean(sizes, hole)
+        first = loft([-depth, 1.0], [sizes.spigot(hole, 0) + c] * 2, [x - depth * leant, x + leant], COARSE)
         second = cylinder(sizes.spigot(hole, -1) + c, low - 1.0, high, top)
-        rod = loft([-depth, -LAND, -LAND, 1.0], [fitting[0] + c] * 2 + [fitting[0]] * 2, x, MIDDLE)
+        below = [-depth, -LAND, -LAND, 0.0, 1.0]
+        leaning = [x + leant * z for z in below]
+        rod = loft(below, [fitting[0] + c] * 2 + [fitting[0]] * 3, leaning, MIDDLE)
         over = low + CHANNEL + LAND
         guide = loft([low - 1.0, over, over, high], [fitting[1]] * 2 + [fitting[1] + c] * 2, top, MIDDLE)
         for kind, one in zip(sockets, (first, second, rod, guide), strict=True):

@@ -43,7 +43,7 @@ def core_scene(mould: SegmentMould, core: Core) -> Image:
             across += wide
     things.append(Drawn.of(core.thread.translate(shift), (0.1, 0.1, 0.1)))
     things.append(Drawn.of(core.rod.solid.translate((across - x, 0.0, 0.0)), COLOURS["rod"]))
-    return picture(things, 420, 620, camera(8.0, 14.0))
+    return picture(things, 300, 460, camera(8.0, 14.0))
 
 
 def exploded(mould: SegmentMould, number: int) -> Image:
@@ -56,7 +56,7 @@ def exploded(mould: SegmentMould, number: int) -> Image:
             x, y = way @ np.array(part.apart[:2])
             lift = part.apart[2] * (1.0 if part.kind == "plate" else 0.55)
             things.append(Drawn.of(turned(part.solid, turn).translate((x, y, lift)), COLOURS[part.kind]))
-    return picture(things, 520, 760, _side(mould))
+    return picture(things, 390, 580, _side(mould))
 
 
 def _side(mould: SegmentMould) -> np.ndarray:
@@ -70,7 +70,7 @@ def open_shell(mould: SegmentMould, number: int, silicone: bool) -> Image:
     if silicone:
         things.append(Drawn.of(_half(mould, mould.cast), SILICONE if number == 1 else LINER))
     x, y, _ = mould.shells[0].down
-    return picture(things, 520, 620, camera(float(np.degrees(np.arctan2(y, x))) + 108.0, 20.0))
+    return picture(things, 390, 480, camera(float(np.degrees(np.arctan2(y, x))) + 108.0, 20.0))
 
 
 def _half(mould: SegmentMould, solid: Manifold) -> Manifold:
@@ -82,13 +82,13 @@ def _half(mould: SegmentMould, solid: Manifold) -> Manifold:
 
 def shell_scene(mould: SegmentMould) -> Image:
     """Draw the parts of the shell as they are printed, side by side."""
-    return _row([Drawn.of(part.printed, COLOURS["shell"]) for part in mould.shells], camera(25.0, 40.0), 620, 360)
+    return _row([Drawn.of(part.printed, COLOURS["shell"]) for part in mould.shells], camera(25.0, 40.0), 480, 280)
 
 
 def plate_scene(mould: SegmentMould, number: int) -> Image:
     """Draw base and top plate of a step as they are printed."""
     plates = [mould.plates[f"{kind}-{number}"] for kind in ("base", "top")]
-    return _row([Drawn.of(part.printed, COLOURS["plate"]) for part in plates], camera(20.0, 48.0), 620, 320)
+    return _row([Drawn.of(part.printed, COLOURS["plate"]) for part in plates], camera(20.0, 48.0), 480, 250)
 
 
 def cap_scene(mould: SegmentMould, end: str) -> Image:
@@ -97,7 +97,7 @@ def cap_scene(mould: SegmentMould, end: str) -> Image:
     body = finished(mould.sizes, end).translate((0.0, 0.0, 2.0 * GUIDE))
     reach = 200.0
     cut = box((-reach, reach), (0.0, reach), (-reach, reach))
-    return picture([Drawn.of(cup.solid ^ cut, COLOURS["cap"]), Drawn.of(body ^ cut, SILICONE)], 420, 420, camera(0.0, 25.0))
+    return picture([Drawn.of(cup.solid ^ cut, COLOURS["cap"]), Drawn.of(body ^ cut, SILICONE)], 320, 320, camera(0.0, 25.0))
 
 
 def part_scene(part: Part, width: int = 360, height: int = 300) -> Image:
@@ -110,7 +110,7 @@ def body_scene(mould: SegmentMould) -> Image:
     reach = 200.0
     low, high = bounds(mould.cast)
     cut = box((0.0, reach), (-reach, 0.0), (low[2] + 0.35 * (high[2] - low[2]), reach))
-    return picture([Drawn.of(mould.cast - cut, SILICONE)], 360, 520, camera(40.0, 28.0))
+    return picture([Drawn.of(mould.cast - cut, SILICONE)], 280, 400, camera(40.0, 28.0))
 
 
 def _row(things: Iterable[Drawn], view: np.ndarray, width: int, height: int) -> Image:

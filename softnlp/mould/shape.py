@@ -141,9 +141,20 @@ def _shape(sections: list[tuple[float, Robot]], robot: Robot, lines: Any, scale:
     return _upright(made)
 
 
+def one_way(r: Array) -> bool:
+    """Whether radii grow only, or shrink only."""
+    return bool(np.all(np.diff(r) >= -_SAME) or np.all(np.diff(r) <= _SAME))
+
+
+def waist(hole: Hole) -> float:
+    """Return by how much a core narrows upwards from a wider place below [mm]: what sides have to move in by."""
+    return float(np.max(np.maximum.accumulate(hole.core) - hole.core))
+
+
 def _upright(made: Shape) -> Shape:
     """Return a shape with no hole that narrows upwards."""
-    every = [made.lumen, *(r for hole in made.holes for r in (hole.core, hole.bore))]
+    cores = [hole.core for hole in made.holes if one_way(hole.core)]
+    every = [made.lumen, *(hole.bore for hole in made.holes), *cores]
     ways = {bool(step > 0) for r in every for step in np.diff(r) if abs(step) > _SAME}
     if len(ways) > 1:
         raise InputError(
@@ -158,8 +169,8 @@ def _upright(made: Shape) -> Shape:
     return Shape(made.z[-1] - made.z[::-1], made.outer[::-1], made.lumen[::-1], holes, flipped=True)
 
 
-def distance(a: Hole, b: Hole, end: int) -> float:
-    """Return the distance of two centres at an end, 0 or -1 [mm]."""
+def distance(a: Hole, b: Hole, end: int, fall: float = 0.0) -> float:
+    """Return the distance of two centres at an end, 0 or -1 [mm]; fall : nearer to the axis by it."""
     turn = a.angle - b.angle
-    rho, other = float(a.circle[end]), float(b.circle[end])
+    rho, other = float(a.circle[end]) - fall, float(b.circle[end]) - fall
     return hypot(rho - other * cos(turn), other * sin(turn))

@@ -11,7 +11,7 @@ from math import pi, radians, sqrt, tan
 import numpy as np
 
 from softnlp.base.errors import InputError
-from softnlp.mould.shape import Hole, Shape, distance
+from softnlp.mould.shape import Hole, Shape, distance, waist
 from softnlp.scenario.mould import MouldTable as Settings
 
 SEAT, GAP, LIP = 4.0, 0.3, 4.0  # how far plates reach into the shell, stand off its end, and overlap its step [mm]
@@ -56,12 +56,19 @@ class Sizes:
         """How much thicker a core is in radius than the thread's r_co, so that the thread's middle lies there."""
         return self.depth - self.settings.thread_diameter_mm / 2 - (0.0 if self.depth > 0 else SMOOTH)
 
+    def fall(self, end: int) -> float:
+        """Return how much nearer to the axis leaning cores are at the ground of their sockets than at the body's end."""
+        if end == -1:
+            return 0.0
+        rise = max(float(hole.circle[-1] - hole.circle[0]) for hole in self.shape.holes)
+        return max(rise, 0.0) / self.shape.length * self.socket
+
     @cached_property
     def shoulder(self) -> float:
         """By how much the ends of cores are thinner, so that the webs between their sockets can be printed."""
         web = self.settings.minimum_wall_mm + 2 * self.settings.clearance_mm
         needed = [
-            (float(a.core[end] + b.core[end]) + 2 * self.inset + web - distance(a, b, end)) / 2
+            (float(a.core[end] + b.core[end]) + 2 * self.inset + web - distance(a, b, end, self.fall(end))) / 2
             for a, b in combinations(self.shape.holes, 2)
             for end in (0, -1)
         ]
@@ -74,7 +81,7 @@ class Sizes:
         for hole in self.shape.holes:
             for end in (0, -1):
                 thick = max(float(hole.core[end]) + self.inset - self.shoulder, float(hole.bore[end]))
-                s = max(s, thick + float(self.shape.lumen[end]) + web - float(hole.circle[end]))
+                s = max(s, thick + float(self.shape.lumen[end]) + web - float(hole.circle[end]) + self.fall(end))
         return s
 
     def spigot(self, hole: Hole, end: int) -> float:
@@ -172,12 +179,13 @@ class Sizes:
         """
         least = self.settings.minimum_wall_mm
         thick = max(float(hole.core.max()) for hole in self.shape.holes) + self.inset
-        off = 2 * sqrt(max(2 * thick * self.depth - self.depth**2, 0.0)) + _PLAY
+        ground = self.depth + max(waist(hole) for hole in self.shape.holes)
+        off = 2 * sqrt(max(2 * thick * ground - ground**2, 0.0)) + _PLAY
         thin = min(
             min(self.spigot(hole, 0), self.spigot(hole, -1), float(hole.core.min()) + self.inset - self.depth)
             for hole in self.shape.holes
         )
-        return max(least, off, min(0.5 * thin, 1.5)), 2 * (0.97 * thin - least)
+        return max(least, off, min(0.5 * thin, 1.5)), 2 * (0.96 * thin - least)
 
     @property
     def tube_hole(self) -> float:
@@ -253,10 +261,11 @@ def _refusals(sizes: Sizes) -> Iterator[InputError]:
 
 def _groove(sizes: Sizes) -> Iterator[InputError]:
     least, depth = sizes.settings.minimum_wall_mm, sizes.depth
-    thin = min(float(hole.core.min()) for hole in sizes.shape.holes) + sizes.inset
+    thin = min(float(hole.core.min()) for hole in sizes.shape.holes)
     if depth >= thin:
         yield refuse(f"a groove of {depth:g} mm is deeper than the core, {thin:.3g} mm in radius", "groove_depth_mm")
-    elif sizes.method == "pin" and 2 * (thin - depth) < least:
+    thin += sizes.inset
+    if sizes.method == "pin" and 2 * (thin - depth) < least:
         left = f"{2 * (thin - depth):.3g} mm"
         yield refuse(f"a groove of {depth:g} mm leaves {left} of the core, less than {least:g} mm", "groove_depth_mm")
     if depth > sizes.settings.thread_diameter_mm + _ROUND_OFF:
@@ -280,12 +289,15 @@ def _rods(sizes: Sizes) -> Iterator[InputError]:
             yield from thin(f"the second rod of chamber {hole.chamber}", float(hole.bore[end]))
             yield from thin(f"the ends of the core of chamber {hole.chamber}", sizes.spigot(hole, end), "shoulder_mm")
         for a, b in combinations(shape.holes, 2):
-            web = distance(a, b, end) - float(a.bore[end] + b.bore[end]) - 2 * settings.clearance_mm
+            web = distance(a, b, end, sizes.fall(end)) - float(a.bore[end] + b.bore[end]) - 2 * settings.clearance_mm
             if web < least - _ROUND_OFF:
                 yield refuse(f"between the rods of chambers {a.chamber} and {b.chamber} plates would be {web:.3g} mm")
     yield from thin("the pins for tubes", sizes.tube_hole, "tube_mm")
     if sizes.tube_hole > min(float(hole.bore.min()) for hole in shape.holes):
         yield refuse(f"tubes of {2 * sizes.tube_hole:g} mm are wider than the bores", "tube_mm")
+    narrow = [hole.chamber for hole in shape.holes if waist(hole) > _ROUND_OFF]
+    if sizes.method == "pin" and narrow:
+        yield refuse(f"the pin of chamber {narrow[0]} could not be drawn: it is wider below a narrower place", "core")
     low, high = sizes.key_room
     if sizes.method == "three-part" and low > high + _ROUND_OFF:
         yield refuse(f"the sides of three-part cores would be less than {least:g} mm thick: use core = 'pin'", "core")
