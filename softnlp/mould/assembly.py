@@ -198,9 +198,7 @@ def _segment(sizes: Sizes, prefix: str, ends: list[str]) -> SegmentMould:
         for k, alike in enumerate(groups.values())
     ]
     caps = {end: cup(sizes, end) for end in ends}
-    return SegmentMould(
-        sizes, prefix, tuple(shell(sizes)), plates(sizes, cores), lumen_rod(sizes), tuple(cores), caps
-    )
+    return SegmentMould(sizes, prefix, tuple(shell(sizes)), plates(sizes, cores), lumen_rod(sizes), tuple(cores), caps)
 
 
 def lead_degrees(sizes: Sizes) -> float:

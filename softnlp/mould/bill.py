@@ -26,7 +26,8 @@ def bill(moulds: Moulds, density: float = 1070.0) -> list[dict[str, Any]]:
     """
     waste = 1 + moulds.settings.waste_percent / 100
     found = [
-        _row("print", part.name, part.count, _box(part), part.solid.volume() / 1000, "cm3", 1.0) for part in moulds.parts
+        _row("print", part.name, part.count, _box(part), part.solid.volume() / 1000, "cm3", 1.0)
+        for part in moulds.parts
     ]
     for segment in moulds.segments:
         where = segment.prefix
@@ -66,7 +67,9 @@ def rods(segment: SegmentMould) -> list[tuple[str, int, str]]:
         longer = 0.0 if sizes.method == "pin" else PULL
         words = f"{wide} x {length + longer:.1f} mm, ends {ends:.2f} mm, groove {sizes.depth:g} mm"
         found.append((f"{kind}, chambers {chambers}", n, words))
-        found.append((f"liner rod, chambers {chambers}", n, f"{_wide(core.hole.bore)} x {sizes.top_end + sizes.socket:.1f} mm"))
+        found.append(
+            (f"liner rod, chambers {chambers}", n, f"{_wide(core.hole.bore)} x {sizes.top_end + sizes.socket:.1f} mm")
+        )
     return found
 
 

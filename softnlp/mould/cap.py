@@ -76,13 +76,11 @@ def finished(sizes: Sizes, end: str) -> Manifold:
     return without(whole, [cylinder(float(shape.lumen[k]), -1.0, height + 1.0, sides=FINE), *bores])
 
 
-def connector(
-    lower: Sizes, upper: Sizes, length: float, turn: float, number: int, bonded: bool
-) -> tuple[Part, str]:
+def connector(lower: Sizes, upper: Sizes, length: float, turn: float, number: int, bonded: bool) -> tuple[Part, str]:
     """Return the rigid piece between two segments, and what to know of it.
 
-    length : of it [mm]. turn : of the upper segment's axes against the lower's [rad]. number : of the lower one. bonded : whether
-    lines come up through the lower segment.
+    length : of it [mm]. turn : of the upper segment's axes against the lower's [rad]. number : of the lower one.
+    bonded : whether lines come up through the lower segment.
 
     It has the lumen, and a hole for a tube to each chamber of the upper segment; where those cannot come up through
     the lower segment as bonded lines, slots on its lower face lead them to the lumen, where there is room.
@@ -109,4 +107,3 @@ def connector(
         return Part(f"connector-{number}", "connector", made), note
     slots = [turned(box((0.0, x), (-w, w), (-1.0, 2 * w)), angle) for x, angle in places]
     return Part(f"connector-{number}", "connector", without(made, slots)), ""
-

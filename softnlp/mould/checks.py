@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib import import_module
 from io import BytesIO
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
@@ -59,8 +60,7 @@ def checks_of(moulds: Moulds) -> list[Check]:
 
 def _of_part(part: Part, moulds: Moulds) -> Iterator[Check]:
     """Yield whether a part is a closed solid as its file has it, how thin it is, and whether it fits the bed."""
-    import trimesh  # of the extra mesh, which was asked for by now
-
+    trimesh: Any = import_module("trimesh")  # of the extra mesh, which was asked for by now
     read = trimesh.load(BytesIO(stl(part)), file_type="stl")
     whole = bool(read.is_watertight and read.is_volume)
     yield Check("closed solid", part.name, float(whole), "= 1", "", whole)
@@ -112,7 +112,9 @@ def _of_segment(mould: SegmentMould) -> Iterator[Check]:
     yield Check("volume of the first void", name, 100 * balance, f"+- {100 * VOLUME:g}", "%", abs(balance) <= VOLUME)
     for core in mould.cores:
         for part, worst in drawn(mould, core):
-            yield Check("overlap when drawn", f"{mould.prefix}{part}", worst, f"<= {OVERLAP:g}", "mm^3", worst <= OVERLAP)
+            yield Check(
+                "overlap when drawn", f"{mould.prefix}{part}", worst, f"<= {OVERLAP:g}", "mm^3", worst <= OVERLAP
+            )
     for part, worst in parted(mould):
         yield Check("overlap when drawn", f"{mould.prefix}{part}", worst, f"<= {OVERLAP:g}", "mm^3", worst <= OVERLAP)
     for end, cup in mould.caps.items():
@@ -153,9 +155,7 @@ def first_balance(mould: SegmentMould) -> float:
     shape = mould.sizes.shape
     around = 2 * float(shape.outer.max())
     slab = box((-around, around), (-around, around), (0.0, shape.length))
-    cores = sum(
-        len(core.turns) * float((part.solid ^ slab).volume()) for core in mould.cores for part in core.parts
-    )
+    cores = sum(len(core.turns) * float((part.solid ^ slab).volume()) for core in mould.cores for part in core.parts)
     thread = sum(len(core.turns) * float(core.thread.volume()) for core in mould.cores)
     bare = Shape(shape.z, shape.outer, shape.lumen, ()).volume()
     return (float(mould.first.volume()) + thread + cores - bare) / shape.volume()
@@ -174,7 +174,7 @@ def surface_distance(void: Manifold, shape: Shape) -> float:
             rho = np.interp(z, shape.z, hole.circle)
             exact.append((rho * np.cos(hole.angle), rho * np.sin(hole.angle), np.interp(z, shape.z, hole.bore)))
         worst = max(worst, _section_distance(void.slice(float(z)), np.array(exact)))
-    return worst
+    return float(worst)
 
 
 def _section_distance(section: CrossSection, exact: Array) -> float:
@@ -205,8 +205,8 @@ def drawn(mould: SegmentMould, core: Core) -> Iterator[tuple[str, float]]:
     """Yield each part of a core, in the order in which they are drawn, with what it shares with others on its way.
 
     In the way are the silicone around the first of these chambers, the thread, the parts not drawn yet and the base
-    plate; the top plate is off. A key goes along the chamber; a side moves off the thread first; a grooved pin turns by its pitch. The second
-    rod goes through the finished bore.
+    plate; the top plate is off. A key goes along the chamber; a side moves off the thread first; a grooved pin turns by
+    its pitch. The second rod goes through the finished bore.
     """
     sizes, L = mould.sizes, mould.sizes.shape.length
     axis, hole = axis_of(sizes, core.hole), core.hole

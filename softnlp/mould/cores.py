@@ -16,7 +16,7 @@ import numpy as np
 from softnlp.base.arrays import Array
 from softnlp.mould.parts import Part
 from softnlp.mould.shape import Hole
-from softnlp.mould.sizes import GRIP, PULL, SMOOTH, Sizes
+from softnlp.mould.sizes import GRIP, KEY_DRAFT, PULL, SMOOTH, Sizes
 from softnlp.mould.solids import FINE, MIDDLE, box, helix, loft, swept
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def axis_of(sizes: Sizes, hole: Hole) -> Array:
 
 
 def lean(sizes: Sizes, hole: Hole) -> float:
-    """Return how far a chamber moves outwards for a rise of 1; its core leans on below the body, and is upright above."""
+    """Return how far a chamber moves outwards for a rise of 1; its core leans on below the body, not above."""
     return float(hole.circle[-1] - hole.circle[0]) / sizes.shape.length
 
 
@@ -110,12 +110,13 @@ def _wound(sizes: Sizes, hole: Hole, profile: Array) -> Manifold:
 def _loft(sizes: Sizes, hole: Hole, less: float, top: float) -> Manifold:
     """Return a core without groove. less : by how much it is thinner between the plates. top : where it ends.
 
-    A thinner one is a key, which is nowhere wider than above.
+    A thinner one is a key, which is everywhere a little wider above.
     """
     shape = sizes.shape
     low, high = sizes.spigot(hole, 0), sizes.spigot(hole, -1)
     core = hole.core if less == 0 else np.minimum.accumulate(hole.core[::-1])[::-1]
-    z, r, x = [*shape.z], [*(core + sizes.inset - less)], [*hole.circle]
+    tapered = KEY_DRAFT * (1 - shape.z / shape.length) if less > 0 else 0.0
+    z, r, x = [*shape.z], [*(core + sizes.inset - less - tapered)], [*hole.circle]
     if sizes.method == "pin" and sizes.depth > 0:  # nothing below the groove may be thicker than its ground
         start = sizes.thread_ends[0] + sizes.settings.thread_diameter_mm / 2 + SMOOTH
         ground = r[0] - sizes.depth - SMOOTH
@@ -182,4 +183,3 @@ def moved_in(sizes: Sizes, part: Part) -> tuple[float, float, float]:
 def screw_angle(sizes: Sizes, drawn: float) -> float:
     """Return by how much a grooved pin turns while it is drawn so far [deg]."""
     return degrees(2 * np.pi * drawn / sizes.settings.thread_pitch_mm)
-

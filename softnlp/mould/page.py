@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Iterator
+from functools import partial
 from html import escape
 from typing import Any, NamedTuple
 
@@ -57,9 +58,10 @@ def steps_page(title: str, moulds: Moulds, rows: list[dict[str, Any]], checks: l
             parts.append(_step(n, step))
     for part in moulds.connectors:
         words = [
-            "Print it with the face to the lower segment down. Glue it between the two segments with the tubes in its holes."
+            "Print it with the face to the lower segment down. Glue it between the two segments with the "
+            "tubes in its holes."
         ]
-        parts.append(_step(None, Step(part.name.replace("-", " "), words, lambda part=part: part_scene(part))))
+        parts.append(_step(None, Step(part.name.replace("-", " "), words, partial(part_scene, part))))
     parts += ["<h2>What was measured</h2>", _checks(checks)]
     head = f'<meta charset="utf-8"><title>{escape(title)}: moulds</title><style>{_STYLE}</style>'
     body = "\n".join(parts)
@@ -77,8 +79,10 @@ def steps(mould: SegmentMould) -> Iterator[Step]:
         "Print the parts",
         [
             "Each file lies as it is printed: shells on their backs, plates with the face to the silicone upwards, the "
-            "parts of cores on their flat sides, rods and pins upright. Fine layers (0.05 mm, resin) are needed for the "
-            "grooves of the thread. Liner rods are plain: metal rods of the same diameter do better where they are thin.",
+            "parts of cores on their flat sides, rods and pins upright. Fine layers (0.05 mm, resin) are "
+            "needed for the "
+            "grooves of the thread. Liner rods are plain: metal rods of the same diameter do better "
+            "where they are thin.",
             "Clean sockets and holes. Try every rod in its plate. In base-2 and top-2, ream the last 2 mm at the "
             "silicone to the liner rods, so that these are held without play. Wash off all resin: it stops silicone "
             "from curing. Wipe or spray what touches silicone with a release agent.",
@@ -90,12 +94,17 @@ def steps(mould: SegmentMould) -> Iterator[Step]:
         if three
         else "Hold the pin by its flats in a drill or between two fingers. "
     )
-    lie = "lies in the groove" if sizes.depth > 0 else f"keeps its pitch of {settings.thread_pitch_mm:g} mm by eye or by a lathe"
+    lie = (
+        "lies in the groove"
+        if sizes.depth > 0
+        else f"keeps its pitch of {settings.thread_pitch_mm:g} mm by eye or by a lathe"
+    )
     yield Step(
         f"Wind the thread on {len(sizes.shape.holes)} cores",
         [
             f"{hold}Knot the thread at the lower end of the groove and fix it with a drop of instant glue. Wind it "
-            f"upwards under light tension, clockwise seen from below, so that it {lie}; knot and fix it at the upper end.",
+            f"upwards under light tension, clockwise seen from below, so that it {lie}; knot and fix it "
+            "at the upper end.",
             f"Each core takes about {sizes.thread_length() / len(sizes.shape.holes):.0f} mm.",
         ],
         lambda: core_scene(mould, mould.cores[0]),
@@ -103,7 +112,8 @@ def steps(mould: SegmentMould) -> Iterator[Step]:
     yield Step(
         "Put the first mould together",
         [
-            "Stand lumen rod and cores in base-1 until their shoulders bear on it. Close the shell around its boss: the "
+            "Stand lumen rod and cores in base-1 until their shoulders bear on it. Close the shell "
+            "around its boss: the "
             f"pins find their holes. Clamp it with {clamps} screws {clamp}. Lower top-1 over the upper ends until it "
             f"bears on the shell; this holds all rods straight. Join the plates by {ties} tie rods {tie}.",
         ],
@@ -112,9 +122,11 @@ def steps(mould: SegmentMould) -> Iterator[Step]:
     yield Step(
         "First pour: the body",
         [
-            f"Mix and degas {ml['first pour, body']} of silicone. Fill it slowly with a syringe through the gate, which "
+            f"Mix and degas {ml['first pour, body']} of silicone. Fill it slowly with a syringe through "
+            "the gate, which "
             "is at the lower end in the joint of the shell and takes the syringe's tip. Air leaves by the vents in the "
-            "top plate. Stop when silicone stands in all of them, and leave the syringe in place or close the gate with "
+            "top plate. Stop when silicone stands in all of them, and leave the syringe in place or "
+            "close the gate with "
             "clay until the silicone has cured.",
         ],
         lambda: open_shell(mould, 1, silicone=True),
@@ -126,21 +138,27 @@ def steps(mould: SegmentMould) -> Iterator[Step]:
         )
     elif sizes.depth > 0:
         draw = (
-            "Take off the top plate; shell and base plate stay. Turn each pin by its flats, anticlockwise seen from above: it "
+            "Take off the top plate; shell and base plate stay. Turn each pin by its flats, "
+            "anticlockwise seen from above: it "
             "leaves its thread like a screw and rises by one pitch a turn."
         )
     else:
         draw = "Take off the top plate; shell and base plate stay. Draw each pin straight upwards."
     yield Step(
         "Draw the cores",
-        [f"{draw} The thread stays in the silicone. The lumen rod stays where it is. Cut off what stands in the vents."],
+        [
+            f"{draw} The thread stays in the silicone. The lumen rod stays where it is. Cut off what "
+            "stands in the vents."
+        ],
         None,
     )
     yield Step(
         "Second pour: the liners",
         [
-            "Take off base-1 and put base-2 on. Fill each chamber with silicone from its lower end upwards, with a syringe and a blunt "
-            "needle, and push its liner rod in down to the socket: what it displaces rises. Lower top-2 over the rods and "
+            "Take off base-1 and put base-2 on. Fill each chamber with silicone from its lower end "
+            "upwards, with a syringe and a blunt "
+            "needle, and push its liner rod in down to the socket: what it displaces rises. Lower top-2 "
+            "over the rods and "
             "join the plates. Fill up through one of the three holes until silicone stands in the other two. "
             f"{ml['second pour, liners']} are enough. After curing take off top-2, draw the rods, take off "
             "base-2, and cut off the ring flush with the body's end.",
@@ -149,20 +167,29 @@ def steps(mould: SegmentMould) -> Iterator[Step]:
     )
     yield Step(
         "Take out the body",
-        ["Draw the lumen rod. Take out the screws, part the shell, and cut off the gate. The plates and the ring look so:"],
+        [
+            "Draw the lumen rod. Take out the screws, part the shell, and cut off the gate. The plates "
+            "and the ring look so:"
+        ],
         lambda: plate_scene(mould, 2),
     )
-    yield Step("The body as cast", ["Look through every chamber: no silicone may close it, no thread may lie bare."], lambda: body_scene(mould))
+    yield Step(
+        "The body as cast",
+        ["Look through every chamber: no silicone may close it, no thread may lie bare."],
+        lambda: body_scene(mould),
+    )
     for end in mould.caps:
         tubes = " The pins leave holes for the tubes: glue one into each afterwards." if end == "base" else ""
         yield Step(
             f"The {end} cap",
             [
-                f"Pour {ml[f'{end} cap']} of a harder silicone into the cup, to {settings.cap_mm:g} mm above its floor. "
-                f"When it begins to set, stand the body's {end} on it; the rim guides it, the pin is in the lumen. Do not "
+                f"Pour {ml[f'{end} cap']} of a harder silicone into the cup, to {settings.cap_mm:g} mm "
+                "above its floor. "
+                f"When it begins to set, stand the body's {end} on it; the rim guides it, the pin is in "
+                "the lumen. Do not "
                 f"press: the chambers have to stay open.{tubes}",
             ],
-            lambda end=end: cap_scene(mould, end),
+            partial(cap_scene, mould, end),
         )
 
 
@@ -180,9 +207,7 @@ def _bill(rows: list[dict[str, Any]]) -> str:
     head = "".join(f"<th>{name}</th>" for name in ("", "what", "count", "size", "amount", "prepare"))
     lines = []
     for row in rows:
-        amount, more = (
-            "" if row[key] is None else f"{row[key]:.2f} {row['unit']}" for key in ("amount", "with_waste")
-        )
+        amount, more = ("" if row[key] is None else f"{row[key]:.2f} {row['unit']}" for key in ("amount", "with_waste"))
         cells = (row["kind"], row["item"], str(row["count"]), row["size"], amount, more)
         lines.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
     return f"<table><tr>{head}</tr>{''.join(lines)}</table>"

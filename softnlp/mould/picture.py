@@ -1,4 +1,4 @@
-"""Pictures of solids without a window: triangles drawn into an array with a depth for each pixel, one light, soft edges."""
+"""Pictures of solids without a window: triangles drawn into an array with a depth for each pixel, and one light."""
 
 from __future__ import annotations
 
@@ -43,7 +43,9 @@ def camera(turn: float = 35.0, lift: float = 22.0) -> Array:
     return np.stack([right, np.cross(towards, right), towards])
 
 
-def picture(things: Sequence[Drawn], width: int = 560, height: int = 560, view: Array | None = None) -> NDArray[np.uint8]:
+def picture(
+    things: Sequence[Drawn], width: int = 560, height: int = 560, view: Array | None = None
+) -> NDArray[np.uint8]:
     """Return (height, width, 3) the picture of things, as large as fits, without perspective."""
     seen = camera() if view is None else view
     projected = [thing.vertices @ seen.T for thing in things]
@@ -59,7 +61,8 @@ def picture(things: Sequence[Drawn], width: int = 560, height: int = 560, view: 
         _draw(np.column_stack([xy, points[:, 2]])[thing.faces], thing, seen, image, depth, (W, H))
     image = _edges(image.reshape(H, W, 3), depth.reshape(H, W))
     small = image.reshape(height, _TWICE, width, _TWICE, 3).mean(axis=(1, 3))
-    return (255 * np.clip(small, 0, 1)).astype(np.uint8)
+    found: NDArray[np.uint8] = (255 * np.clip(small, 0, 1)).astype(np.uint8)
+    return found
 
 
 def _draw(corners: Array, thing: Drawn, seen: Array, image: Array, depth: Array, size: tuple[int, int]) -> None:

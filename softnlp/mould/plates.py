@@ -1,7 +1,7 @@
 """Base and top plates: they close the body's ends and hold rods and cores at both ends, in either step.
 
-Shoulders of cores bear flat on a plate and close the socket's play. Second rods have none: at the silicone their hole is
-as wide as they are, to be reamed. Plates are printed with the face to the silicone upwards.
+Shoulders of cores bear flat on a plate and close the socket's play. Second rods have none: at the silicone their hole
+is as wide as they are, to be reamed. Plates are printed with the face to the silicone upwards.
 """
 
 from __future__ import annotations
@@ -122,4 +122,3 @@ def above(sizes: Sizes, cut: Manifold) -> Manifold:
 def tie_places(sizes: Sizes) -> list[tuple[float, float]]:
     """Return the places of the tie rods."""
     return plate_outline(sizes, 0)[1]
-

@@ -1,8 +1,4 @@
-"""What the pictures of the steps show: the parts of each step, exploded or cut open, with plain cores where they are many.
-
-Threads and grooves of all cores would be half a million triangles; pictures of an assembly show plain cores, and one
-core is drawn with its thread.
-"""
+"""What the pictures of the steps show: the parts of each step, exploded or cut open, and one core with its thread."""
 
 from __future__ import annotations
 
@@ -97,7 +93,9 @@ def cap_scene(mould: SegmentMould, end: str) -> Image:
     body = finished(mould.sizes, end).translate((0.0, 0.0, 2.0 * GUIDE))
     reach = 200.0
     cut = box((-reach, reach), (0.0, reach), (-reach, reach))
-    return picture([Drawn.of(cup.solid ^ cut, COLOURS["cap"]), Drawn.of(body ^ cut, SILICONE)], 320, 320, camera(0.0, 25.0))
+    return picture(
+        [Drawn.of(cup.solid ^ cut, COLOURS["cap"]), Drawn.of(body ^ cut, SILICONE)], 320, 320, camera(0.0, 25.0)
+    )
 
 
 def part_scene(part: Part, width: int = 360, height: int = 300) -> Image:
@@ -117,6 +115,6 @@ def _row(things: Iterable[Drawn], view: np.ndarray, width: int, height: int) -> 
     moved, across = [], 0.0
     for thing in things:
         low, high = thing.vertices[:, 0].min(), thing.vertices[:, 0].max()
-        moved.append(Drawn(thing.vertices + (across - low, 0.0, 0.0), thing.faces, thing.colour))
+        moved.append(Drawn(thing.vertices + np.array([across - low, 0.0, 0.0]), thing.faces, thing.colour))
         across += high - low + 8.0
     return picture(moved, width, height, view)

@@ -131,4 +131,3 @@ def plate_outline(sizes: Sizes, end: int) -> tuple[list[Array], list[tuple[float
     ties = [(far * cos(back), far * sin(back)) for back in backs(sizes)]
     rims = [np.array(tie) + (sizes.hole + 3.0) * circle(48) for tie in ties]
     return [*rims, (sizes.boss(end) + 2.0) * circle(FINE)], ties
-

@@ -6,12 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
-from math import pi, radians, sqrt, tan
+from math import cos, pi, radians, sqrt, tan
 
 import numpy as np
 
 from softnlp.base.errors import InputError
 from softnlp.mould.shape import Hole, Shape, distance, waist
+from softnlp.mould.solids import TURN
 from softnlp.scenario.mould import MouldTable as Settings
 
 SEAT, GAP, LIP = 4.0, 0.3, 4.0  # how far plates reach into the shell, stand off its end, and overlap its step [mm]
@@ -19,8 +20,9 @@ FLOOR, GRIP, PULL = 1.2, 8.0, 6.0  # below sockets; what cores stand out above t
 LAND, CHANNEL = 2.0, 2.0  # where second rods fit without play; depth of the channel above the liners [mm]
 LUER, USUAL_GATE, USUAL_TUBE = 4.3, 4.0, 2.0  # the mouth takes a syringe's tip [mm]
 THREE_PART_FROM = 15.0  # outer diameter of the smallest robot of the paper with three-part cores [mm]
+KEY_DRAFT, SEAL = 0.01, 0.01  # of a key's narrow sides; of shoulders beyond their sockets' play, at least [mm]
 SMOOTH = 0.03  # by which smooth cores stay below the chords of a thread [mm]
-_PLAY = 0.1  # of a side of a core that has moved in [mm]
+_PLAY = 0.02  # of a side of a core that has moved in [mm]
 _ROUND_OFF = 1e-6
 
 
@@ -57,7 +59,7 @@ class Sizes:
         return self.depth - self.settings.thread_diameter_mm / 2 - (0.0 if self.depth > 0 else SMOOTH)
 
     def fall(self, end: int) -> float:
-        """Return how much nearer to the axis leaning cores are at the ground of their sockets than at the body's end."""
+        """Return how much nearer to the axis leaning cores are at their sockets' ground than at the body's end."""
         if end == -1:
             return 0.0
         rise = max(float(hole.circle[-1] - hole.circle[0]) for hole in self.shape.holes)
@@ -72,12 +74,19 @@ class Sizes:
             for a, b in combinations(self.shape.holes, 2)
             for end in (0, -1)
         ]
-        return max([self.settings.shoulder_mm, *needed])
+        return max([self.settings.shoulder_mm, self._sealing, *needed])
+
+    @property
+    def _sealing(self) -> float:
+        """The least shoulder that covers its socket's play: keys and grooved pins bear on it with their grounds."""
+        ground = self.depth + SMOOTH + KEY_DRAFT if self.depth > 0 or self.method == "three-part" else 0.0
+        return ground + self.settings.clearance_mm + SEAL
 
     @cached_property
     def lumen_shoulder(self) -> float:
         """The same of the lumen rod."""
-        web, s = self.settings.minimum_wall_mm + 2 * self.settings.clearance_mm, self.settings.shoulder_mm
+        web = self.settings.minimum_wall_mm + 2 * self.settings.clearance_mm
+        s = max(self.settings.shoulder_mm, self.settings.clearance_mm + SEAL)
         for hole in self.shape.holes:
             for end in (0, -1):
                 thick = max(float(hole.core[end]) + self.inset - self.shoulder, float(hole.bore[end]))
@@ -179,7 +188,8 @@ class Sizes:
         """
         least = self.settings.minimum_wall_mm
         thick = max(float(hole.core.max()) for hole in self.shape.holes) + self.inset
-        ground = self.depth + max(waist(hole) for hole in self.shape.holes)
+        chords = thick * (1 - cos(pi / TURN))  # of the thread, which are inside its circle
+        ground = self.depth + chords + max(waist(hole) for hole in self.shape.holes)
         off = 2 * sqrt(max(2 * thick * ground - ground**2, 0.0)) + _PLAY
         thin = min(
             min(self.spigot(hole, 0), self.spigot(hole, -1), float(hole.core.min()) + self.inset - self.depth)
@@ -197,7 +207,9 @@ class Sizes:
     @property
     def thread_ends(self) -> tuple[float, float]:
         """Heights between which the thread is wound."""
-        margin = max(self.settings.thread_pitch_mm / 2, self.settings.minimum_wall_mm + self.settings.thread_diameter_mm)
+        margin = max(
+            self.settings.thread_pitch_mm / 2, self.settings.minimum_wall_mm + self.settings.thread_diameter_mm
+        )
         return margin, self.shape.length - margin
 
     def thread_length(self) -> float:
@@ -243,8 +255,8 @@ def _refusals(sizes: Sizes) -> Iterator[InputError]:
     yield from _groove(sizes)
     if depth > 0 and pitch - t < least - _ROUND_OFF:
         yield refuse(
-            f"the ridge between turns is {pitch - t:.3g} mm, less than minimum_wall_mm = {least:g}: a pitch of at least "
-            f"{least + t:.3g} mm, or groove_depth_mm = 0 to wind on smooth cores",
+            f"the ridge between turns is {pitch - t:.3g} mm, less than minimum_wall_mm = {least:g}: a pitch of "
+            f"at least {least + t:.3g} mm, or groove_depth_mm = 0 to wind on smooth cores",
             "thread_pitch_mm",
         )
     if pitch <= t:
@@ -271,7 +283,9 @@ def _groove(sizes: Sizes) -> Iterator[InputError]:
     if depth > sizes.settings.thread_diameter_mm + _ROUND_OFF:
         yield refuse(f"a groove of {depth:g} mm is deeper than the thread is thick", "groove_depth_mm")
     if depth > 0 and sizes.method == "pin" and sizes.tilted:
-        yield refuse("pins that lean or widen cannot be turned out of a groove: 0, or three-part cores", "groove_depth_mm")
+        yield refuse(
+            "pins that lean or widen cannot be turned out of a groove: 0, or three-part cores", "groove_depth_mm"
+        )
 
 
 def _rods(sizes: Sizes) -> Iterator[InputError]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
@@ -11,9 +12,9 @@ import numpy as np
 
 from softnlp.base.arrays import Array
 from softnlp.base.units import MILLIMETRE
-from softnlp.mould.assembly import Moulds, SegmentMould
+from softnlp.mould.assembly import Moulds
 from softnlp.mould.parts import Part
-from softnlp.mould.solids import Faces, mesh_of, turned
+from softnlp.mould.solids import Faces, mesh_of
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
@@ -99,8 +100,7 @@ def three_mf(part: Part) -> bytes:
 
 def glb(moulds: Moulds) -> bytes:
     """Return all assemblies as one GLB, exploded: first step, second step and caps beside each other."""
-    import trimesh  # of the extra mesh, which was asked for by now
-
+    trimesh: Any = import_module("trimesh")  # of the extra mesh, which was asked for by now
     scene = trimesh.Scene()
     to_metres = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
     to_metres[:3] *= MILLIMETRE
@@ -161,8 +161,3 @@ def _material(trimesh: Any, kind: str) -> Any:
         roughnessFactor=0.7,
         alphaMode="OPAQUE" if rgba[3] == 1 else "BLEND",
     )
-
-
-def instances(segment: SegmentMould, number: int) -> list[tuple[Part, Manifold]]:
-    """Return every part of an assembly, each where it is."""
-    return [(part, turned(part.solid, turn)) for part in segment.step(number) for turn in part.turns]

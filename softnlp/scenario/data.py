@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -88,7 +88,7 @@ class Scenario:
     warnings: tuple[str, ...]
     registration: RegistrationTable | None = None
     uncertainty: Uncertainty | None = None
-    mould: MouldTable = MouldTable()
+    mould: MouldTable = field(default_factory=MouldTable)
 
     @property
     def model(self) -> Model:

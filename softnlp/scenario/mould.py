@@ -1,4 +1,4 @@
-"""[mould] of a scenario: what a maker chooses of the moulds that `softnlp mould` writes; every other study ignores it."""
+"""[mould] of a scenario: what a maker chooses of the moulds that `softnlp mould` writes; no study uses it."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ class MouldTable(Table):
     draft_deg : of the keys in three-part cores and of the register pins, on each side; less where there is no room
     minimum_wall_mm : the least wall, rod or web that the printer makes
     bed_mm : of the printer, along x, y and z
-    screw_mm : thread of the clamping screws and tie rods; as in 3.0 for M3
+    screw_mm : thread of the clamping screws and tie rods, 3 for M3
     thread_diameter_mm : of the thread that is wound on the cores
     thread_pitch_mm : from one turn to the next
     groove_depth_mm : of the helical groove; by default half the thread; as in 0.1
     shoulder_mm : by how much the ends of cores and lumen rod are thinner in radius, at least; more where webs need it
-    gate_mm : bore of the pour gate; by default 4 mm, or four fifths of the silicone's wall where that is less; as in 3.0
+    gate_mm : bore of the pour gate; by default 4 mm, or 0.8 of the silicone's wall if that is less; as in 3.0
     vent_mm : width of the vents
     cap_mm : thickness of the end caps
     tube_mm : diameter of the holes for tubes in the base cap; by default 2 mm, less in narrow bores; as in 1.5
