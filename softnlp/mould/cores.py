@@ -16,7 +16,7 @@ import numpy as np
 from softnlp.base.arrays import Array
 from softnlp.mould.parts import Part
 from softnlp.mould.shape import Hole
-from softnlp.mould.sizes import GRIP, KEY_DRAFT, PULL, SMOOTH, Sizes
+from softnlp.mould.sizes import GRIP, KEY_DRAFT, PULL, Sizes
 from softnlp.mould.solids import FINE, MIDDLE, box, helix, loft, swept
 
 if TYPE_CHECKING:
@@ -118,8 +118,8 @@ def _loft(sizes: Sizes, hole: Hole, less: float, top: float) -> Manifold:
     tapered = KEY_DRAFT * (1 - shape.z / shape.length) if less > 0 else 0.0
     z, r, x = [*shape.z], [*(core + sizes.inset - less - tapered)], [*hole.circle]
     if sizes.method == "pin" and sizes.depth > 0:  # nothing below the groove may be thicker than its ground
-        start = sizes.thread_ends[0] + sizes.settings.thread_diameter_mm / 2 + SMOOTH
-        ground = r[0] - sizes.depth - SMOOTH
+        start = sizes.thread_ends[0] + sizes.settings.thread_diameter_mm / 2 + sizes.smooth
+        ground = r[0] - sizes.depth - sizes.smooth
         z, r, x = [0.0, start, start + _RAMP, *z[1:]], [ground, ground, r[0], *r[1:]], [x[0]] * 3 + x[1:]
     z = [-sizes.foot, 0.0, *z, shape.length, top]
     r = [low, low, *r, high, high]
@@ -151,7 +151,7 @@ def _three(
         x = float(np.interp(z, shape.z, hole.circle)) + min(z, 0.0) * lean(sizes, hole)
         rings.append([(x - reach, -half, z), (x + reach, -half, z), (x + reach, half, z), (x - reach, half, z)])
     slab = swept(np.array(rings))
-    key = _loft(sizes, hole, sizes.depth + SMOOTH, top) ^ slab
+    key = _loft(sizes, hole, sizes.depth + sizes.smooth, top) ^ slab
     grooved = whole if groove is None else whole - groove
     sides = sorted((grooved - slab).decompose(), key=lambda one: one.bounding_box()[4])
     draft = atan2((high - low) / 2, top - bottom)

@@ -20,9 +20,8 @@ FLOOR, GRIP, PULL = 1.2, 8.0, 6.0  # below sockets; what cores stand out above t
 LAND, CHANNEL = 2.0, 2.0  # where second rods fit without play; depth of the channel above the liners [mm]
 LUER, USUAL_GATE, USUAL_TUBE = 4.3, 4.0, 2.0  # the mouth takes a syringe's tip [mm]
 THREE_PART_FROM = 15.0  # outer diameter of the smallest robot of the paper with three-part cores [mm]
-KEY_DRAFT, SEAL = 0.01, 0.01  # of a key's narrow sides; of shoulders beyond their sockets' play, at least [mm]
-SMOOTH = 0.03  # by which smooth cores stay below the chords of a thread [mm]
-_PLAY = 0.02  # of a side of a core that has moved in [mm]
+KEY_DRAFT, SEAL = 0.003, 0.01  # of a key's narrow sides; of shoulders beyond their sockets' play, at least [mm]
+_PLAY = 0.004  # of a side of a core that has moved in [mm]
 _ROUND_OFF = 1e-6
 
 
@@ -53,10 +52,15 @@ class Sizes:
             return given
         return 0.0 if self.method == "pin" and self.tilted else self.settings.thread_diameter_mm / 2
 
+    @cached_property
+    def smooth(self) -> float:
+        """By how much what a thread touches stays below its circle, whose chords are inside it."""
+        return max(float(hole.core.max()) for hole in self.shape.holes) * (1 - cos(pi / TURN)) + 0.003
+
     @property
     def inset(self) -> float:
         """How much thicker a core is in radius than the thread's r_co, so that the thread's middle lies there."""
-        return self.depth - self.settings.thread_diameter_mm / 2 - (0.0 if self.depth > 0 else SMOOTH)
+        return self.depth - self.settings.thread_diameter_mm / 2 - (0.0 if self.depth > 0 else self.smooth)
 
     def fall(self, end: int) -> float:
         """Return how much nearer to the axis leaning cores are at their sockets' ground than at the body's end."""
@@ -79,7 +83,7 @@ class Sizes:
     @property
     def _sealing(self) -> float:
         """The least shoulder that covers its socket's play: keys and grooved pins bear on it with their grounds."""
-        ground = self.depth + SMOOTH + KEY_DRAFT if self.depth > 0 or self.method == "three-part" else 0.0
+        ground = self.depth + self.smooth + KEY_DRAFT if self.depth > 0 or self.method == "three-part" else 0.0
         return ground + self.settings.clearance_mm + SEAL
 
     @cached_property
@@ -184,12 +188,11 @@ class Sizes:
         """Least and largest width of the key: key and sides are as thick as can be printed, and the sides come off.
 
         A side moves in by half the key's width w. Its edge, at w/2 from the middle, is then at the distance
-        sqrt(r^2 - (w/2)^2) from the axis, which has to be less than that of the groove's ground, r - depth.
+        sqrt(r^2 - (w/2)^2) from the axis, which has to be less than that of what the key left, r - ground.
         """
         least = self.settings.minimum_wall_mm
         thick = max(float(hole.core.max()) for hole in self.shape.holes) + self.inset
-        chords = thick * (1 - cos(pi / TURN))  # of the thread, which are inside its circle
-        ground = self.depth + chords + max(waist(hole) for hole in self.shape.holes)
+        ground = self.depth + self.smooth + KEY_DRAFT + max(waist(hole) for hole in self.shape.holes)
         off = 2 * sqrt(max(2 * thick * ground - ground**2, 0.0)) + _PLAY
         thin = min(
             min(self.spigot(hole, 0), self.spigot(hole, -1), float(hole.core.min()) + self.inset - self.depth)
