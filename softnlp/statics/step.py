@@ -11,14 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.status import Status
-from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.contact_settings import NO_CLOSURE, ContactSettings
 from softnlp.model.conventions import Coefficients, Conventions
 from softnlp.model.materials import Material
+from softnlp.model.obstacles import Obstacle
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.model.section import SectionRadii as SectionRadii
 from softnlp.nlp.solver import EquationResidual, Ipopt
 from softnlp.statics.body import Fit, fit_of
+from softnlp.statics.obstacle_contact import ObstacleContact as ObstacleContact
 
 Array = NDArray[np.float64]
 
@@ -222,6 +224,11 @@ class Contact:
         return self if self.normal.any() else None
 
     @property
+    def told_reaction(self) -> Array | None:
+        """The reactions (N,); None where the section has no closure, so that there are none [N]."""
+        return None if self.closure == NO_CLOSURE else self.chamber_reaction
+
+    @property
     def elasticities(self) -> dict[str, float]:
         """The elasticity of the force to each weight by its name [1]."""
         return {line.weight: line.elasticity for line in self.sensitivity}
@@ -306,6 +313,10 @@ class Step:
         What IPOPT said, None where it took no part.
     deviation
         Where uncertainties were given, else None.
+    contacts
+        Of obstacles, one each.
+    complementarity
+        Sum of what each contact pushes with times its gap, None without obstacles [N m].
     """
 
     pressure: Array
@@ -325,6 +336,8 @@ class Step:
     engine: str | None = None
     ipopt: Ipopt | None = None
     deviation: Deviation | None = None
+    contacts: tuple[ObstacleContact, ...] = ()
+    complementarity: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,6 +360,8 @@ class Run:
         Of a blocked force, else None.
     uncertainty
         What scatters and how much, by the keys of a scenario and in their units; empty where nothing was said.
+    obstacles
+        What the body may touch.
     """
 
     study: str
@@ -360,6 +375,7 @@ class Run:
     warnings: tuple[str, ...] = field(default=())
     contact: ContactSettings | None = None
     uncertainty: Mapping[str, Any] = field(default_factory=dict)
+    obstacles: tuple[Obstacle, ...] = ()
 
     @property
     def failed(self) -> tuple[Step, ...]:

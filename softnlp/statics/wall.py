@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from softnlp.base.errors import InputError
 from softnlp.base.ranges import POSITION
 from softnlp.base.status import Status
-from softnlp.model.contact_settings import CLOSURES, Closure, ContactSettings, require_in_front
+from softnlp.model.contact_settings import CLOSURES, NO_CLOSURE, Closure, ContactSettings, require_in_front
+from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.statics.arc import unloaded_arc
@@ -57,6 +58,16 @@ def _wall_at(offset: float, rest: Array, furthest: Array) -> Wall:
     return Wall(np.array([offset, 0.0, 0.0]), np.array([-np.sign(moved), 0.0, 0.0]))
 
 
+def with_closure(model: Model, contact: ContactSettings) -> ContactSettings:
+    """Return the settings, or raise `InputError` for a closure that the model's section does not have."""
+    if model.section.coupled and contact.closure != NO_CLOSURE:
+        text = f"{contact.closure_name!r} is not used with conventions energy; expected 'none'"
+        raise InputError(text, key="closure")
+    if contact.closure == NO_CLOSURE and not model.section.coupled:
+        raise InputError("expected 'none' only with conventions energy", key="closure")
+    return contact
+
+
 def checked_contact(
     contact: ContactSettings, robots: Iterable[Robot] = (), offsets: Iterable[float] = ()
 ) -> ContactSettings:
@@ -64,7 +75,7 @@ def checked_contact(
 
     robots, offsets : whose unbent tips may not start behind the wall, and how far that is moved (`require_in_front`).
     """
-    if contact.closure not in CLOSURES and not isinstance(contact.closure, Closure):
+    if contact.closure not in (*CLOSURES, NO_CLOSURE) and not isinstance(contact.closure, Closure):
         raise InputError(f"expected one of {', '.join(CLOSURES)}, got {contact.closure!r}", key="closure")
     numbers = {"offset": contact.offset, "tip_cap": contact.tip_cap}
     for key, value in numbers.items():
@@ -144,10 +155,19 @@ def standing_wall(poses: PoseSolver, contact: ContactSettings, pressures: Array,
         if pose is not None:
             return _wall_at(contact.offset, rest, pose.tip_position + contact.tip_cap * pose.tip_rotation[:, 2])
     for pressure in (largest, 1e-3 * largest):
-        branch, arc = unloaded_arc(poses, pressure)
-        if branch.status is Status.SOLVED:
-            return _wall_at(contact.offset, rest, arc.tip_position + contact.tip_cap * arc.axis)
+        tip = _unloaded_tip(poses, pressure)
+        if tip is not None:
+            return _wall_at(contact.offset, rest, tip[0] + contact.tip_cap * tip[1])
     return _wall_at(contact.offset, rest, rest)
+
+
+def _unloaded_tip(poses: PoseSolver, pressure: Array) -> tuple[Array, Array] | None:
+    """Return the tip [m] of the shape without loads and its axis, None where the stretch ends before this pressure."""
+    if isinstance(poses, ChainSolver):  # several arcs, of which no closed form is kept
+        pose = poses.solve(pressure, Loads())[0].pose
+        return None if pose is None else (pose.tip_position, pose.tip_rotation[:, 2])
+    branch, arc = unloaded_arc(poses, pressure)
+    return (arc.tip_position, arc.axis) if branch.status is Status.SOLVED else None
 
 
 def slipping_pressure(begin: Situation, end: Situation, sideways: list[tuple[float, float]]) -> float | None:

@@ -46,6 +46,7 @@ COEFFICIENTS: Mapping[str, Coefficient] = MappingProxyType(
         "k_a": Coefficient("corrections.area", "area", 0.05, 20.0),
         "k_i": Coefficient("corrections.inertia", "inertia", 0.05, 20.0),
         "phi": Coefficient("corrections.bore_fraction", "bore_fraction", 0.0, 1.0),
+        "c_m": Coefficient("corrections.modulus_factor", "modulus_factor", 0.05, 20.0),
         "k_c": Coefficient("contact.chamber_reaction", "chamber_reaction", 0.0, 100.0),
     }
 )
@@ -69,6 +70,12 @@ class FreeConstants:
     def values(self, x: Array) -> dict[str, float]:
         """Return values [SI] by quantity."""
         return dict(zip(self.quantities, (float(v) for v in x), strict=True))
+
+    def those(self, wanted: NDArray[np.bool_]) -> FreeConstants:
+        """Return some of the constants (n,)."""
+        at = np.flatnonzero(wanted)
+        names, quantities = (tuple(every[int(k)] for k in at) for every in (self.names, self.quantities))
+        return FreeConstants(names, quantities, self.start[at], self.lower[at], self.upper[at], self.scale[at])
 
     def applied(self, x: Array, material: Material, coefficients: Coefficients) -> tuple[Material, Coefficients]:
         """Return material and coefficients with these values; raises `MaterialError` where they are no material."""
