@@ -22,6 +22,7 @@ from softnlp.model.robot import ROBOTS, Robot, robot
 from softnlp.model.segments import segmented_robot
 from softnlp.mould import Moulds, MouldTable, bill, checks_of, moulds
 from softnlp.mould.checks import failed, overlap, surface_distance, thinnest
+from softnlp.mould.picture import Drawn, camera, picture
 from softnlp.mould.plates import vent_angles
 from softnlp.mould.shape import shapes_of
 from softnlp.mould.sizes import settled
@@ -229,6 +230,20 @@ def test_shrinkage_makes_moulds_larger() -> None:
     larger = shapes_of(robot("D25L40"), 1.0)[0]
     assert larger.length == pytest.approx(40 / 0.99)
     assert larger.volume() == pytest.approx(shapes_of(robot("D25L40"))[0].volume() / 0.99**3)
+
+
+def test_what_is_nearer_hides_what_is_behind() -> None:
+    """Of two plates seen from above the upper one is seen, in its colour; beside it the lower one; around them nothing."""
+    low = Drawn.of(box((-10, 10), (-10, 10), (0, 1)), (1.0, 0.0, 0.0))
+    high = Drawn.of(box((-5, 5), (-5, 5), (4, 5)), (0.0, 0.0, 1.0))
+    for things in ([low, high], [high, low]):
+        image = picture(things, 100, 100, camera(0.0, 90.0)).astype(int)
+        middle, edge, corner = image[50, 50], image[50, 10], image[1, 1]
+        assert middle[2] > 100
+        assert middle[0] == 0
+        assert edge[0] > 100
+        assert edge[2] == 0
+        assert np.all(corner == 255)
 
 
 def test_vents_are_between_chambers() -> None:

@@ -16,7 +16,7 @@ from softnlp.mould.solids import Faces, mesh_of
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
-_LIGHT = np.array([0.35, -0.5, 0.8]) / np.linalg.norm([0.35, -0.5, 0.8])
+_LIGHT = np.array([-0.45, 0.6, 0.66])  # from the left and above, along the rows of a view
 _TWICE = 2  # drawn so many times larger and averaged
 
 
@@ -72,7 +72,7 @@ def _draw(corners: Array, thing: Drawn, seen: Array, image: Array, depth: Array,
     length = np.linalg.norm(normal, axis=1)
     front = (normal @ seen[2] > 0) & (length > 0)
     corners, unit = corners[front], normal[front] / length[front, None]
-    light = 0.35 + 0.65 * np.clip(unit @ _LIGHT, 0, 1) + 0.12 * np.clip(unit @ seen[2], 0, 1)
+    light = 0.35 + 0.65 * np.clip(unit @ (_LIGHT @ seen), 0, 1) + 0.12 * np.clip(unit @ seen[2], 0, 1)
     shade = np.clip(np.array(thing.colour) * light[:, None], 0, 1)
     # Pixels whose middle is inside, row by row: first the rows of each triangle, then the pixels of each row.
     y = corners[..., 1]

@@ -109,7 +109,8 @@ def channel(sizes: Sizes, extra: float = 0.0) -> Manifold:
     middle, half = (inner + outer) / 2, NOTCH / 2 + extra
     notch = box((middle, R + LIP / 2), (-half, half), (L - 1.0, top))
     riser = cylinder(RISER + extra, L - 1.0, L + sizes.stand + 1.0, R + LIP / 2)
-    angles = vent_angles(sizes.shape)[:3]
+    every = sorted(vent_angles(sizes.shape))
+    angles = every[:: max(len(every) // 3, 1)][:3]
     return union([ring, *(turned(notch + riser, degrees(angle)) for angle in angles)])
 
 

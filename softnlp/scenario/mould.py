@@ -29,7 +29,7 @@ class MouldTable(Table):
     thread_diameter_mm : of the thread that is wound on the cores
     thread_pitch_mm : from one turn to the next
     groove_depth_mm : of the helical groove; by default half the thread; as in 0.1
-    shoulder_mm : by how much ends of cores and lumen rod are thinner in radius, at least; more where webs or play need it
+    shoulder_mm : by how much ends of cores and lumen rod are thinner in radius; more where webs or play need it
     gate_mm : bore of the pour gate; by default 4 mm, or 0.8 of the silicone's wall if that is less; as in 3.0
     vent_mm : width of the vents
     cap_mm : thickness of the end caps
