@@ -271,6 +271,28 @@ class Deviation:
 
 
 @dataclass(frozen=True, eq=False)
+class Moving:
+    """What a step of a run in time holds beside its pose.
+
+    Attributes
+    ----------
+    tip_velocity
+        (3,) world frame [m/s].
+    regulator
+        (sets,) pressures at the regulators; those of the step are in the chambers [Pa].
+    energy
+        By the names of `softnlp.dynamics.energy.Energy`, until now [J].
+    time_steps
+        How many steps of time were taken since the step before.
+    """
+
+    tip_velocity: Array
+    regulator: Array
+    energy: Mapping[str, float]
+    time_steps: int
+
+
+@dataclass(frozen=True, eq=False)
 class Step:
     """One step of a run: its input, how it ended, and the pose when it was solved.
 
@@ -306,6 +328,8 @@ class Step:
         What IPOPT said, None where it took no part.
     deviation
         Where uncertainties were given, else None.
+    moving
+        Of a run in time, else None.
     """
 
     pressure: Array
@@ -325,6 +349,7 @@ class Step:
     engine: str | None = None
     ipopt: Ipopt | None = None
     deviation: Deviation | None = None
+    moving: Moving | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -365,3 +390,9 @@ class Run:
     def failed(self) -> tuple[Step, ...]:
         """The steps that carry no solution."""
         return tuple(s for s in self.steps if not s.status.has_solution)
+
+    @property
+    def energy(self) -> dict[str, float]:
+        """The balance of energy of a run in time at its last solved step [J]; empty for any other."""
+        moving = [step.moving for step in self.steps if step.moving is not None]
+        return dict(moving[-1].energy) if moving else {}
