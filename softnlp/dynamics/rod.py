@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
 from softnlp.dynamics.grid import Grid
@@ -155,7 +156,7 @@ class Rod:
         M[:, 1:, 0], M[:, 0, 1:] = U, -U
         M[:, 1:, 1:] = -hats(U)
         A = self._eye - (self._half[:, None, :, None] * M.transpose(1, 0, 2)[None]).reshape(4 * n, 4 * n)
-        q = np.linalg.solve(A, self._first).reshape(n, 4)
+        q = scipy.linalg.lapack.dgesv(A, self._first)[2].reshape(n, 4)
         rate = np.matmul(M, q[:, :, None])[:, :, 0] / 2
         every = self.P_turn @ rate
         every[:, 0] += 1.0

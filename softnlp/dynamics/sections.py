@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -18,7 +19,8 @@ from softnlp.statics.branch import branch_function, stretch_on_branch
 
 Array = NDArray[np.float64]
 
-_ROOT = 1e-12  # of the stretch
+_ROOT = 1e-7  # of the stretch: a correction of this size leaves a millionth of it
+_KEPT = 3  # sets of pressures: those of a step that ends, and of the next one
 _MOST = 12  # iterations on it
 _TINY = 1e-6  # step of a difference quotient by the stretch
 _RAY = np.polynomial.legendre.leggauss(6)  # of an energy along a ray of resultants
@@ -79,9 +81,10 @@ _STATE = 1 + len(STIFFNESSES) + 4  # imbalance, stiffnesses, F_P, M_P, mass; the
 _EA, _EI_X, _EI_Y, _GA, _GJ = range(2, 7)
 
 
-def _stations(body: Body, grid: Grid, k: int) -> Stations:
-    model, rows = body.models[k], np.flatnonzero(grid.segment == k)
-    section, tables = model.section, body.segments[k].tables
+@lru_cache(maxsize=16)
+def _functions(model: Model) -> tuple[ca.Function, ca.Function, ca.Function | None, int]:
+    """Return what is compiled of a model's section: its branch, state and strains; and its number of chambers."""
+    section = model.section
     declared = section.quantities()
     symbols = {q.name: ca.SX.sym(q.name, q.size) for q in declared}
     P, stretch = ca.SX.sym("P", max(model.sets, 1)), ca.SX.sym("stretch")
@@ -92,21 +95,29 @@ def _stations(body: Body, grid: Grid, k: int) -> Stations:
                        state.line_density, *centres, *own)  # fmt: skip
     numbers = ca.vertcat(*symbols.values())
     values = ca.Function("values", [P, numbers, stretch], [every], {"cse": True})
+    linear = type(section).strains is Section.strains
+    strains = None if linear else _strains(section, len(state.own), len(centres))
+    return branch_function(model), values, strains, len(state.centres)
+
+
+def _stations(body: Body, grid: Grid, k: int) -> Stations:
+    model, rows = body.models[k], np.flatnonzero(grid.segment == k)
+    tables, declared = body.segments[k].tables, model.section.quantities()
+    branch, values, strains, chambers = _functions(model)
     where = [0.0] if not tables else grid.fraction[rows]
     columns = []
     for s in where:
         there = {**model.numbers, **{key: float(np.interp(s, *table)) for key, table in tables.items()}}
         columns.append(np.concatenate([np.ravel(np.asarray(there[q.name], float)) for q in declared]))
-    linear = type(section).strains is Section.strains
     return Stations(
         model=model,
         pressures=body._pressures[k],
         rows=rows,
         columns=np.array(columns).T,
-        branch=branch_function(model),
+        branch=branch,
         values=values,
-        strains=None if linear else _strains(section, len(state.own), len(centres)),
-        chambers=len(state.centres),
+        strains=strains,
+        chambers=chambers,
     )
 
 
@@ -144,7 +155,7 @@ class Sections:
         self.axes = axes
         """(segments, 3, 3) of each segment's axes in those of the base, which the rod's frame keeps."""
         self._turned = bool(np.any(turns))
-        self._last: tuple[Array, Numbers] | None = None
+        self._kept: dict[bytes, Numbers] = {}
         self._stretches: list[Array | None] = [None] * len(self.stations)
 
     @property
@@ -157,8 +168,9 @@ class Sections:
 
     def at(self, pressures: Array) -> Numbers:
         """Return the sections at pressures (sets,) [Pa]. Raises `Failed` where there is no equilibrium, or no sign."""
-        if self._last is not None and np.array_equal(self._last[0], pressures):
-            return self._last[1]
+        key = pressures.tobytes()
+        if key in self._kept:
+            return self._kept[key]
         n = self.size
         stretch, rest, slope = np.empty(n), np.empty((n, 6)), np.zeros((n, 6, 6))
         kept = []
@@ -176,7 +188,9 @@ class Sections:
         if self._turned:
             rest, slope = self._to_base(rest), self._both_to_base(slope)
         made = Numbers(stretch, rest, slope, np.asarray(np.linalg.inv(slope), float), tuple(kept))
-        self._last = np.array(pressures), made
+        self._kept[key] = made
+        while len(self._kept) > _KEPT:
+            del self._kept[next(iter(self._kept))]
         return made
 
     def _unloaded(self, own: Stations, state: Array, stretch: Array) -> tuple[Array, Array]:
@@ -225,7 +239,8 @@ class Sections:
         m = stretch.size
         columns = np.hstack([own.columns, own.columns])
         found: Array = np.asarray(own.values(P, columns, np.concatenate([stretch, stretch + _TINY])[None, :]), float)
-        return found[0].reshape(2, m)
+        both: Array = found[0].reshape(2, m)
+        return both
 
     def _to_base(self, a: Array) -> Array:
         """Turn vectors (n, 6, ...) of the segments' axes into those of the base."""

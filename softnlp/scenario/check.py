@@ -34,7 +34,10 @@ SCHEMAS: Mapping[str, type[ScenarioFile]] = {
 HOW = ": --all-errors"
 """How to see all mistakes of a file."""
 
-_TABLES = {"segment", *(name for schema in SCHEMAS.values() for name in schema.model_fields)} - {"title", "study"}
+_TABLES = {"segment", "obstacle", *(name for schema in SCHEMAS.values() for name in schema.model_fields)} - {
+    "title",
+    "study",
+}
 
 
 def parse(data: Mapping[str, Any]) -> ScenarioFile:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,17 @@ from softnlp.base.reading import shown
 from softnlp.dynamics.simulation import Dynamics
 from softnlp.scenario.data import Read, Scenario
 from softnlp.scenario.pressures import PressurePath
-from softnlp.scenario.schema import MOST_STEPS, NotNegative, Positive, PressureTable, ScenarioFile, Table, wrong
+from softnlp.scenario.schema import (
+    MOST_STEPS,
+    FileName,
+    ImportSettings,
+    NotNegative,
+    Positive,
+    ScenarioFile,
+    Table,
+    optional_keys,
+    wrong,
+)
 from softnlp.scenario.values import is_number
 from softnlp.statics.step import Run, Step
 from softnlp.studies.dynamic import dynamic
@@ -37,22 +47,20 @@ def _step(value: Any) -> float | None:
     return float(value)
 
 
-def _no_obstacle(value: Any) -> Any:
-    raise wrong("study 'dynamic' takes no obstacle so far; remove it")
-
-
-class DynamicPressureTable(PressureTable):
+class DynamicPressureTable(optional_keys({"import": ImportSettings})):  # type: ignore[misc]
     """[pressure]: exactly one of sequence_bar and file; over time, linear between rows.
 
     t_s : the time of each row of sequence_bar; two rows of one time are a jump; not needed for one row, which is held;
         as in [0.0, 0.1]
     sequence_bar : a row for each time with one pressure a set; as in [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]]
-    ramp : not used; sequence_bar with t_s says the same
     file : CSV with t_s, p1_bar, p2_bar, ..., and fx_N, fy_N, fz_N of a force at the tip; as in "pressures.csv"
     import : settings of a file as a logger wrote it; as in { "unit.pressure" = "kPa" }
     """
 
+    ramp: ClassVar[None] = None
     t_s: Annotated[list[float], Field(min_length=1, max_length=MOST_STEPS)] | None = None
+    sequence_bar: Annotated[list[list[float]], Field(min_length=1)] | None = None
+    file: FileName | None = None
 
 
 class DynamicTable(Table):
@@ -89,7 +97,6 @@ class DynamicFile(ScenarioFile):
 
     pressure: DynamicPressureTable = Field(description="a table with one of sequence_bar, file")
     dynamic: DynamicTable = DynamicTable()
-    obstacle: Annotated[Any, PlainValidator(_no_obstacle)] = Field(default=None, exclude=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +156,6 @@ def dynamic_task(given: Read) -> DynamicTask:
 def _times(table: DynamicPressureTable, steps: PressurePath) -> Array:
     """Return the time of each row [s]."""
     rows = len(steps.pressures)
-    if table.ramp is not None:
-        raise InputError("not used over time; sequence_bar with t_s says the same", table="pressure", key="ramp")
     times = steps.times
     if table.t_s is not None:
         if table.file is not None:

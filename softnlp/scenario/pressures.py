@@ -53,10 +53,11 @@ def pressure_path(table: PressureTable, sets: int, folder: Path, *, over_time: b
     InputError
         With the key (no table, no source), when not exactly one source is given or it does not fit the robot.
     """
-    given = table.written(PRESSURE_SOURCES)
+    sources = [name for name in PRESSURE_SOURCES if name in type(table).model_fields]
+    given = table.written(sources)
     if len(given) != 1:
         raise InputError(
-            f"expected exactly one of {', '.join(PRESSURE_SOURCES)}, got {' and '.join(given) or 'none'}",
+            f"expected exactly one of {', '.join(sources)}, got {' and '.join(given) or 'none'}",
             key=given[1] if given else None,
         )
     if table.sequence_bar is not None:

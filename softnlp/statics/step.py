@@ -281,7 +281,7 @@ class Moving:
     regulator
         (sets,) pressures at the regulators; those of the step are in the chambers [Pa].
     energy
-        By the names of `softnlp.dynamics.energy.Energy`, until now [J].
+        (entries,) by the names of `softnlp.dynamics.energy.Energy`, until now [J].
     time_steps
         How many steps of time were taken since the step before.
     """
@@ -393,6 +393,6 @@ class Run:
 
     @property
     def energy(self) -> dict[str, float]:
-        """The balance of energy of a run in time at its last solved step [J]; empty for any other."""
+        """(entries,) the balance of energy of a run in time at its last solved step, empty for any other [J]."""
         moving = [step.moving for step in self.steps if step.moving is not None]
         return dict(moving[-1].energy) if moving else {}

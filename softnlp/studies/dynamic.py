@@ -133,7 +133,7 @@ def _followed(
 ) -> list[str]:
     """Give each step as it is solved; return what to know of the run."""
     began, last = time.perf_counter(), -1.0
-    tolerance = min(numerics.tolerance, 1e-8) / 100
+    tolerance = min(numerics.tolerance, 1e-8) / 10
     outputs = asked.outputs
     try:
         intervals, error = chosen_intervals(body, loads, series, numerics)
