@@ -102,8 +102,7 @@ class Ledger:
                 pressure -= float(w @ more) / 2
         rate, dissipated, numerical = one.motion.strain_rate, 0.0, 0.0
         if rod.damping_s:
-            viscous = np.matmul(held[1].damping, rate[:, :, None])[:, :, 0]
-            dissipated = h * rod.damping_s * float(w @ (rate * viscous).sum(axis=1))
+            dissipated = h * float(w @ (rate * rotated(rod.viscosity, rate)).sum(axis=1))
         if isinstance(rule, Trapezoid):
             load = (acting[0].force + acting[1].force) / 2 @ (one.at.position[-1] - last.at.position[-1])
             turned = turned_by(last.at.turn[-1:], one.at.turn[-1:])

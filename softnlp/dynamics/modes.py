@@ -109,10 +109,10 @@ def vibration(rod: Rod, pressures: Array, acting: Acting, radius: float, lag: fl
     n = rod.size
     numbers = rod.sections.at(pressures)
     pose, residual = Stepper(rod).pose(numbers, acting)
-    _, N, M, _, _ = at_end(rod, numbers, pose.e, pose.at, still(n), acting)
+    _, N, M, _, _ = at_end(rod, pose.e, pose.at, still(n), acting)
     geometric = -rod.tangent(pose.at, N, M, 0.0, acting)
     mass = -rod.tangent(pose.at, N, M, 1.0, acting) - geometric
-    elastic, damping = np.linalg.inv(pose.at.compliance), rod.damping_s * numbers.damping
+    elastic, damping = np.linalg.inv(pose.at.compliance), rod.viscosity
     K, D = geometric, np.zeros((6 * n, 6 * n))
     K.reshape(n, 6, n, 6)[range(n), :, range(n)] += elastic
     D.reshape(n, 6, n, 6)[range(n), :, range(n)] += damping

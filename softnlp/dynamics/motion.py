@@ -20,6 +20,7 @@ TOLERANCE = 1e-10
 """Largest residual of a step, in EI/L^2 and EI/L."""
 _MOST = 12  # corrections of a step
 _SLOW = 0.15  # what is left by a correction with an old slope, above which a new one is made
+_ROUNDINGS = 8  # that a residual may be made of
 _LONGEST = 30  # of a correction, in the units of the residual
 _LOAD_STEPS, _FINEST = 4, 2.0**-12  # of the way to a loaded static pose
 
@@ -52,17 +53,18 @@ class Stepper:
         """Return the instant at t. Raises `Failed` where Newton's method does not arrive."""
         rod, e = self.rod, guess
         before, fresh = np.inf, False
+        enough = max(self.tolerance, _ROUNDINGS * rod.noise(rule.rate))
         for count in range(_MOST + 1):
             at = rod.placed(numbers, e)
-            balance = rule.balance(rod, numbers, e, at, acting)
+            balance = rule.balance(rod, e, at, acting)
             size = float(np.max(np.abs(balance.off)))
-            if size <= self.tolerance:
+            if size <= enough:
                 return Solved(Instant(t, e, at, balance.motion), balance, size, count)
             if not size < 1e6 or count == _MOST:
                 break
             known = self._factors is not None and self._factors[0] == rule.rate
             if not known or (size > _SLOW * before and not fresh):
-                slope = rod.slope(numbers, at, balance.N, balance.M, rule.rate, acting)
+                slope = rod.slope(at, balance.N, balance.M, rule.rate, acting)
                 self._factors = rule.rate, _factors(slope)
                 self.slopes += 1
                 fresh = True
@@ -80,13 +82,13 @@ class Stepper:
         rod, parts = self.rod, still(self.rod.size)
         for _ in range(_MOST):
             at = rod.placed(numbers, e)
-            off, N, M, _, motion = at_end(rod, numbers, e, at, parts, acting)
+            off, N, M, _, motion = at_end(rod, e, at, parts, acting)
             size = float(np.max(np.abs(off)))
             if size <= self.tolerance:
                 return Instant(0.0, e, at, motion), size
             if not size < _LONGEST:
                 break
-            e = e - _solved(_factors(rod.slope(numbers, at, N, M, 0.0, acting)), off.ravel()).reshape(-1, 6)
+            e = e - _solved(_factors(rod.slope(at, N, M, 0.0, acting)), off.ravel()).reshape(-1, 6)
         raise Failed(Status.DIVERGED, "no pose at rest was found")
 
     def pose(self, numbers: Numbers, acting: Acting) -> tuple[Instant, float]:

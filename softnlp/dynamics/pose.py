@@ -101,7 +101,7 @@ class Poses:
     def pose(self, output: Output) -> tuple[Pose, tuple[str, ...]]:
         """Return the pose of an output and what to know of it."""
         rod, numbers, at = self.rod, output.numbers, output.instant.at
-        stress = rod.stress(numbers, output.instant.e, output.instant.motion.strain_rate)
+        stress = rod.stress(output.instant.e, output.instant.motion.strain_rate)
         wall = stress + self._carried(numbers)
         shapes = [self._shape(k, at, wall, numbers) for k in range(len(self._points))]
         segments, bodies = list[SegmentPose](), self._simulation.body.segments

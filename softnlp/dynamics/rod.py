@@ -3,7 +3,7 @@
 What is solved for are the elastic resultants e at every Gauss point, force and moment in the body frame. They give
 strains, strains the shape (from the base), the shape velocities and accelerations (by a rule in time), and those the
 resultants again, from the tip: N' = rho A_0 (a - g), M' = -p' x N + R (J w' + w x J w) per length as cast. With damping
-stress is e + D times the rate of the strains.
+stress is e + D times the rate of the strains, D the stiffness as cast times a time.
 """
 
 from __future__ import annotations
@@ -139,12 +139,21 @@ class Rod:
         self.length = float(grid.ends[-1] + grid.connectors.sum())
         rest = sections.at(np.zeros(sections.body.sets)) if sections.body.sets else sections.at(np.zeros(0))
         self.at_rest = rest
-        EI = float(np.mean(rest.damping[:, [3, 4], [3, 4]]))
+        self.viscosity = damping_s * rest.stiffness
+        EI = float(np.mean(rest.stiffness[:, [3, 4], [3, 4]]))
         self.units = np.repeat([EI / self.length**2, EI / self.length], 3)
+        EA = float(np.mean(rest.stiffness[:, 2, 2]))
+        self._noise = (
+            np.finfo(float).eps * self.length**2 / EI * np.array([np.mean(self.mass) * self.length**2, damping_s * EA])
+        )
         self._eye = np.eye(4 * n)
         self._first = np.zeros(4 * n)
         self._first[::4] = 1.0
         self._half = self.P / 2
+
+    def noise(self, rate: float) -> float:
+        """Return what rounding leaves of a residual, in `units`, where rates gain so much by what is at the end."""
+        return float(self._noise @ [rate**2, rate])
 
     def turns(self, U: Array) -> tuple[Array, Array, Array]:
         """Return unit quaternions at points and tip (n + 1, 4), at connectors (m, 4), and their rates (n, 4).
@@ -190,11 +199,11 @@ class Rod:
             M = M + (1 - self.grid.beyond[:-1]) @ cross(offsets, N_tip - beyond @ f)
         return N, M
 
-    def stress(self, numbers: Numbers, e: Array, strain_rate: Array) -> Array:
+    def stress(self, e: Array, strain_rate: Array) -> Array:
         """Return (n, 6) resultants with damping, body frame."""
         if not self.damping_s:
             return e
-        found: Array = e + self.damping_s * rotated(numbers.damping, strain_rate)
+        found: Array = e + rotated(self.viscosity, strain_rate)
         return found
 
     def kinematics(self, at: Placed) -> tuple[Array, Array]:
@@ -260,13 +269,13 @@ class Rod:
         weights = np.array([np.prod([(1 - c[k]) / (c[j] - c[k]) for k in range(d) if k != j]) for j in range(d)])
         return np.array([weights @ N[(k - 1) * d : k * d] for k in self.grid.joints])
 
-    def slope(self, numbers: Numbers, at: Placed, N: Array, M: Array, rate: float, acting: Acting) -> Array:
+    def slope(self, at: Placed, N: Array, M: Array, rate: float, acting: Acting) -> Array:
         """Return (6 n, 6 n) how the residual, in `units`, follows e; rate : of a strain's rate by the strain [1/s]."""
         n = self.size
         by_strain = -self.tangent(at, N, M, rate * rate, acting)
         blocks = by_strain.reshape(n, 6, n, 6)
         if self.damping_s and rate:
-            blocks[range(n), :, range(n)] += self.damping_s * rate * numbers.damping
+            blocks[range(n), :, range(n)] += rate * self.viscosity
         found: Array = np.matmul(by_strain.reshape(6 * n, n, 1, 6), at.compliance[None])[:, :, 0].reshape(n, 6, n, 6)
         found[range(n), :, range(n)] += np.eye(6)
         found /= self.units[None, :, None, None]

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.dynamics.rod import Acting, Inertia, Motion, Placed, Rod, cross, rotated, turned_by
-from softnlp.dynamics.sections import Numbers
 
 Array = NDArray[np.float64]
 RuleName = Literal["trapezoid", "bdf2"]
@@ -44,11 +43,11 @@ class Balance(NamedTuple):
     motion: Motion
 
 
-def at_end(rod: Rod, numbers: Numbers, e: Array, at: Placed, parts: tuple[Motion, Inertia], acting: Acting) -> Balance:
+def at_end(rod: Rod, e: Array, at: Placed, parts: tuple[Motion, Inertia], acting: Acting) -> Balance:
     """Return the balance at an instant: what e gives, less what inertia and loads ask for, in the body frame."""
     motion, inertia = parts
     N, M = rod.required(at.slope, at.offsets, inertia, acting)
-    stress, R_T = rod.stress(numbers, e, motion.strain_rate), at.rotation.transpose(0, 2, 1)
+    stress, R_T = rod.stress(e, motion.strain_rate), at.rotation.transpose(0, 2, 1)
     off = np.hstack([stress[:, :3] - rotated(R_T, N), stress[:, 3:] - rotated(R_T, M)])
     return Balance(off / rod.units, N, M, inertia, motion)
 
@@ -66,7 +65,7 @@ class Trapezoid:
         """What a rate at the end gains by the quantity there [1/s]."""
         return 2 / (self.t - self.last.time)
 
-    def balance(self, rod: Rod, numbers: Numbers, e: Array, at: Placed, acting: Acting) -> Balance:
+    def balance(self, rod: Rod, e: Array, at: Placed, acting: Acting) -> Balance:
         """Return twice the mean balance over the step, in the body frame of its end."""
         last, was, c = self.last, self.last.at, self.rate
         theta = turned_by(was.turn[:-1], at.turn[:-1])
@@ -80,7 +79,7 @@ class Trapezoid:
             (acting.force + self.begun.force) / 2, (acting.moment + self.begun.moment) / 2, acting.gravity, acting.mass
         )
         N, M = rod.required((at.slope + was.slope) / 2, (at.offsets + was.offsets) / 2, inertia, mean)
-        stress = rod.stress(numbers, (e + last.e) / 2, strain_rate)
+        stress = rod.stress((e + last.e) / 2, strain_rate)
         force = rotated((at.rotation + was.rotation) / 2, stress[:, :3])
         turned, moment = rotated(was.rotation, theta), rotated(was.rotation, stress[:, 3:])
         moment = (moment + cross(turned, moment) / 2) / (1 + (theta**2).sum(axis=1) / 4)[:, None]
@@ -107,7 +106,7 @@ class Backward:
         """What a rate at the end gains by the quantity there [1/s]."""
         return -sum(self.weights)
 
-    def balance(self, rod: Rod, numbers: Numbers, e: Array, at: Placed, acting: Acting) -> Balance:
+    def balance(self, rod: Rod, e: Array, at: Placed, acting: Acting) -> Balance:
         """Return the balance at the end of the step."""
         c = self.rate
         velocity, strain_rate, spin = c * at.position, c * at.strains, np.zeros((rod.size, 3))
@@ -122,7 +121,7 @@ class Backward:
         J = rod.inertia
         turning = rotated(at.rotation, J * spin_rate + cross(spin, J * spin))
         parts = Motion(velocity, spin, strain_rate), Inertia(acceleration, turning)
-        return at_end(rod, numbers, e, at, parts, acting)
+        return at_end(rod, e, at, parts, acting)
 
 
 Rule = Trapezoid | Backward

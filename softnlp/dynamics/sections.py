@@ -40,13 +40,13 @@ class Numbers:
     """Sections of n points at one set of pressures, per length as cast; body frame, resultants (force, moment).
 
     stretch : (n,) of the pressure alone. rest : (n, 6) strains V, U without a load [1], [1/m]. compliance : (n, 6, 6)
-    their slope by the resultants without a load. damping : (n, 6, 6) its inverse. own : what `Law.strains` takes.
+    their slope by the resultants without a load. stiffness : (n, 6, 6) its inverse. own : what `Law.strains` takes.
     """
 
     stretch: Array
     rest: Array
     compliance: Array
-    damping: Array
+    stiffness: Array
     own: tuple[Array, ...]
 
 
@@ -282,7 +282,7 @@ class Sections:
 
     def resultants(self, numbers: Numbers, strains: Array) -> Array:
         """Return the resultants (n, 6) of strains (n, 6), by Newton's method."""
-        e: Array = np.matmul(numbers.damping, (strains - numbers.rest)[:, :, None])[:, :, 0]
+        e: Array = np.matmul(numbers.stiffness, (strains - numbers.rest)[:, :, None])[:, :, 0]
         for _ in range(0 if self.linear else 30):
             found, slope = self.strains(numbers, e)
             change = np.linalg.solve(slope, (strains - found)[:, :, None])[:, :, 0]

@@ -170,10 +170,12 @@ class Simulation:
         else:
             numbers = sections.at(self.chambers.at(0.0, after=False))
             begun, residual = self.stepper.pose(numbers, self.acting(0.0, after=False))
-        numbers = sections.at(self.chambers.at(0.0))
-        one = self._behind(begun, numbers)
-        ledger = Ledger(self.rod, one, numbers, self.acting(0.0), 0.0)
-        return one, numbers, residual, ledger.now.elastic if asked.start == "rest" else 0.0
+        before, numbers = numbers, sections.at(self.chambers.at(0.0))
+        if numbers is before:
+            return begun, numbers, residual, 0.0
+        one, acting = self._behind(begun, numbers), self.acting(0.0)
+        after = Ledger(self.rod, one, numbers, acting, 0.0).now.elastic
+        return one, numbers, residual, after - Ledger(self.rod, begun, before, acting, 0.0).now.elastic
 
     def _behind(self, one: Instant, numbers: Numbers) -> Instant:
         """Return an instant with the resultants behind a jump, its shape and speeds as they are."""

@@ -171,8 +171,7 @@ def chosen_intervals(
 ) -> tuple[int, float | None]:
     """Return the intervals to a segment, and the estimated error of the tip at rest with them, of the length.
 
-    It is estimated at the row of the largest pressures, by twice as many. Raises `Failed` where the pressures have no
-    equilibrium at all.
+    It is estimated at the row of the largest pressures, by twice as many; None where there is no pose at rest.
     """
     P = series[0].values
     row = int(np.argmax(P.sum(axis=1)))
@@ -186,8 +185,8 @@ def chosen_intervals(
         grid = grid_of(body, intervals)
         sections = Sections(body, grid)
         stepper = Stepper(Rod(sections, grid))
-        numbers = sections.at(P[row])
         try:
+            numbers = sections.at(P[row])
             found: Array = stepper.pose(numbers, acting)[0].at.position[-1]
             return found
         except Failed:  # a motion may go where no pose at rest is

@@ -103,7 +103,7 @@ def modes(
     rows = Series(np.zeros(1), P[None]), Series(np.zeros(1), np.zeros((1, 3)))
     try:
         intervals, _ = chosen_intervals(body, loads, rows, numerics)
-        grid = grid_of(body, 2 * intervals)
+        grid = grid_of(body, intervals)
         radius = max(float(own.outer_diameter) for own, _ in segments_of(robot)) / 2
         found = vibration(Rod(Sections(body, grid), grid, damping), P, acting, radius, lag)
     except Failed as failure:
