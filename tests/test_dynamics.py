@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 D25, RUBBER = robot("D25L60"), material("Ecoflex 00-50")
 EXACT = Numerics(accuracy=1e-9, engine="newton")
 FREE = Loads()
+FREE = Loads()
 NOTHING = Series(np.zeros(1), np.zeros((1, 3)))
 
 
