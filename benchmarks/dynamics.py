@@ -19,7 +19,7 @@ from softnlp.base.status import Status
 from softnlp.dynamics.drive import Series
 from softnlp.dynamics.grid import grid_of
 from softnlp.dynamics.rod import Rod
-from softnlp.dynamics.rules import Instant, rule
+from softnlp.dynamics.rules import rule
 from softnlp.dynamics.sections import Failed, Sections
 from softnlp.dynamics.simulation import Dynamics, Simulation
 from softnlp.model.robot import ROBOTS
@@ -51,13 +51,11 @@ def gait(seconds: float, step: float = 0.01) -> dict[str, float]:
     }
 
 
-def judged(simulation: Simulation, last: Instant, now: Instant) -> float:
-    """Return the residual of a step, evaluated again from its resultants alone with a new rod."""
-    grid = grid_of(simulation.body, simulation.intervals)
-    sections = Sections(simulation.body, grid)
-    fresh = Rod(sections, grid, simulation.asked.damping)
-    numbers = sections.at(simulation.chambers.at(now.time, after=False))
-    step = rule(simulation.asked.rule, [last], now.time, simulation.acting(last.time))
+def judged(simulation: Simulation, fresh: Rod) -> float:
+    """Return the residual of the last step, evaluated again from its resultants alone with a new rod."""
+    now, *before = simulation.recent
+    numbers = fresh.sections.at(simulation.chambers.at(now.time, after=False))
+    step = rule(simulation.asked.rule, before, now.time, simulation.acting(before[0].time))
     at = fresh.placed(numbers, now.e)
     off = step.balance(fresh, now.e, at, simulation.acting(now.time, after=False)).off
     return float(np.max(np.abs(off)))
@@ -69,11 +67,9 @@ def random_run(draw: np.random.Generator) -> dict[str, Any]:
     rubber = material(str(draw.choice(["Ecoflex 00-10", "Ecoflex 00-30", "Ecoflex 00-50", "Dragon Skin 10"])))
     made = robot(name)
     kind = str(draw.choice(["pressure", "release", "load"]))
-    rest = Rod(
-        sections := Sections(Body([Segment(made, rubber)]), grid_of(Body([Segment(made, rubber)]))),
-        grid_of(Body([Segment(made, rubber)])),
-    )
-    scale = float(rest.units[0])  # EI/L^2 [N]
+    body = Body([Segment(made, rubber)])
+    sections = Sections(body, grid_of(body))
+    scale = float(Rod(sections, grid_of(body)).units[0])  # EI/L^2 [N]
     direction = draw.random(made.chamber_sets)
     highest = 3.0 * BAR
     while highest > 0.01 * BAR:  # to the end of the branch, nearly
@@ -107,7 +103,7 @@ def random_run(draw: np.random.Generator) -> dict[str, Any]:
         release=kind == "release",
     )
     simulation = Simulation(
-        Body([Segment(made, rubber)]),
+        body,
         loads,
         asked,
         Series(np.array(times), rows),
@@ -116,23 +112,21 @@ def random_run(draw: np.random.Generator) -> dict[str, Any]:
     )
     found: dict[str, Any] = {"robot": name, "rubber": rubber.name, "kind": kind, "bar": (P / BAR).tolist()}
     found |= {"rule": asked.rule, "step": asked.step, "gravity": gravity, "status": "solved", "false": False}
-    largest, steps, began = 0.0, 0, time.perf_counter()
+    largest, again, steps, began = 0.0, 0.0, 0, time.perf_counter()
+    fresh = Rod(Sections(simulation.body, simulation.grid), simulation.grid, asked.damping)
     try:
         for output in simulation.run():
             steps += output.steps
             energy = output.energy
             largest = max(largest, output.residual)
-            if not np.isfinite(output.instant.at.position).all() or output.residual > 1e-8:
-                found["false"] = True
+            if output.steps:
+                again = max(again, judged(simulation, fresh))
+            found["false"] |= not np.isfinite(output.instant.at.position).all() or again > 1e-8
     except Failed as failure:
         found |= {"status": failure.status.value, "message": failure.message}
     else:
-        again = Sections(simulation.body, simulation.grid)
-        placed = Rod(again, simulation.grid).placed(again.at(output.pressure), output.instant.e)
-        found["moved_again"] = float(np.max(np.abs(placed.position - output.instant.at.position))) / made.length
         found["imbalance"] = abs(energy.imbalance) / max(energy.exchanged, 1e-300)
-        found["false"] |= found["moved_again"] > 1e-9 or found["imbalance"] > 0.2
-    found |= {"residual": largest, "steps": steps, "wall_s": time.perf_counter() - began}
+    found |= {"judged_again": again, "residual": largest, "steps": steps, "wall_s": time.perf_counter() - began}
     return found
 
 
@@ -154,7 +148,7 @@ def random(count: int, seed: int = 19) -> dict[str, Any]:
 
 
 def cost() -> dict[str, Any]:
-    """A step of 10 ms of the gait, and a static pose of the same robot, warm."""
+    """Time a step of 10 ms of the gait, and a static pose of the same robot, warm."""
     gait(0.2)
     moving = gait(4.0)
     P = [[0.4 * BAR * (1 + np.sin(0.06 * k)), 0.2 * BAR, 0.0] for k in range(60)]

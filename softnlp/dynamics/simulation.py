@@ -111,7 +111,8 @@ class Simulation:
     """A body driven over time.
 
     body, loads : as statics take them; of the loads force and moment act at the tip. pressures : at the regulators
-    (columns: sets). force : at the tip, beside that of the loads (3 columns) [N].
+    (columns: sets). force : at the tip, beside that of the loads (3 columns) [N]. intervals : to a segment. points : Gauss points to
+    one. refused : steps that were taken again, shorter. recent : the last instants since a jump, the last one first.
     """
 
     body: Body
@@ -124,6 +125,7 @@ class Simulation:
     tolerance: float = TOLERANCE
     refused: int = 0
     warnings: list[str] = field(default_factory=list)
+    recent: list[Instant] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         asked, body = self.asked, self.body
@@ -243,6 +245,7 @@ class Simulation:
             ledger.step(rule(asked.rule, before, t, loads[0]), now, held, loads)
             count.add(now)
             before, at = [now.instant, *before[:2]], t
+            self.recent = before
         return before, (asked.step or h)
 
     def _ends(self, a: float, b: float) -> tuple[tuple[Numbers, Numbers], tuple[Acting, Acting]]:
