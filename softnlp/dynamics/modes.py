@@ -39,12 +39,12 @@ class Mode:
     kind
         "bending", "torsion" or "extension": where most of its elastic energy is.
     shares
-        Of that energy in bending, torsion and extension (3,) [1].
+        (3,) of that energy in bending, torsion and extension [1].
     displacement
-        (n + 1, 3) of the axis at the Gauss points and the tip, world frame, the largest 1, or that of the surface by
-        torsion where that is larger [1].
+        (points, 3) of the axis at the Gauss points and, last, the tip, world frame, the largest 1, or that of the
+        surface by torsion where that is larger [1].
     rotation
-        (n, 3) in the same scale, world frame [1/m].
+        (points, 3) at the Gauss points in the same scale, world frame [1/m].
     stable
         Whether the pose does not buckle in this way.
     """
@@ -65,7 +65,7 @@ class Linear:
     Attributes
     ----------
     A, B, C, D
-        (states, states), (states, inputs), (outputs, states), (outputs, inputs).
+        (states, states), (states, inputs), (outputs, states) and (outputs, inputs) [SI].
     states, inputs, outputs
         Their names, with units.
     """
@@ -81,7 +81,23 @@ class Linear:
 
 @dataclass(frozen=True, eq=False)
 class Vibration:
-    """What is known of small motions about a pose. place : (n + 1,) of the Gauss points and the tip, of the length."""
+    """What is known of small motions about a pose.
+
+    Attributes
+    ----------
+    modes
+        Lowest first.
+    linear
+        The linear system.
+    pressure
+        (sets,) in the chambers [Pa].
+    place
+        (points,) of the Gauss points and, last, the tip, of the segments' lengths together [1].
+    tip
+        (3,) at rest, world frame [m].
+    residual
+        Of the pose, scaled [1].
+    """
 
     modes: tuple[Mode, ...]
     linear: Linear

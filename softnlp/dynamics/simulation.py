@@ -75,7 +75,7 @@ class Dynamics:
 
     @property
     def outputs(self) -> Array:
-        """The times that are kept, from 0 to the duration [s]."""
+        """The times that are kept, from 0 to the duration (outputs,) [s]."""
         count = ceil(self.duration / self.output_step - 1e-6)
         return np.append(self.output_step * np.arange(count), self.duration)
 
@@ -111,8 +111,9 @@ class Simulation:
     """A body driven over time.
 
     body, loads : as statics take them; of the loads force and moment act at the tip. pressures : at the regulators
-    (columns: sets). force : at the tip, beside that of the loads (3 columns) [N]. intervals : to a segment. points : Gauss points to
-    one. refused : steps that were taken again, shorter. recent : the last instants since a jump, the last one first.
+    (columns: sets). force : at the tip, beside that of the loads (3 columns) [N]. intervals : to a segment. points :
+    Gauss points to one. refused : steps that were taken again, shorter. recent : the last instants since a jump, the
+    last one first.
     """
 
     body: Body

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.figures.body import body_panel
 from softnlp.figures.series import LEAST_SPAN, new_panels
@@ -56,7 +57,7 @@ def dynamic_figure(view: RunView, moving: MovingView) -> Figure:
 
 
 def _tip(axes: Axes, view: RunView, moving: MovingView) -> None:
-    plain(axes, "time [s]", "tip moved by [mm]")
+    plain(axes, OUTPUTS["t"].axis, "tip moved by [mm]")
     first = moving.tip[view.solved[0]] if view.solved else np.zeros(3)
     moved = (moving.tip - first) / MILLIMETRE
     for k, name in enumerate("xyz"):
@@ -71,7 +72,7 @@ def _tip(axes: Axes, view: RunView, moving: MovingView) -> None:
 
 
 def _pressures(axes: Axes, view: RunView, moving: MovingView) -> None:
-    plain(axes, "time [s]", "pressure [bar]")
+    plain(axes, OUTPUTS["t"].axis, "pressure [bar]")
     for k in range(view.pressure.shape[1]):
         chamber, regulator = view.pressure[:, k] / BAR, moving.regulator[:, k] / BAR
         axes.plot(view.time, chamber, color=colour(k), linewidth=1.4, label=f"set {k + 1}")  # type: ignore[arg-type]
@@ -80,7 +81,7 @@ def _pressures(axes: Axes, view: RunView, moving: MovingView) -> None:
 
 
 def _energies(axes: Axes, view: RunView, moving: MovingView) -> None:
-    plain(axes, "time [s]", "energy [mJ]")
+    plain(axes, OUTPUTS["t"].axis, "energy [mJ]")
     largest = max(float(np.nanmax(np.abs(values), initial=0.0)) for values in moving.energy.values())
     for k, name in enumerate((*_ENERGIES, *_WORKS)):
         values = moving.energy[name]
