@@ -111,6 +111,8 @@ def hostile(folder: Path) -> dict[str, Path]:
 
     put("line.csv", b"1,2," + b"3" * 5_000_000)
     put("columns.csv", b",".join(b"%d" % k for k in range(100_000)))
+    put("blanks.csv", b"t_s,p1_bar\n0,1\n1,2\n" + (b"3,4" + b"," * 300_000 + b"\n") * 9)
+    put("rows.csv", b"t_s,p1_bar\n" + b"\n" * 10_000_001)
     put("nul.csv", b"t,p1\n0,1\n" + b"\0" * 100_001)
     put("spaces.csv", b"length" + b" " * 300_000 + b"9\nx,y,z\n" + b"1e7,2e7,3e7\n" * 9)
     put("counts.csv", b"counts per N" + b" " * 300_000 + b"x\nFx,Fy,Fz\n" + b"1,2,3\n" * 9)

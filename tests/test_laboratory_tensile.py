@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 from laboratory_files import FOLDER, SPECIMEN, check_of, imported
 
+from softnlp import material, run_scenario
 from softnlp.base.errors import InputError
 from softnlp.cli import main
+from softnlp.cli.example import shipped_folder
 from softnlp.laboratory.choices import AskError, settings_from_words
-from softnlp.laboratory.signals import break_row, legs
+from softnlp.laboratory.signals import break_row
+from softnlp.scenario.read import load_scenario
+from softnlp.studies.cycles import legs
 
 
 def modulus(**settings: object) -> float:
@@ -138,6 +142,22 @@ def test_a_setting_against_the_file_is_not_silent(tmp_path: Path) -> None:
     assert imported(file, unit__Load="mN", accept="shear-modulus-of-the-data").columns["stress_MPa"][-1] < 1e-4
 
 
+def test_a_crosshead_is_not_taken_before_an_extensometer(tmp_path: Path) -> None:
+    rows = np.column_stack([26 * (STRETCH - 1), STRETCH - 1, 8 * STRESS])
+    assert modulus(file=machine(tmp_path, "Crosshead,Extensometer,Load\nmm,mm/mm,N", rows), **SPECIMEN) == (
+        pytest.approx(0.03, rel=1e-3)
+    )
+
+
+@pytest.mark.parametrize(
+    ("moved", "message"), [(25 * (1 - STRETCH), "the stretch only falls"), (25 * STRETCH + 80, "looks like a slack")]
+)
+def test_a_position_that_is_no_extension_is_named(moved: np.ndarray, message: str, tmp_path: Path) -> None:
+    file = machine(tmp_path, "Position (mm),Load (N)", np.column_stack([moved, 8 * STRESS]))
+    with pytest.raises(InputError, match=message):
+        imported(file, **SPECIMEN)
+
+
 def test_two_lengths_are_asked_for(tmp_path: Path) -> None:
     preamble = "Grip to grip separation (mm),50\nGauge length (mm),25\n"
     rows = np.column_stack([50 * (STRETCH - 1), 8 * STRESS])
@@ -208,6 +228,14 @@ def test_toe_tare_and_preload(tmp_path: Path) -> None:
     assert imported(tared, **SPECIMEN, tare=0.05, preload_N=0.005).columns["stretch"][0] == 1.0
 
 
+def test_a_small_preload_is_warned_of_and_noise_is_not(tmp_path: Path) -> None:
+    name, random = "stress at stretch 1, relative to the largest,", np.random.default_rng(2)
+    noise = np.clip(random.standard_normal(STRETCH.size), -2, 2) * 0.02 * STRESS.max()
+    for more, verdict in ((0.018 * STRESS.max(), "warned"), (noise, "passed")):
+        file = machine(tmp_path, "Extension (mm),Load (N)", np.column_stack([25 * (STRETCH - 1), 8 * (STRESS + more)]))
+        assert check_of(imported(file, **SPECIMEN), name).verdict == verdict
+
+
 WRONG = {
     "kN as N": ("Extension (mm),Load (N)", {**SPECIMEN}, "shear modulus of the data is 3e-05"),
     "kPa as MPa": ("Stretch,Stress (MPa)", {}, "stress in kPa"),
@@ -242,6 +270,7 @@ def test_a_wrong_reading_is_stopped_by_name(name: str, tmp_path: Path) -> None:
         ("true", "true stress"),
         ("cycles", "several load cycles"),
         ("failure", "the points after the break is 5"),
+        ("up to failure", "the largest stretch is 8.84, expected 1.1 to 3: the whole test, perhaps to failure"),
         ("area", "left at 1"),
         ("area alone", "left at 1"),
     ],
@@ -255,6 +284,7 @@ def test_a_wrong_reading_of_a_renamed_file_is_warned_by_name(
         "true": ("strain,stress_MPa", four[four[:, 3] < 1.2][:, [3, 2]]),
         "cycles": ("displacement_mm,force_N", cyclic[:, 1:3]),
         "failure": ("strain,stress_MPa", four[:, 3:5]),
+        "up to failure": ("strain,stress_MPa", four[: np.argmax(four[:, 4]) + 1, 3:5]),
         "area alone": ("stretch,stress_MPa", np.column_stack([STRETCH, 8 * STRESS])),
         "area": ("stretch,stress_MPa,force_N", np.column_stack([STRETCH, 8 * STRESS, 8 * STRESS])),
     }[name]
@@ -296,6 +326,14 @@ def test_legs_and_breaks() -> None:
         ("Strain (%),Stress (kgf/cm2)", (100, 1 / 8 / 0.0980665), {}),
         ("Hencky strain (1),Stress (true) (MPa)", (None, None), {}),
         ("Stretch (%),Stress (kPa)", (0, 1e3 / 8), {}),
+        ("Extensometer (%),Load (N)", (100, 1), {}),
+        ("Nominelle Dehnung,Kraft\nmm,N", (25, 1), {"gauge_length_mm": 25}),
+        ("Distance (mm),Force (gf)", (25, 1e3 / 9.80665), {"gauge_length_mm": 25}),
+        ("Déplacement (mm),Force (N)", (25, 1), {"gauge_length_mm": 25}),
+        ("Déformation (%),Contrainte (kPa)", (100, 1e3 / 8), {}),
+        ("Deformation,Force (N)", (25, 1), {"gauge_length_mm": 25, "unit.Deformation": "mm"}),
+        ("Desplazamiento (mm),Fuerza (N)", (25, 1), {"gauge_length_mm": 25}),
+        ("Allungamento [mm],Carico [N]", (25, 1), {"gauge_length_mm": 25}),
     ],
 )
 def test_units_of_machines(
@@ -308,6 +346,13 @@ def test_units_of_machines(
     file = machine(tmp_path, header, np.column_stack(columns))
     found = imported(file, **{key.replace(".", "__"): value for key, value in {"area_mm2": 8, **settings}.items()})
     assert found.numbers["shear_modulus_MPa"] == pytest.approx(0.03, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["Deformation", "Dehnung", "Elongation"])
+def test_what_may_be_in_mm_or_percent_is_asked(name: str, tmp_path: Path) -> None:
+    file = machine(tmp_path, f"{name},Load (N)", np.column_stack([25 * (STRETCH - 1), 8 * STRESS]))
+    with pytest.raises(AskError, match=f"column '{name}' has no unit"):
+        imported(file, **SPECIMEN)
 
 
 @pytest.mark.parametrize("unit", ["kgx", "Nn"])
@@ -341,12 +386,22 @@ def test_columns_that_are_not_used_are_named(tmp_path: Path) -> None:
         ("eps,sig (MPa)", "do not tell what it is; say --as tensile, pressure, tips, force"),
         ("Extension (mm),Load (N),p1 (bar)", "could be tensile or pressure; say --as"),
         ("x_mm,y_mm,z_mm,Fx (N),Fy (N),Fz (N)", "could be tips or force; say --as"),
+        ("lambda,P (MPa)", "could be tensile or pressure; say --as"),
     ],
 )
 def test_kinds_that_are_both_possible_are_asked_for(header: str, message: str, tmp_path: Path) -> None:
     rows = np.column_stack([STRETCH] * len(header.split(",")))
     with pytest.raises(AskError, match=message):
         imported(machine(tmp_path, header, rows))
+
+
+def test_the_shipped_file_of_a_machine_gives_the_silicone_that_it_was_made_with() -> None:
+    fit = run_scenario(load_scenario(shipped_folder() / "identify" / "machine_test.toml"))
+    assert len(fit.stretch) == 33  # the first of three cycles
+    assert fit.fits["mooney-rivlin"].misfit.rmse == pytest.approx(200, rel=0.3)  # the noise [Pa]
+    stretch = np.linspace(1, 1.8, 9)
+    found, true = fit.fits["mooney-rivlin"].material, material("Ecoflex 00-50")
+    np.testing.assert_allclose(found.engineering_stress(stretch), true.engineering_stress(stretch), atol=200)
 
 
 def test_a_law_that_does_not_follow_the_data_is_warned_of(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from softnlp.base.errors import InputError
-from softnlp.laboratory.cells import is_number, number
+from softnlp.laboratory.cells import is_number, number, numbers
 from softnlp.laboratory.choices import AskError, Choices, settings_from_words
 from softnlp.laboratory.table import RawTable
 from softnlp.laboratory.text import text_table
@@ -126,6 +126,11 @@ def test_numbers_in_cells() -> None:
     assert number("1,234.5", ".") == 1234.5
     assert not is_number("1_5", ".")
     assert not is_number("0,500", ".")
+    for cells, decimal in ((["1,5", "1.234"], ","), (["1.5", "1_5"], ".")):
+        values, wrong = numbers(cells, decimal)
+        assert values[0] == 1.5
+        assert np.isnan(values[1])
+        assert wrong == 1
 
 
 def test_settings_are_toml_or_plain_words() -> None:

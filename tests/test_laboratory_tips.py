@@ -11,6 +11,7 @@ from laboratory_files import FOLDER, TRUTH, check_of, imported
 from scipy.spatial.transform import Rotation
 
 from softnlp.laboratory.choices import AskError
+from softnlp.laboratory.poses import motion_axis
 from softnlp.laboratory.signals import lag_between, plateaus
 
 EM = TRUTH["tracker_em_two_sensors.csv"]
@@ -137,6 +138,8 @@ def test_forces_lose_their_bias_and_take_the_pressures_of_plateaus() -> None:
     both = imported("force_torque_counts.csv", "pressure_log_mbar_absolute.csv")
     np.testing.assert_allclose(both.columns["fx_N"], -0.9 * both.columns["p1_bar"], atol=0.01)
     assert both.rows == 11
+    warned = [check.name for check in both.checks if check.verdict == "warned"]
+    assert warned == ["offset between two clocks of a file", "lag between two files"]  # not that two sets push nothing
 
 
 def test_a_log_without_header_and_one_of_labview() -> None:
@@ -169,6 +172,16 @@ def test_plateaus_and_lags_of_a_known_signal() -> None:
     assert [len(rows) for rows in plateaus(response)] == [16] * 10
     lag, error, quality = lag_between(time, response, time + 0.4, levels)
     assert abs(lag - 0.4) <= max(error, 0.05)
+    assert quality > 0.99
+
+
+def test_the_lag_of_a_long_record_with_short_plateaus_is_found() -> None:
+    random = np.random.default_rng(1)
+    time = 0.5 * np.arange(4000)
+    held = random.choice([0, 0.4, 0.8, 1.2], size=(1001, 3))[(time / 2).astype(int)]
+    response = held @ random.uniform(-20, 20, (3, 3)) + random.normal(scale=0.2, size=(4000, 3))
+    lag, error, quality = lag_between(time, response, time + 7.3, held)
+    assert abs(lag - 7.3) <= error <= 0.5
     assert quality > 0.99
 
 
@@ -231,6 +244,25 @@ def test_a_robot_that_is_not_along_z_is_named(tip: np.ndarray, up: str, turn: fl
         again = imported(str(tmp_path / "tips.csv"), up=up)
         assert [check_of(again, name).verdict for name in names] == ["passed"] * 2
         np.testing.assert_allclose(tips(again), tip, atol=0.2)
+
+
+def test_two_tips_tell_no_axis() -> None:
+    assert motion_axis(np.array([[0.0, 0.0, 0.06], [0.02, 0.0, 0.05]]), np.array([0.0, 0.0, 0.06])) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "step"),
+    [("ms", 0.0, 50.0), ("Unix Time", 1.74e9, 0.05), ("Time", 45720.0, 0.05 / 86400), ("Temps (s)", 0.0, 0.05)],
+)
+def test_clocks_have_many_names_and_counts(name: str, first: float, step: float, tmp_path: Path) -> None:
+    file = log_file(tmp_path, [f"{first + k * step:.15g}" for k in range(100)], name, LOG + 373)
+    time = np.genfromtxt(imported(file).csv().splitlines(), delimiter=",", names=True)["t_s"]
+    np.testing.assert_allclose(time - time[0], 0.05 * np.arange(100), atol=2e-4)
+
+
+def test_a_small_level_at_rest_is_warned_of(tmp_path: Path) -> None:
+    found = imported(log_file(tmp_path, [f"{k / 10}" for k in range(100)], "Time (s)", LOG - 580))
+    assert check_of(found, "level at which all sets rest").verdict == "warned"
 
 
 def test_a_robot_that_only_grows_longer_is_not_turned_round(tmp_path: Path) -> None:

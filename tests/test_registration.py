@@ -13,8 +13,11 @@ import pytest
 from laboratory_files import FOLDER, TRUTH
 from scipy.spatial.transform import Rotation
 
+from benchmarks.identify_data import BASE, OFFSET
 from softnlp import BAR, Coefficients, Loads, Measurements, Numerics, compare, forward, identify, material, robot
+from softnlp import run_scenario as run
 from softnlp.base.errors import InputError
+from softnlp.cli.example import shipped_folder
 from softnlp.results.comparison import comparison_document, rows_text
 from softnlp.scenario.compare import compare_task, run_compare
 from softnlp.scenario.read import load_scenario
@@ -79,6 +82,16 @@ def test_a_mirrored_order_is_named_where_the_frame_is_fitted() -> None:
     assert any("mirror image" in words for words in said(simulated(order=(0, 2, 1), placed=placed), Loads(), WORLD))
 
 
+def test_two_sets_that_are_swapped_are_turned_by_half_a_turn_too_and_both_are_named() -> None:
+    two = replace(robot("D25L60"), chamber_sets=2)
+    P = BAR * np.array([[0, 0], [0.5, 0], [1, 0], [0, 0.4], [0, 0.8], [0.3, 0.9], [1, 0.5]])
+    run = forward(two, SILICONE, P, coefficients=TRUE, numerics=NEWTON)
+    tips = np.array([step.pose.tip_position for step in run.steps if step.pose is not None])
+    (message,) = (w for w in said(Measurements(two, P[:, ::-1], tip_position=tips), NONE) if "clock of the sets" in w)
+    assert "clock_deg = 180.0" in message.replace("-180.0", "180.0")
+    assert "set_order = [2, 1], which leaves as little" in message
+
+
 def test_one_plane_of_bending_leaves_the_place_across_it_open_and_says_what_to_measure() -> None:
     P = BAR * np.column_stack([np.linspace(0, 1.2, 9), np.zeros((9, 2))])
     run = forward(robot("D25L60"), SILICONE, P, coefficients=TRUE, numerics=NEWTON)
@@ -86,8 +99,8 @@ def test_one_plane_of_bending_leaves_the_place_across_it_open_and_says_what_to_m
     rows = Measurements(
         robot("D25L60"), P, tip_position=tips + np.random.default_rng(0).normal(scale=1e-4, size=(9, 3))
     )
-    asked = Registration(fit=("frame", "tip_offset"))
-    fit = identify(rows, SILICONE, ["k_b"], registration=asked, numerics=NEWTON)
+    fit = identify(rows, SILICONE, ["k_b"], registration=WORLD)
+    assert fit.ipopt is not None  # which agrees on what the rows do tell
     errors = dict(zip(fit.free.names, fit.uncertainty.standard_errors, strict=True))
     assert np.isinf(errors["tip_offset_y"])
     assert abs(fit.constants[0] - 2.2) < 3 * errors["k_b"] < 1.0  # which is known all the same
@@ -121,6 +134,13 @@ def test_frame_place_and_constants_are_found_together() -> None:
     R = Rotation.from_euler("ZYX", truth["euler_ZYX_deg"], degrees=True)
     assert (R.inv() * Rotation.from_matrix(fit.registration.rotation)).magnitude() < np.deg2rad(1)
     assert fit.ipopt is not None  # it closed the joint problem
+
+
+def test_the_shipped_files_of_a_tracker_and_a_logger_give_what_they_were_made_with() -> None:
+    fit = run(load_scenario(shipped_folder() / "identify" / "tracked_tips.toml"))
+    errors = fit.uncertainty.standard_errors
+    assert np.all(np.abs(fit.constants[:2] - [0.55, 2.2]) < 2 * errors[:2])
+    assert np.all(np.abs(1e3 * (fit.constants[5:11]) - [*BASE[1], *OFFSET]) < 2 * 1e3 * errors[5:11])
 
 
 def test_the_same_rows_ten_times_change_nothing() -> None:

@@ -37,6 +37,15 @@ def test_a_pose_that_six_sets_reach_takes_the_least_pressures(tmp_path: Path) ->
     assert abs(still @ P) < 2e-3 * np.linalg.norm(P)
 
 
+@pytest.mark.slow
+def test_a_shape_that_a_body_can_take_is_looked_for_where_the_first_ones_cross_themselves(tmp_path: Path) -> None:
+    thin = segment('name = "D10L60"', "Ecoflex 00-30")
+    target = '[target]\ntip_position_mm = [[10.0, 0.0, 90.0]]\n[solver]\nengine = "newton"\n'
+    (found,) = solved(tmp_path, scenario([thin, thin], "", target, study="inverse"))
+    assert (found["status"], found["self_intersecting"]) == ("solved", False), found["message"]
+    np.testing.assert_allclose(found["tip_position_mm"], [10, 0, 90], atol=1e-6 * 120)
+
+
 def test_bounds_beyond_the_last_pressure_of_a_segment_are_refused(tmp_path: Path) -> None:
     bounds = "[stiffening]\nelongation = 0.0\n[bounds]\npressure_bar = [0, 50]\n"
     more = "[target]\ntip_position_mm = [[4.0, 3.0, 65.0]]\n" + bounds
@@ -81,6 +90,19 @@ def test_the_blocked_force_of_two_halves_is_that_of_the_whole(tmp_path: Path) ->
             assert a["length_error_mm"] == pytest.approx(b["length_error_mm"], abs=1e-5)
         assert two[1]["blocked_force_N"] > 0.1
         assert two[1]["stable"] is None
+
+
+def test_a_wall_of_segments_stands_also_where_the_last_pressure_has_no_shape(tmp_path: Path) -> None:
+    """The wall stands where the free shape goes, of which a thousandth of the pressure tells as much."""
+    law = 'model = "soft"\nformula = "0.03 * (stretch - 1) - 0.01 * (stretch - 1) ** 2"\n'
+    soft = BASE.split("[segment.material]")[0] + f'[segment.material]\nname = "soft"\n{law}'
+    wall = '[contact]\nclosure = "free"\n[solver]\nengine = "newton"\n'
+    rows = "[0.02, 0, 0, 0, 0, 0], [9, 0, 0, 0, 0, 0]"
+    held, beyond = solved(tmp_path, scenario([soft, TOP], rows, wall, "blocked-force"))
+    assert held["blocked_force_N"] > 1e-3
+    assert held["wall_normal"] == pytest.approx([1, 0, 0], abs=1e-9)
+    assert beyond["status"] in ("unstable_material", "no_equilibrium")
+    assert beyond["message"].count("segment 1") == 1
 
 
 def test_a_wall_takes_closure_free_with_segments(tmp_path: Path) -> None:

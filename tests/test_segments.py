@@ -91,6 +91,10 @@ REFUSED = [
         segment("name = \"D25L60\"\nouter_diameter_mm = {s = [0, 1], value = [25, 25, 25]}"),
         "expected as many values as s has, 2, got 3",
     ),
+    (
+        segment(f"name = \"D25L60\"\nouter_diameter_mm = {{s = {[k / 60 for k in range(61)]}, value = {[25] * 61}}}"),
+        "segment.1.robot.outer_diameter_mm: expected at most 50 fractions of the length, got 61",
+    ),
 ]  # fmt: skip
 
 

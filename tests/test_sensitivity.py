@@ -539,6 +539,8 @@ def _loads(document: dict[str, list[dict[str, object]]]) -> Loads:
         (["--tolerance", "length_mm"], "expected NAME=VALUE"),
         (["--tolerance", "length_mm=x"], "length_mm: expected a number, got 'x'"),
         (["--tolerance", "length_mm=-1"], "expected a number that is not negative"),
+        (["--tolerance", "length_mm=1e300"], "length_mm: expected at most 1e+06, got 1e300"),
+        (["--tolerance", "length_mm=1e300%"], "length_mm: expected at most 10 (1000%), got 1e300%"),
         (["--tolerance", "force_N=1%"], "force_N: expected a number and no percentage"),
         (["--samples", "1"], "--samples: expected 0, or at least 2"),
     ],

@@ -167,6 +167,18 @@ def test_sets_scatter_as_their_constants_do(tmp_path: Path) -> None:
     assert_total(step, parts, 3e-3)
 
 
+def test_one_uniform_segment_scatters_as_the_robot_that_it_is(tmp_path: Path) -> None:
+    path = scenario_file(tmp_path, 'material = "sets"')
+    whole = to_json(run_scenario(load_scenario(path)))["steps"]
+    text = (
+        path.read_text().replace("[robot]", "[[segment]]\n[segment.robot]").replace("[material]", "[segment.material]")
+    )
+    path.write_text(text)
+    one = to_json(run_scenario(load_scenario(path)))["steps"]
+    assert [step["std"] for step in one] == [step["std"] for step in whole]
+    assert one[-1]["std"]["bending_angle_deg"] > 1
+
+
 def test_a_blocked_force_scatters_with_silicone_wall_and_closure(tmp_path: Path) -> None:
     text = "material = 0.1\noffset_mm = 0.3\nchamber_reaction = 0.2\nchamber_wall_mm = 0.03\npressure_bar = '1%'"
     path = scenario_file(tmp_path, text, WALL.format("compliant"), "blocked-force")
@@ -317,6 +329,9 @@ def test_a_tip_that_only_touches_and_one_that_does_not(tmp_path: Path) -> None:
         ('force_N = "3%"', "[uncertainty] force_N: expected a number, and no percentage of what may be 0"),
         ("chamber_reaction = 0.1", "[uncertainty] chamber_reaction: unknown name"),
         ("C01_MPa = 0.1", "[uncertainty] C01_MPa: unknown name; did you mean"),
+        ("material = 11", "[uncertainty] material: expected at most 10 (1000%), got 11"),
+        ("length_mm = 1e300", "[uncertainty] length_mm: expected at most 1e+06, got 1e+300"),
+        ('chamber_wall_mm = "2000%"', "[uncertainty] chamber_wall_mm: expected at most 10 (1000%), got '2000%'"),
     ],
 )
 def test_what_is_no_uncertainty_is_one_line(tmp_path: Path, text: str, line: str) -> None:

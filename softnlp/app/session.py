@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from softnlp.app.document import START, Document
 from softnlp.app.live import LivePoses
 from softnlp.base.errors import InputError, located
-from softnlp.base.reading import LARGEST_TOML, one_line, read_bytes, read_text, shown
+from softnlp.base.reading import IMPORTED, LARGEST_TOML, one_line, read_bytes, read_text, shown
 from softnlp.base.units import BAR
 from softnlp.model.segments import require_one_segment
 from softnlp.scenario.check import SCHEMAS
@@ -52,7 +52,7 @@ def checked_content(name: str, content: bytes) -> bytes:
 
     That one names further files. A page reads what was dropped, and not what else the machine of its server has.
     """
-    if name.endswith(".import.toml"):
+    if name.endswith(IMPORTED):
         raise InputError(f"{shown(name)} names further files; take the CSV of the import, or import those files here")
     if len(content) > LARGEST_FILE:
         size = len(content) / 1e6

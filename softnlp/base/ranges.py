@@ -91,6 +91,7 @@ TIME = Range("time", "s", -1e12, 1e12)
 WEIGHT = Range("weight of a closure", "", 1e-9, 1e9)
 ROW_WEIGHT = Range("weight of a measured row", "", 0, 1e9)
 DEVIATION = Range("standard deviation", "", 1e-9, 1e6)
+LARGEST_SHARE = 10.0  # of what scatters, as a fraction
 ACCURACY = Range("accuracy", "of L_0", 1e-12, 1e-2)
 TOLERANCE = Range("tolerance", "", 1e-14, 1e-4)
 
@@ -152,6 +153,12 @@ def range_of(*keys: str) -> Range | None:
         if found is not None:
             return READING if re.fullmatch(r"p\d+_bar", path[k]) else found
     return None
+
+
+def too_uncertain(size: float, share: bool) -> str:
+    """Return what a standard deviation, in the unit of files or a fraction, is expected to be, "" where it is that."""
+    most = LARGEST_SHARE if share else DEVIATION.high
+    return "" if size <= most else f"expected at most {most:g}{f' ({100 * most:g}%)' if share else ''}"
 
 
 def without_noise(readings: Array) -> Array:

@@ -16,6 +16,7 @@ from softnlp.base.errors import InputError, nearest
 LONGEST_QUOTE = 60
 LONGEST_NAME = 200  # of a key or a file
 LARGEST_DATA, LARGEST_TOML = 64_000_000, 1_000_000  # bytes of a file
+IMPORTED = ".import.toml"  # what the name of an import's recipe ends with
 DEEPEST = 16  # keys, tables and lists within each other
 BACKSLASH_HINT = "a backslash in \"…\" begins an escape; write a path in single quotes '…' or with /"
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from softnlp.base.errors import InputError
+from softnlp.base.reading import IMPORTED
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, say, say_rows
 from softnlp.cli.study import Json
 
@@ -52,11 +53,11 @@ def import_(
     """
     from softnlp.laboratory.choices import settings_from_words
     from softnlp.laboratory.importing import import_files
-    from softnlp.laboratory.recipe import SUFFIX, read_recipe, write_import
+    from softnlp.laboratory.recipe import read_recipe, write_import
 
     files += tuple(Path(word) for word in set_ if "=" not in word)  # --set takes all the words behind it
     settings = settings_from_words(word for word in set_ if "=" in word)
-    if len(files) == 1 and files[0].name.endswith(SUFFIX):
+    if len(files) == 1 and files[0].name.endswith(IMPORTED):
         recipe = read_recipe(files[0])
         if as_ not in (None, recipe.kind):
             raise InputError(f"expected {recipe.kind!r}, as in {files[0]}", key="--as")

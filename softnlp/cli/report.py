@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from softnlp.base.reading import IMPORTED
 from softnlp.cli.console import say
 from softnlp.cli.figures import draw
 
@@ -54,7 +55,7 @@ def _imports(asked: Scenario) -> dict[str, str]:
     import tomllib
 
     tables = [table for table in tomllib.loads(asked.text).values() if isinstance(table, dict)]
-    named = [table["file"] for table in tables if str(table.get("file", "")).endswith(".import.toml")]
+    named = [table["file"] for table in tables if str(table.get("file", "")).endswith(IMPORTED)]
     paths = {name: asked.path.parent / name for name in named}
     return {f"Conversion {name}": path.read_text(encoding="utf-8") for name, path in paths.items() if path.is_file()}
 

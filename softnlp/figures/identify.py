@@ -9,7 +9,9 @@ import numpy as np
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.units import KILOPASCAL
 from softnlp.figures.style import GREY, INK, PALE, TEXT, colour, in_own_style, legend, new_figure, plain, user_text
+from softnlp.studies.identified import constants_text, file_name
 from softnlp.studies.measurements import OBSERVABLES, column_slice
+from softnlp.studies.registration import NAMES as REGISTRATION_NAMES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -72,8 +74,10 @@ def identified_figure(found: Identified, title: str) -> Figure:
     """Draw the model before and after against what was measured, a panel an observable and a marker a robot."""
     shown = [key for key in OBSERVABLES if key in found.errors()]
     width = 0.9 + 4.1 * len(shown)
-    pairs = zip(found.free.names, found.constants, strict=True)
-    constants = ", ".join(f"{n} = {v:.4g}" + (found.notes[n] and f" ({found.notes[n]})") for n, v in pairs)
+    pairs = [(n, v) for n, v in zip(found.free.names, found.constants, strict=True) if n not in REGISTRATION_NAMES]
+    told = [constants_text([file_name(n, found.material)], np.array([v])) for n, v in pairs]
+    notes = (found.notes[n] for n, _ in pairs)
+    constants = ", ".join(words + (note and f" ({note})") for words, note in zip(told, notes, strict=True))
     figure = new_figure(max(width, 6.5), 5.0, title, constants)
     step = 1.0 / len(shown)
     robots = [sum(bool(np.any(np.isfinite(d.of(key)))) for d in found.data) for key in shown]

@@ -36,17 +36,21 @@ def is_grouped(cell: str, decimal: str) -> bool:
 def number(cell: str, decimal: str) -> float:
     """Return the number of a cell, nan where it is missing or none."""
     text = cell.strip()
-    if not text or not is_number(text, decimal):
-        return float("nan")
     if _GROUPED[decimal].fullmatch(text):
         text = _GROUPS.sub("", text.replace("," if decimal == "." else ".", ""))
+    elif not _PLAIN[decimal].fullmatch(text):
+        return float("nan")
     return float(text.replace(",", ".") if decimal == "," else text)
 
 
 def numbers(cells: Sequence[str], decimal: str) -> tuple[Array, int]:
     """Return a column of cells as numbers, nan where there is none, and how many cells are wrong."""
-    plain = [cell.replace(",", ".") for cell in cells] if decimal == "," else cells
+    commas = decimal == ","
     try:
+        every = "".join(cells)
+        if "_" in every or (commas and "." in every):  # which Python's float would take
+            raise ValueError
+        plain = [cell.replace(",", ".") for cell in cells] if commas else cells
         values = np.fromiter(map(float, plain), float, len(cells))
     except ValueError:
         values = np.array([number(cell, decimal) for cell in cells])

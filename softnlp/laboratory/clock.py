@@ -18,7 +18,8 @@ from softnlp.studies.check import Check
 Array = NDArray[np.float64]
 
 _NAMES = (
-    r"^(test |elapsed |relative |run |rel\.? ?)?(time|zeit|t|x_value|seconds|timestamp|time ?stamp|(milli|micro)s)\b"
+    r"^((test|elapsed|relative|run|unix|epoch|total|sample|log|system|recording|rel\.?)[ _]?)?"
+    r"(time|zeit|temps|tiempo|tempo|tijd|t|x_value|seconds|timestamp|time ?stamp|(milli|micro)s|m?s$)\b"
 )
 _PARTS = (("hour", 3600.0), ("minute", 60.0), ("second", 1.0), (r"ms|millisecond", 1e-3))
 _RATES = (0.1, 5000.0)  # samples a second that a laboratory's logger takes
@@ -60,14 +61,14 @@ def _seconds(table: RawTable, k: int, choices: Choices) -> Array | None:
     if known is not None:
         return _past_midnight(known, table, choices)
     plain: Array = table.columns[k]
-    for word, scale in (("millis", 1e-3), ("micros", 1e-6)):
+    for word, scale in (("millis", 1e-3), ("micros", 1e-6), ("ms", 1e-3), ("s", 1.0)):
         if table.names[k].lower() == word:
             return np.asarray(plain * scale)
     steps = np.diff(plain[np.isfinite(plain)])
     step = float(np.median(steps)) if steps.size else 0.0
     if not step > 0:
         return None
-    known_units = [(u, UNITS[u].scale) for u in ("s", "ms", "us", "ns")]
+    known_units = [(u, UNITS[u].scale) for u in ("day", "s", "ms", "us", "ns")]
     likely = [(unit, scale) for unit, scale in known_units if _RATES[0] <= 1 / (step * scale) <= _RATES[1]]
     if len(likely) != 1:
         raise AskError(

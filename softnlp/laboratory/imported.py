@@ -48,9 +48,9 @@ class Imported:
         return tuple(told(check) for check in self.checks if check.verdict == "warned")
 
     def csv(self) -> str:
-        """Return the columns as the project's CSV; a number has ten digits."""
+        """Return the columns as the project's CSV; a number has ten digits, seconds since 1970 have more."""
         table = np.column_stack(list(self.columns.values()))
-        form = ",".join(["%.10g"] * table.shape[1])
+        form = ",".join("%.15g" if size > 1e6 else "%.10g" for size in np.nanmax(np.abs(table), axis=0))
         parts = [",".join(self.columns)]
         for first in range(0, len(table), _CHUNK):  # a list of all numbers would take ten times their memory
             parts.append("\n".join(form % tuple(row) for row in table[first : first + _CHUNK].tolist()))

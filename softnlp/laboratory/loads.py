@@ -30,9 +30,8 @@ _SETTLED = 0.2  # of the spread of a plateau: the first one stands for the bias
 
 def force_columns(table: RawTable) -> list[int]:
     """Return the columns of the three components of a force, or of the one that there is."""
-    found = [
-        k for axis in "xyz" for k in table.named(rf"^(force[ _]?)?f?[ _]?{axis}$") if "f" in table.names[k].lower()
-    ]
+    every = [k for axis in "xyz" for k in table.named(rf"^((force|kraft)[ _]?)?f?[ _]?{axis}$")]
+    found = [k for k in every if "f" in table.names[k].lower()]
     return found if len(found) == 3 else table.named(r"^(force|load|kraft|f)$")[:1]
 
 

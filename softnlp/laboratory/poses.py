@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 _POSITION = re.compile(r"^(?:tip[ _.]?|pos(?:ition)?[ _.]?|t|p)?([xyz])(?:[ _.]?(\w{1,12}))?$", re.IGNORECASE)
 _TURN = r"q(?:uat(?:ernion)?)?|rotation|orientation"
-_QUATERNION = re.compile(rf"^(?:{_TURN})[ _.]?([ow0-4xyzrs])(?:[ _.]?(\w{{1,12}}))?$", re.IGNORECASE)
+_QUATERNION = re.compile(rf"^(?:{_TURN})[ _.:/]?([ow0-4xyzrs])(?:[ _.]?(\w{{1,12}}))?$", re.IGNORECASE)
 _PREFIXED = re.compile(
     rf"^(.+?)[ _.:/]+(?:pos(?:ition)?[ _.:/]+)?(t?[xyz]|q[ow0-4xyz]|(?:{_TURN})[ _.:/][wxyz])$", re.IGNORECASE
 )
@@ -305,6 +305,8 @@ def motion_axis(position: Array, rest: Array) -> tuple[Array, bool] | None:
     Tips that bend all around lie on a cap, thin along the robot, which rises towards the rest tip; those of one plane
     tell its normal, which the robot is across. None where they tell neither.
     """
+    if len(position) < 3:
+        return None
     centred = position - position.mean(axis=0)
     _, size, axes = np.linalg.svd(centred, full_matrices=False)
     size = size / max(size[0], 1e-30)

@@ -26,7 +26,7 @@ _NAMES = r"^(p|pressure|press|druck|ch|chamber|valve|actuator|sensor)[ _#-]?\(?(
 _WORDS = r"(?<!com)press|(?<![a-z])druck|chamber|valve|actuator|supply|regulator|^p\b|^p_|^ch"
 _COMMAND = r"set ?point|set|command|cmd|soll|target|desired|ref"
 _ATMOSPHERE = (0.85, 1.08)  # [bar]: of the air where people live
-_AT_REST = 0.1  # [bar]: sets that rest at more than this, all of them, are hardly at 0
+_AT_REST = (0.05, 0.1)  # [bar]: sets that rest at more, all of them, are hardly at 0; are not
 _HIGHEST = 6.0  # [bar]: what drives no silicone robot
 _UNITS = ("mbar", "kPa", "bar", "psi", "Pa")
 
@@ -79,7 +79,7 @@ def import_pressure(tables: Sequence[RawTable], choices: Choices) -> Imported:
         lag, error, _ = lag_between(other_time, other, time, pressures)
         lag = float(choices.take("lag_s", round(lag, 4), f"the two logs then go together; taken off {tables[0].file}"))
         time = time - lag
-        checks.append(lag_check(lag))
+        checks.append(lag_check(lag, error))
         numbers |= {"lag_s": lag, "lag_error_s": error}
     deadband = choices.number("deadband_bar")
     if deadband is not None:
@@ -221,22 +221,22 @@ def _gauge(values: Array, choices: Choices) -> Array:
 def _rest_check(gauge: Array, choices: Choices) -> Check:
     """Return the check of the level at which all sets rest [bar], which is that of the air, so 0 where it is gauge."""
     level = float(np.min(np.nanpercentile(gauge, 5, axis=0)))
-    usual = (-_AT_REST, _AT_REST)
-    asked = choices.used.get("zero")
-    if asked == "gauge":  # a person knows that none of them goes to 0
-        usual = (-_AT_REST, max(_AT_REST, level))
+    usual, most = _AT_REST
+    if choices.used.get("zero") == "gauge":  # a person knows that none of them goes to 0
+        usual = most = max(usual, level)
     likely = (
         "neither 0, as a gauge shows at rest, nor the pressure of the air: --set zero=absolute where the air has so "
         f"little, high up; zero=tare, or zero={level:.4g}, where a sensor or regulator rests there; zero=gauge where "
         "no set goes to 0"
     )
-    return Check("level at which all sets rest", level, usual, (-np.inf, usual[1]), likely, "bar")
+    return Check("level at which all sets rest", level, (-usual, usual), (-np.inf, most), likely, "bar")
 
 
-def lag_check(lag: float) -> Check:
-    """Return the check of how much later one clock reads than another [s]."""
+def lag_check(lag: float, error: float) -> Check:
+    """Return the check of how much later one clock reads than another, and of the error of that [s]."""
     likely = "the clocks differ by this; it was taken off the time of the pressures"
-    return Check("lag between two files", lag, (-0.01, 0.01), ANY, likely, "s")
+    least = max(0.01, error)
+    return Check("lag between two files", lag, (-least, least), ANY, likely, "s")
 
 
 def _level_checks(pressures: Array) -> list[Check]:

@@ -11,13 +11,21 @@ from typing import Any
 
 from softnlp.base.errors import InputError, located, nearest
 from softnlp.base.files import make_folder, write_whole
-from softnlp.base.reading import LARGEST_TOML, LONGEST_NAME, one_line, read_bytes, read_text, shown, toml_tables
+from softnlp.base.reading import (
+    IMPORTED,
+    LARGEST_TOML,
+    LONGEST_NAME,
+    one_line,
+    read_bytes,
+    read_text,
+    shown,
+    toml_tables,
+)
 from softnlp.laboratory.choices import flat
 from softnlp.laboratory.formats import LARGEST
 from softnlp.laboratory.imported import Imported
 from softnlp.laboratory.importing import KINDS, import_files
 
-SUFFIX = ".import.toml"
 _KEYS = ("kind", "files", "sha256", "settings", "registration")
 _NOT_KEPT = ("as", "format")
 
@@ -108,7 +116,7 @@ def write_import(imported: Imported, name: Path, folder: Path = Path(), force: b
     InputError
         Where one of them stands there already and is not to be replaced, or is a file of the import itself.
     """
-    made = name.with_name(f"{name.name}.csv"), name.with_name(f"{name.name}{SUFFIX}")
+    made = name.with_name(f"{name.name}.csv"), name.with_name(f"{name.name}{IMPORTED}")
     sources = {(folder / file).resolve() for file in imported.files}
     for path in made:
         if path.resolve() in sources:

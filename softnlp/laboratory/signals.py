@@ -1,10 +1,9 @@
-"""Signals of any kind: load cycles, the break, static plateaus, and the lag between two clocks."""
+"""Signals of any kind: the break of a specimen, static plateaus, and the lag between two clocks."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,39 +11,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
-_TURN = 0.1  # of the range: a smaller fall is noise and no turn
 _BROKEN = 0.5  # of the largest stress: what is left of it after a break
 _HELD, _RELAXED = 2e-3, 0.02  # of the range of the stretch, and of the largest stress
 _TRIED_ON = 4000  # samples on which a lag is looked for first
 _CHANGED = 0.05  # of the range: a step between two plateaus
 _NOISE = 6.0  # standard deviations of the change between samples
-
-
-class Leg(NamedTuple):
-    """Rows first to before `end` over which a quantity rises, or falls."""
-
-    first: int
-    end: int
-    rising: bool
-
-
-def legs(values: Array) -> list[Leg]:
-    """Return the loadings and unloadings of a test, by the turns that are larger than a tenth of its range."""
-    span = float(np.ptp(values)) * _TURN
-    found: list[Leg] = []
-    first = turn = 0
-    rising: bool | None = None
-    for k, value in enumerate(values):
-        if rising is None:
-            if abs(value - values[first]) > span:
-                rising, turn = bool(value > values[first]), k
-        elif (value >= values[turn]) == rising or value == values[turn]:
-            turn = k if value != values[turn] else turn
-        elif abs(value - values[turn]) > span:
-            found.append(Leg(first, turn + 1, rising))
-            first, rising, turn = turn, not rising, k
-    found.append(Leg(first, len(values), True if rising is None else rising))
-    return found
 
 
 def break_row(stress: Array) -> int:
@@ -106,60 +77,77 @@ def plateaus(signals: Array, shortest: int = 3) -> Iterator[Rows]:
             yield np.arange(first + cut, end - cut)
 
 
+class Commands:
+    """The commands of a log: time (m,) [s], columns (sets, m), and between which samples they step."""
+
+    def __init__(self, time: Array, command: Array) -> None:
+        self.time = time
+        self.columns = np.ascontiguousarray(command.T)  # sums along a set are ten times as fast as across
+        limits = np.array([max(_NOISE * np.sqrt(2) * noise(c), 0.02 * float(np.ptp(c))) for c in self.columns])
+        steps = np.any(np.abs(np.diff(self.columns, axis=1)) > limits[:, None], axis=0)
+        self.steps: NDArray[np.bool_] = steps & bool(np.mean(steps) <= 0.5)  # none of one that moves all the time
+        self.stepping = bool(np.any(self.steps))
+        self.counted = np.cumsum(self.steps)
+        holds = np.diff(time[1:][self.steps])
+        usual = 3 * float(np.median(np.diff(time)))
+        self.hold = float(np.median(holds[holds > usual])) if np.any(holds > usual) else np.inf
+        self.least = 0.02 * max(float(np.max(np.ptp(self.columns, axis=1))), 1e-30)
+
+
 def lag_between(time: Array, response: Array, command_time: Array, command: Array) -> tuple[float, float, float]:
     """Return how much later the clock of a command reads than that of a response [s], its uncertainty, and R^2.
 
     time : (n,). response : (n, channels) of one unit. command_time : (m,). command : (m, sets). The lag is the shift at
-    which the commands, as a linear map, `explained` the most of the response; the two share half of the shorter record.
+    which the commands, as a linear map, explain the most of the response; the two share half of the shorter record.
     """
     half = min(np.ptp(time), np.ptp(command_time)) / 2
     low, high = command_time[0] - time[-1] + half, command_time[-1] - time[0] - half
-    step = max(min(float(np.median(np.diff(time))), float(np.median(np.diff(command_time)))) / 2, (high - low) / 2000)
-    tried = np.arange(low, high + step, step)
+    sampled = min(float(np.median(np.diff(time))), float(np.median(np.diff(command_time)))) / 2
     some, few = (slice(None, None, 1 + len(time) // most) for most in (_TRIED_ON, 10 * _TRIED_ON))
     thin = slice(None, None, 1 + len(command) // (10 * _TRIED_ON))
-    command_time, command = command_time[thin], command[thin]
-    steps = stepping(command)
-    quality = np.array([explained(time[some], response[some], command_time - lag, command, steps) for lag in tried])
-    fine = tried[int(np.argmax(quality))] + np.linspace(-2, 2, 41) * step
-    sharp = np.array([explained(time[few], response[few], command_time - lag, command, steps) for lag in fine])
-    good = fine[sharp >= sharp.max() - 1e-9 - 0.02 * (1 - sharp.min())]
-    return float(np.mean(good)), float(max(np.ptp(good) / 2, step / 2)), float(sharp.max())
+    commands = Commands(command_time[thin], command[thin])
+    # of a long record as finely as its plateaus need, and then around the best
+    step = max(sampled, (high - low) / 10_000, min((high - low) / 2000, commands.hold / 3))
+    tried = np.arange(low, high + step, step)
+    quality = np.array([explained(time[some], response[some], commands, lag) for lag in tried])
+    best = tried[int(np.argmax(quality))]
+    while True:
+        fine = best + np.linspace(-2, 2, 41) * step
+        sharp = np.array([explained(time[few], response[few], commands, lag) for lag in fine])
+        good = fine[sharp >= sharp.max() - 1e-9 - 0.02 * (1 - sharp.min())]
+        if step <= 2 * sampled or np.ptp(good) > step:
+            break
+        best, step = float(np.mean(good)), step / 10
+    between = sum(float(np.median(np.diff(clock))) for clock in (time[few], commands.time))
+    error = max(np.ptp(good), step, between) / 2
+    return float(np.mean(good)), float(error), float(sharp.max())
 
 
-def stepping(command: Array) -> NDArray[np.bool_]:
-    """Return between which samples a command (m, sets) steps, nowhere for one that moves all the time."""
-    limits = np.array([max(_NOISE * np.sqrt(2) * noise(c), 0.02 * float(np.ptp(c))) for c in command.T])
-    found: NDArray[np.bool_] = np.any(np.abs(np.diff(command, axis=0)) > limits, axis=1)
-    return found & bool(np.mean(found) <= 0.5)
-
-
-def explained(
-    time: Array, response: Array, command_time: Array, command: Array, steps: NDArray[np.bool_] | None = None
-) -> float:
+def explained(time: Array, response: Array, commands: Commands, lag: float) -> float:
     """Return the part of a response that commands explain as a linear map, but for samples at which they step.
 
     It is R^2 adjusted for how many levels the commands hold (Theil 1961): four levels of three sets explain anything. 0
-    where the two share less than half of the shorter record. steps : as `stepping` finds them.
+    where the two share less than half of the shorter record. lag : how much later the clock of the commands reads [s].
     """
-    shared = min(time[-1], command_time[-1]) - max(time[0], command_time[0])
-    if shared < 0.49 * min(np.ptp(time), np.ptp(command_time)):
+    time, known = time + lag, commands.time
+    shared = min(time[-1], known[-1]) - max(time[0], known[0])
+    if shared < 0.49 * min(np.ptp(time), np.ptp(known)):
         return 0.0
-    steps = stepping(command) if steps is None else steps
-    at = np.clip(np.searchsorted(command_time, time, side="right") - 1, 0, len(steps) - 1)
-    inside = (time >= command_time[0]) & (time <= command_time[-1]) & ~steps[at]
+    at = np.clip(np.searchsorted(known, time, side="right") - 1, 0, len(commands.steps) - 1)
+    inside = (time >= known[0]) & (time <= known[-1]) & ~commands.steps[at]
     if np.sum(inside) < 10:
         return 0.0
-    P = np.column_stack([np.interp(time[inside], command_time, c) for c in command.T])
-    P = P[:, np.ptp(P, axis=0) > 0.02 * max(float(np.max(np.ptp(command, axis=0))), 1e-30)]
-    levels = 1 + int(np.sum(np.diff(np.cumsum(steps)[at[inside]]) > 0)) if np.any(steps) else len(P)
-    free = levels - 1 - P.shape[1]
-    y = response[inside] - response[inside].mean(axis=0)
+    P = np.array([np.interp(time[inside], known, column) for column in commands.columns])
+    P = P[np.ptp(P, axis=1) > commands.least]
+    levels = 1 + int(np.sum(np.diff(commands.counted[at[inside]]) > 0)) if commands.stepping else P.shape[1]
+    free = levels - 1 - len(P)
+    y = response[inside].T
+    y = y - y.mean(axis=1, keepdims=True)
     total = float(np.sum(y**2))
-    if free < 1 or not P.shape[1] or not total > 0:
+    if free < 1 or not len(P) or not total > 0:
         return 0.0
-    A = np.column_stack([np.ones(len(P)), P / np.ptp(P, axis=0)])  # with squares another lag fits as well
-    left = y - A @ np.linalg.lstsq(A.T @ A, A.T @ y, rcond=None)[0]  # of numbers near 1: faster, and exact enough
+    A = np.vstack([np.ones(P.shape[1]), P / np.ptp(P, axis=1, keepdims=True)])  # with squares another lag fits as well
+    left = y - np.linalg.lstsq(A @ A.T, A @ y.T, rcond=None)[0].T @ A  # of numbers near 1: faster, and exact enough
     return float(max(0.0, 1 - np.sum(left**2) / total * (levels - 1) / free))
 
 

@@ -19,9 +19,9 @@ _AREA = r"\barea\b|cross.?section|querschnitt"
 _MARKED = r"gauge|l0|messl"  # labels of what is stretched, and of nothing else
 _LABELS: Mapping[str, Sequence[str]] = {
     "gauge_length": (r"gauge", r"^(specimen |sample )?length", r"l0|messl"),
-    "diameter": (r"^(specimen |sample )?diameter",),
-    "width": (r"^(specimen |sample )?width",),
-    "thickness": (r"^(specimen |sample )?thickness",),
+    "diameter": (r"^(specimen |sample )?diameter|^(proben)?durchmesser",),
+    "width": (r"^(specimen |sample )?width|^(proben)?breite",),
+    "thickness": (r"^(specimen |sample )?thickness|^(proben)?dicke",),
 }
 _SLENDER = 10.0  # widths: a dumbbell's gauge length is 2 to 7 of its narrow width, the whole of it 12 to 20 (ISO 37)
 

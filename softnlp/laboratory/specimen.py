@@ -21,12 +21,14 @@ from softnlp.studies.plausibility import SHEAR_MODULUS, area_check, divisor_chec
 Array = NDArray[np.float64]
 
 DISPLACEMENT = (
-    r"extension|disp(?![a-z])|displac|crosshead|position|stroke|travel|traverse|elongation|standardweg|^weg|verl[aä]ngerung|"
-    r"^d$|^delta ?l$"
+    r"extension|extensomet|disp(?![a-z])|displac|crosshead|position|stroke|travel|traverse|elongation|distance|^d$|"
+    r"^delta ?l$|standardweg|^weg|verl[aä]ngerung|verformung|d[eé]form|d[eé]placement|desplaz|spostam|verplaats|"
+    r"allung|alarg"
 )
-_FORCE = r"load|force|kraft|^last|^f[yz]?$"
-_STRAIN, _STRESS, _STRETCH = r"strain|dehnung", r"stress|spannung|^sigma", r"stretch|lambda"
-ALONG, ACROSS = rf"{DISPLACEMENT}|{_STRAIN}|{_STRETCH}", rf"{_STRESS}|{_FORCE}"
+_FORCE = r"load|force|kraft|^last|^f[yz]?$|fuerza|forza|carga|carico|kracht"
+_STRAIN, STRETCH = r"strain|dehnung", r"stretch|lambda"
+_STRESS = r"stress|spannung|^sigma|contrainte|esfuerzo|sforzo"
+ALONG, ACROSS = rf"{DISPLACEMENT}|{_STRAIN}|{STRETCH}", rf"{_STRESS}|{_FORCE}"
 _TRUE = r"true|cauchy|wahre|hencky|(?<![a-z])(?:ln|log(?:arithm\w*)?)(?![a-z])"
 _GREEN, _RATE = r"green|lagrang", r"rate|limit|pacing|almansi"
 _COMPRESSION = r"compress|druck(spannung|kraft)"
@@ -119,12 +121,16 @@ def curve_of(table: RawTable, choices: Choices) -> Curve:
 def _stretch(table: RawTable, choices: Choices, missing: list[str]) -> tuple[Array | None, list[Check]]:
     """Return the stretch, and the check of the crosshead against a strain where the file has both."""
     moved = table.named(DISPLACEMENT, f"{_STRAIN}|{_RATE}")
-    ratios = [k for k in moved if _is_ratio(table, k, choices)]  # an elongation in percent is a strain
-    strains = [*table.named(_STRAIN, f"{_TRUE}|{_GREEN}|{_RATE}"), *ratios]
+    strains = table.named(_STRAIN, f"{_TRUE}|{_GREEN}|{_RATE}")
+    # an elongation in percent is a strain, and a strain in mm an elongation
+    ratios = [k for k in moved if _kind(table, k, choices, "displacement") == "ratio"]
+    lengths = [k for k in strains if _kind(table, k, choices, "strain") == "length"]
+    strains = [k for k in strains if k not in lengths] + ratios
+    moved = [k for k in moved if k not in ratios] + lengths
     columns = {
-        "stretch": one_column(table, "stretch", table.named(_STRETCH), choices),
+        "stretch": one_column(table, "stretch", table.named(STRETCH), choices),
         "strain": one_column(table, "strain", strains, choices),
-        "displacement": one_column(table, "displacement", [k for k in moved if k not in ratios], choices),
+        "displacement": one_column(table, "displacement", moved, choices),
         "true strain": one_column(table, "true strain", table.named(rf"(?=.*({_TRUE})).*({_STRAIN})", _RATE), choices),
         "Green strain": one_column(table, "Green strain", table.named(rf"({_GREEN}).*({_STRAIN})", _RATE), choices),
     }
@@ -168,11 +174,11 @@ def _stretch(table: RawTable, choices: Choices, missing: list[str]) -> tuple[Arr
     return stretch, [] if crosshead is None else _crosshead_check(crosshead, stretch)
 
 
-def _is_ratio(table: RawTable, k: int, choices: Choices) -> bool:
-    """Whether a column of an extension is over a length, by its unit or the one that a person gives it."""
-    asked = choices.given.get(f"unit.{table.names[k]}", choices.given.get("unit.displacement"))
+def _kind(table: RawTable, k: int, choices: Choices, role: str) -> str:
+    """Return what a column measures, by its unit or the one that a person gives it, "" where neither tells."""
+    asked = choices.given.get(f"unit.{table.names[k]}", choices.given.get(f"unit.{role}"))
     unit = table.units[k] if asked is None else unit_named(str(asked))
-    return unit is not None and unit.kind == "ratio"
+    return "" if unit is None else unit.kind
 
 
 def _require_tension(table: RawTable, k: int) -> None:
@@ -232,7 +238,7 @@ def _strain(
             if 0.5 < ratio / UNITS[unit].scale < 2:
                 choices.take("unit.strain", unit, "it then agrees with the displacement over the gauge length")
                 return plain * UNITS[unit].scale
-    if largest > 12:
+    if largest > 12 and "strain" in table.names[k].lower():  # Dehnung may be in mm
         choices.take("unit.strain", "%", f"it goes to {largest:.4g}, and no silicone to that stretch")
         return plain * UNITS["%"].scale
     plain_one, percent = (float(_stretch_of(np.array(largest * scale), chosen)) for scale in (1.0, 0.01))
@@ -249,7 +255,7 @@ def _stress(
     """Return the engineering stress [Pa], and the checks of what the machine divided by."""
     columns = {
         "engineering stress": one_column(table, "stress", table.named(_STRESS, f"{_TRUE}|{_RATE}"), choices),
-        "force": one_column(table, "force", table.named(_FORCE, f"{_RATE}|cell"), choices),
+        "force": one_column(table, "force", table.named(_FORCE, f"{_RATE}|cell|peak"), choices),
         "true stress": one_column(table, "true stress", table.named(rf"(?=.*({_TRUE})).*({_STRESS})"), choices),
     }
     known = [name for name, k in columns.items() if k is not None]

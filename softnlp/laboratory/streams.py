@@ -13,7 +13,7 @@ from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.clock import day_start
 from softnlp.laboratory.imported import ANY, require_possible
 from softnlp.laboratory.pressure import lag_check, pressures_of
-from softnlp.laboratory.signals import changes, explained, lag_between, plateaus
+from softnlp.laboratory.signals import Commands, changes, explained, lag_between, plateaus
 from softnlp.laboratory.table import RawTable
 from softnlp.studies.check import Check
 
@@ -41,7 +41,7 @@ def with_pressures(
     time = columns["t_s"]
     lag, error = choices.number("lag_s", -1e9), 0.0
     if lag is not None:
-        quality = explained(time, response, command_time - lag, pressures)
+        quality = explained(time, response, Commands(command_time, pressures), lag)
     else:
         lag, error, quality = lag_between(time, response, command_time, pressures)
         if quality < _SURE:
@@ -51,13 +51,14 @@ def with_pressures(
         lag = choices.take("lag_s", round(lag, 4), f"the pressures then explain {100 * quality:.1f} % of what moved")
     checks += _shared_checks(time, command_time - lag, (table, log))
     require_possible(checks, choices)
-    checks += _change_checks(time, response, command_time - lag, pressures)
+    changed = _change_checks(time, response, command_time - lag, pressures)
+    checks += changed if "x_mm" in columns else changed[:1]  # a force need not answer to every set
     rest = {name: column for name, column in columns.items() if name != "t_s"}
     rows, values = _rows(time, command_time - lag, pressures, response, choices)
     found = {"t_s": np.array([time[r].mean() for r in rows])}
     found |= {f"p{k + 1}_bar": column for k, column in enumerate(values.T)}
     found |= {name: np.array([column[r].mean() for r in rows]) for name, column in rest.items()}
-    checks.append(lag_check(float(lag)))
+    checks.append(lag_check(float(lag), error))
     likely = (
         "the pressures do not move what was measured: another experiment, another lag_s, or too few plateaus to tell"
     )

@@ -13,17 +13,17 @@ from softnlp.base.reading import shown
 from softnlp.base.units import MEGAPASCAL
 from softnlp.laboratory.choices import AskError, Choices
 from softnlp.laboratory.imported import ANY, Imported, require_possible
-from softnlp.laboratory.signals import Leg, break_row, enclosed_area, legs, relaxing
-from softnlp.laboratory.specimen import ACROSS, ALONG, Curve, curve_of, specimens
+from softnlp.laboratory.signals import break_row, enclosed_area, relaxing
+from softnlp.laboratory.specimen import ACROSS, ALONG, STRETCH, Curve, curve_of, specimens
 from softnlp.laboratory.table import RawTable
 from softnlp.studies.check import Check
-from softnlp.studies.plausibility import curve_checks, stiffness_checks
+from softnlp.studies.cycles import CYCLES, Leg, legs
+from softnlp.studies.plausibility import LARGEST_STRETCH, curve_checks, stiffness_checks
 
 Array = NDArray[np.float64]
 
-_LONG, _POSSIBLE = 3.0, 12.0  # a test between these is cut to the range where robots are; beyond, it is no stretch
+_POSSIBLE = 12.0  # what is stretched further than usual up to here is cut to where robots are; beyond, it is no stretch
 _USUAL = (1.0, 2.0)
-_CYCLES = ("first loading", "unloading", "all")
 
 
 def import_tensile(tables: Sequence[RawTable], choices: Choices) -> Imported:
@@ -66,13 +66,15 @@ def _used(curve: Curve, choices: Choices) -> tuple[Curve, dict[str, float], int]
     every = legs(curve.stretch)
     loadings = [leg for leg in every if leg.rising]
     unloadings = [leg for leg in every if not leg.rising]
+    if not loadings:
+        raise InputError("the stretch only falls: a test in compression, or extension and force have the other sign")
     asked = choices.get("cycle")
     if asked is None:
         reason = f"{len(loadings)} loadings; the first is that of a new specimen" if len(loadings) > 1 else ""
-        asked = choices.take("cycle", _CYCLES[0], reason) if reason else _CYCLES[0]
+        asked = choices.take("cycle", CYCLES[0], reason) if reason else CYCLES[0]
     if asked == "all":
         chosen = Leg(0, len(curve.stretch), True)
-    elif asked == "first loading" and loadings:
+    elif asked == "first loading":
         chosen = loadings[0]
     elif asked == "unloading" and unloadings:
         chosen = unloadings[0]
@@ -133,7 +135,7 @@ def _held_check(parts: Sequence[Curve], choices: Choices) -> Check:
 def _cut(stretch: Array, stress: Array, choices: Choices) -> tuple[Array, Array]:
     """Return the points within the range of stretch that is asked for."""
     limits = choices.numbers("stretch", 2)
-    if limits is None and _LONG < np.max(stretch) <= _POSSIBLE:
+    if limits is None and LARGEST_STRETCH[0][1] < np.max(stretch) <= _POSSIBLE and np.min(stretch) < _USUAL[1]:
         reason = f"the test goes to {np.max(stretch):.3g}; robots stretch less, and a law fits the range it is used in"
         limits = choices.take("stretch", list(_USUAL), f"{reason}; stretch=[1, {np.max(stretch):.3g}] takes it all")
     if limits is None:
@@ -198,4 +200,5 @@ def _without_toe(stretch: Array, stress: Array, toe: object, choices: Choices) -
 
 def is_tensile(table: RawTable) -> bool:
     """Whether a table is of a testing machine: a stretch and a stress, or an extension and a force."""
-    return bool(table.named(ALONG)) and bool(table.named(ACROSS, r"rate|cell"))
+    pressure = any(unit is not None and unit.kind == "pressure" for unit in table.units)  # perhaps a stress P
+    return bool(table.named(ALONG) and table.named(ACROSS, r"rate|cell")) or bool(table.named(STRETCH) and pressure)

@@ -14,6 +14,7 @@ from collections import Counter, deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
+from sys import intern
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ _LONGEST_LINE = 1_000_000
 _SAMPLE_LINES, _SAMPLE = 600, 400_000
 _CHUNK = 20_000
 _PREAMBLE = 200  # lines above a repeated header
+_MOST_ROWS = 10_000_000
 _NEARLY = 0.9  # of the best score: another reading that is as likely
 _WHITE = 0.9  # of the score of a reading by spaces, which text has too
 
@@ -112,6 +114,8 @@ def text_table(label: str, content: bytes, choices: Choices) -> RawTable:
         For binary data, a line or a row that is too long, or no rows of numbers.
     """
     encoding = encoding_of(content, choices)
+    if max(content.count(b"\n"), content.count(b"\r")) > _MOST_ROWS:
+        raise InputError(f"expected at most {_MOST_ROWS} rows, got more; thin them, or cut the file")
     lines = _sample(content, encoding)
     block = _decided(lines, choices)
     choices.note("separator", SEPARATORS[block.dialect.separator])
@@ -211,8 +215,7 @@ def _blocks(lines: Sequence[Sequence[str]], dialect: Dialect) -> Iterator[Block]
     run: list[tuple[int, tuple[str, ...]]] = []
     best: list[tuple[int, tuple[str, ...]]] = []
     for k, row in enumerate([*map(tuple, lines), ("end",)]):
-        while row and not row[-1]:
-            row = row[:-1]
+        row = row[: len(row) - next((j for j, cell in enumerate(reversed(row)) if cell), len(row))]
         if not row:
             continue
         if len(row) > MOST_COLUMNS:
@@ -262,40 +265,60 @@ def _columns(
     later: list[list[list[str]]] = []
     notes_above: deque[list[str]] = deque(maxlen=_PREAMBLE)
     pieces: list[list[Any]] = [[] for _ in range(width + 1)]
-    wrong = repeat = 0
+    wrong = repeat = notes = 0
     numeric = [_is_numeric(block, k) for k in range(width)]
+    names = [name for name in header if name]
     while chunk := list(islice(rows, _CHUNK)):
-        kept, repeats, notes = [], [], 0
-        for row in chunk:
-            if len(row) > width:
-                if any(row[width:]):
-                    raise InputError(f"expected at most {width} columns as above, got a row of {len(row)}")
-                row = row[:width]
-            if row and row[0][:1].isalpha():
+        table, repeats = _of_width(chunk, width), np.full(len(chunk), repeat)
+        told = [k for k in _doubtful(table, numeric, block.dialect.decimal) if _is_note(table[k], numeric)]
+        for k in told:
+            row = [cell.strip() for cell in table[k]]
+            if row[0][:1].isalpha():
                 notes_above.append(row)
-            count = sum(1 for cell, is_one in zip(row, numeric, strict=False) if is_one and cell[:1] in _BEGINS)
-            if not count or _begins_with_word(row, numeric):
-                if header and [c for c in row if c] == [n for n in header if n]:
-                    repeat += 1
-                    later.append(list(notes_above))
-                    notes_above.clear()
-                notes += any(row)
-                continue
-            kept.append(row + [""] * (width - len(row)) if len(row) < width else row)
-            repeats.append(repeat)
-        choices.drop(notes, "rows of text between the numbers")
-        if not kept:
-            continue
-        for k, column in enumerate(zip(*kept, strict=True)):
+            if names and [c for c in row if c] == names:
+                repeat += 1
+                repeats[k:] = repeat
+                later.append(list(notes_above))
+                notes_above.clear()
+            notes += any(row)
+        for k in reversed(told):
+            del table[k]
+        pieces[width].append(np.delete(repeats, told).astype(float))
+        for k, column in enumerate(zip(*table, strict=True)):
             if numeric[k]:
                 values, bad = numbers(column, block.dialect.decimal)
                 pieces[k].append(values)
                 wrong += bad
             else:
-                pieces[k].append(list(column))
-        pieces[width].append(np.array(repeats, float))
+                pieces[k].append([intern(cell.strip()) for cell in column])  # each word of a state once
+    choices.drop(notes, "rows of text between the numbers")
     choices.drop(wrong, "cells that are no number")
     return pieces, later
+
+
+def _of_width(rows: list[list[str]], width: int) -> list[list[str]]:
+    """Return rows of one width; raises `InputError` for one that holds more."""
+    if set(map(len, rows)) == {width}:
+        return rows
+    for row in rows:
+        if any(cell.strip() for cell in row[width:]):
+            raise InputError(f"expected at most {width} columns as above, got a row of {len(row)}")
+    return [row[:width] + [""] * (width - len(row)) for row in rows]
+
+
+def _doubtful(rows: Sequence[Sequence[str]], numeric: Sequence[bool], decimal: str) -> list[int]:
+    """Return which rows may be no data: those without a number in the first column that has numbers."""
+    first = next((k for k, is_one in enumerate(numeric) if is_one), 0)
+    values, _ = numbers([row[first] for row in rows], decimal)
+    return [int(k) for k in np.flatnonzero(np.isnan(values))]
+
+
+def _is_note(row: Sequence[str], numeric: Sequence[bool]) -> bool:
+    """Whether a row has no number in a column of numbers, or begins with a word there."""
+    cells = [cell.strip() for cell in row]
+    return _begins_with_word(cells, numeric) or not any(
+        is_one and cell[:1] in _BEGINS for cell, is_one in zip(cells, numeric, strict=True)
+    )
 
 
 def _begins_with_word(row: Sequence[str], numeric: Sequence[bool]) -> bool:
@@ -317,15 +340,17 @@ def _is_numeric(block: Block, column: int) -> bool:
 
 
 def _rows(file: io.TextIOWrapper, block: Block) -> Iterator[list[str]]:
-    """Yield the rows from the first one of numbers on, their cells without blanks around them."""
+    """Yield the rows from the first one of numbers on."""
     lines: Iterable[str] = islice(_short_lines(file), block.first, None)
     if block.dialect.separator == " ":
-        yield from (line.split() for line in lines)
+        yield from map(str.split, lines)
         return
     reader = csv.reader(lines, delimiter=block.dialect.separator, skipinitialspace=True)
     try:
         for row in reader:
-            yield [cell.strip() for cell in row] if len(row) <= MOST_COLUMNS else row
+            if len(row) > MOST_COLUMNS + 1:
+                raise InputError(f"expected at most {MOST_COLUMNS} columns, got a row of {len(row)}")
+            yield row
     except csv.Error as error:
         raise InputError(f"line {block.first + reader.line_num}: {one_line(str(error))}") from None
 

@@ -32,7 +32,7 @@ _SCALES: Mapping[str, Mapping[str, float]] = {
         **{"inH2O": 249.08891, "ksi": 1e3 * _PSI, "kgf/cm2": 98066.5, "kgf/mm2": 9806650.0, "kN/m2": 1e3},
         **{"N/cm2": 1e4},
     },
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "day": 86400.0},
     "ratio": {"1": 1.0, "%": 0.01, "um/m": 1e-6},
     "moment": {"Nm": 1.0, "Nmm": 1e-3, "mNm": 1e-3},
     "angle": {"rad": 1.0, "deg": 0.017453292519943295},

@@ -18,6 +18,7 @@ from softnlp.laboratory.text import cells_table
 
 _LARGEST, _GROWTH = 150_000_000, 300  # bytes of all parts together, and that over the size of the archive
 _MOST_ROWS = 300_000
+_TOO_MANY = f"expected at most {_MOST_ROWS} rows in a sheet; write it as .csv"
 
 
 def workbook_tables(label: str, content: bytes, choices: Choices) -> list[RawTable]:
@@ -39,14 +40,13 @@ def workbook_tables(label: str, content: bytes, choices: Choices) -> list[RawTab
                 raise InputError(
                     f"the workbook would take {size / 1e6:.4g} MB unpacked, from {len(content) / 1e6:.4g} MB"
                 )
-            for part in parts:
-                if part.filename.endswith((".xml", ".rels")):
-                    with archive.open(part) as opened:
-                        if b"<!DOCTYPE" in opened.read(2000).upper():
-                            raise InputError("the workbook declares entities, which none that Excel writes does")
+            plain = io.BytesIO()  # without compression, so that nothing in it is larger than it says
+            with zipfile.ZipFile(plain, "w") as copy:
+                for part in parts:
+                    copy.writestr(part.filename, _text_of(archive, part))
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError) as error:
         raise InputError(f"not a valid workbook: {one_line(str(error), 80)}") from None
-    sheets = _sheets(content)
+    sheets = _sheets(plain)
     asked = choices.get("sheet")
     if asked is not None and asked not in sheets:
         raise InputError(f"expected {listed(sheets)}, got {shown(asked)}", key="sheet")
@@ -57,14 +57,25 @@ def workbook_tables(label: str, content: bytes, choices: Choices) -> list[RawTab
     return [cells_table(label, sheets[chosen], choices)]
 
 
-def _sheets(content: bytes) -> dict[str, list[list[str]]]:
+def _text_of(archive: zipfile.ZipFile, part: zipfile.ZipInfo) -> bytes:
+    """Return a part; raises `InputError` for one that declares entities, or has more rows than are read."""
+    with archive.open(part) as opened:
+        text = opened.read(part.file_size)
+    if b"<!DOCTYPE" in text[:2000].upper():
+        raise InputError("the workbook declares entities, which none that Excel writes does")
+    if text.count(b"<row") > _MOST_ROWS:
+        raise InputError(_TOO_MANY)
+    return text
+
+
+def _sheets(content: io.BytesIO) -> dict[str, list[list[str]]]:
     """Return the cells of every sheet as text."""
     try:
         from openpyxl import load_workbook
     except ImportError:
         raise InputError("a workbook needs openpyxl: pip install 'softnlp[lab]'") from None
     try:
-        book = load_workbook(io.BytesIO(content), read_only=True, data_only=True, keep_links=False)
+        book = load_workbook(content, read_only=True, data_only=True, keep_links=False)
         return {sheet.title: list(_rows(sheet)) for sheet in book.worksheets}
     except InputError:
         raise
@@ -77,7 +88,7 @@ def _rows(sheet: Any) -> Iterator[list[str]]:
     sheet.reset_dimensions()
     for count, row in enumerate(sheet.iter_rows(values_only=True)):
         if count >= _MOST_ROWS:
-            raise InputError(f"sheet {shown(sheet.title)}: expected at most {_MOST_ROWS} rows; write it as .csv")
+            raise InputError(_TOO_MANY)
         if len(row) > MOST_COLUMNS:
             raise InputError(f"sheet {shown(sheet.title)}: expected at most {MOST_COLUMNS} columns, got {len(row)}")
         yield [_cell(value) for value in row]

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from softnlp.base.csv_columns import Columns, csv_rows, read_columns
 from softnlp.base.errors import InputError, located
-from softnlp.base.reading import LONGEST_NAME, one_line
+from softnlp.base.reading import IMPORTED, LONGEST_NAME, one_line
 
 if TYPE_CHECKING:  # imported where needed: most scenarios name no file of a laboratory
     from softnlp.laboratory.imported import Imported
 
 T = TypeVar("T")
 
-_RECIPE = ".import.toml"
 _INLINE = "; here as a key of the table import"
 
 
@@ -39,7 +38,7 @@ def laboratory_columns(
         As `read_columns` and `softnlp.laboratory.importing.import_files`.
     """
     file = files[0]
-    plain = len(files) == 1 and settings is None and not file.endswith(_RECIPE)
+    plain = len(files) == 1 and settings is None and not file.endswith(IMPORTED)
     if plain:
         found = _or_imported(
             lambda: read_columns(folder, file), folder, file, own, lambda: _imported(folder, files, kind, further or {})
@@ -52,7 +51,7 @@ def or_imported(
     read: Callable[[], T], folder: Path, file: str, kind: str, own: Collection[str], settings: Mapping[str, Any] | None
 ) -> T | tuple[Columns, Imported]:
     """Return what `read` makes of a file of the project's own, or else the columns of its import."""
-    if settings is not None or file.endswith(_RECIPE):
+    if settings is not None or file.endswith(IMPORTED):
         return _imported(folder, [file], kind, settings or {})
     return _or_imported(read, folder, file, own, lambda: _imported(folder, [file], kind, {}))
 
@@ -105,14 +104,15 @@ def _imported(folder: Path, files: Sequence[str], kind: str, settings: Mapping[s
 
     label = one_line(", ".join(files), LONGEST_NAME)
     try:
-        if len(files) == 1 and files[0].endswith(_RECIPE):
+        if len(files) == 1 and files[0].endswith(IMPORTED):
             recipe = read_recipe(folder / files[0])
             if recipe.kind != kind:
                 raise InputError(f"expected an import of kind {kind!r}, got {recipe.kind!r}", source=label)
             with located(source=label):
                 imported = recipe.run()
         else:
-            imported = import_files(list(files), kind, flat(settings), folder)
+            with located(source=label):
+                imported = import_files(list(files), kind, flat(settings), folder)
     except AskError as error:
         source = None if error.message.startswith(label) else error.source or label
         raise type(error)(f"{error.message}{_INLINE}", source=source, key=error.key) from None

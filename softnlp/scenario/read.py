@@ -113,6 +113,9 @@ def _scenario(text: str, path: Path) -> Scenario:
     data = parse_toml(text)
     file, errors, bad = parse_parts(data)  # what does not fit is in no table of the file
     made, chosen, unlikely = _robot(file, data, path.parent, errors, bad)
+    alone: list[Any] = getattr(file, "segment", None) or []
+    if len(alone) == 1:  # a robot like any other, of which studies read what they read elsewhere
+        file = file.model_copy(update={"robot": alone[0].robot, "material": alone[0].material})
     steps = contact = task = numerics = None
     if "pressure" not in bad and (made is not None or not bad & {"robot", "segment"}):
         with suppress(InputError, AttributeError):  # of a robot that is not described, which was said

@@ -21,6 +21,7 @@ from softnlp.scenario.data import Read, Scenario
 from softnlp.scenario.laboratory import import_notes, laboratory_columns
 from softnlp.scenario.schema import FileName, ImportSettings, Label, Positive, optional_keys, wrong
 from softnlp.studies.check import Check
+from softnlp.studies.cycles import CYCLES
 from softnlp.studies.measurements import TensileTask
 from softnlp.studies.plausibility import area_check, divisor_checks, percent_check, stiffness_checks, true_checks
 
@@ -37,7 +38,6 @@ _SIZES: Mapping[str, tuple[float, float]] = {
 }
 _OWN = (*_STRETCHES, *_STRESSES, "displacement_mm", "force_N")
 _OF_IMPORT = (*_SIZES, "area_mm2", "cycle", "stretch")
-CYCLES = ("first loading", "unloading", "all")
 _ROUNDED = 1e-9  # of a stretch; a point on an end of the range stays
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from softnlp.base.errors import InputError, nearest
+from softnlp.base.ranges import too_uncertain
 from softnlp.base.reading import shown
 from softnlp.base.units import MILLIMETRE
 from softnlp.model.contact_settings import ContactSettings, ContactTask
@@ -100,6 +101,8 @@ def _size(key: str, written: float | str) -> tuple[float, bool]:
         raise InputError(f"expected {expected}, got {shown(written)}", key=key) from None
     if not (np.isfinite(size) and size >= 0):
         raise InputError(f"expected {expected}, got {shown(written)}", key=key)
+    if refusal := too_uncertain(size, relative or key == _MATERIAL):
+        raise InputError(f"{refusal}, got {shown(written)}", key=key)
     return size, relative
 
 

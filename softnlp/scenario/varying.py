@@ -12,6 +12,9 @@ from softnlp.scenario.values import is_number, wrong
 
 T = TypeVar("T")
 
+MOST_KNOTS = 50
+"""Of one dimension; between each two stands a part of the rod, which is compiled."""
+
 
 class Varying(NamedTuple):
     """A dimension that varies along s: values at fractions of the length, linear between them."""
@@ -40,6 +43,8 @@ def _along(value: Any, plain: ValidatorFunctionWrapHandler) -> Any:
     rising = all(a < b for a, b in pairwise(s))
     if len(s) < 2 or s[0] != 0 or s[-1] != 1 or not rising:
         raise wrong(f"expected s from 0 to 1, rising, got {shown(s)}")
+    if len(s) > MOST_KNOTS:
+        raise wrong(f"expected at most {MOST_KNOTS} fractions of the length, got {len(s)}")
     if len(numbers) != len(s):
         raise wrong(f"expected as many values as s has, {len(s)}, got {len(numbers)}")
     for number in numbers:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from softnlp.model.tip import TipContact
 from softnlp.nlp.continuation import follow
 from softnlp.nlp.solver import Solution
 from softnlp.statics.blocked_grid import Blocked, BlockedGrid, kept_grid, transferred
-from softnlp.statics.blocked_refine import examined, refined, stepwise
+from softnlp.statics.blocked_refine import examined, refined, stepwise, to_accuracy
 from softnlp.statics.blocked_resume import (
     LARGEST_JUMP,
     MOST_STEPS,
@@ -29,11 +30,11 @@ from softnlp.statics.blocked_resume import (
     resumed,
     sound_error,
 )
-from softnlp.statics.blocked_step import failed_step, solved_step, touching_step
+from softnlp.statics.blocked_step import failed_step, inaccurate_step, solved_step, touching_step
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.compiled import RodEquations, rod_equations
 from softnlp.statics.free_shape import Free, FreeShapes, Route, free_shape, from_zero, route_from
-from softnlp.statics.grid_size import MOST_INTERVALS, search_grids
+from softnlp.statics.grid_size import search_grids
 from softnlp.statics.loadcase import RodFunctions
 from softnlp.statics.pose_grid import iteration_cost
 from softnlp.statics.solver import SEARCHED_BY, PoseSolver
@@ -47,6 +48,8 @@ _NEAR_FOLD = 0.2  # of the largest in-plane determinant on the way: below it a b
 _FINEST_FIRST = 55  # intervals of a first grid, however far the free shape curls: the wall keeps the rod from that
 _MOST_STEPS_MINIMUM = 24  # to a point of a path where that is a minimum, see `MOST_STEPS`
 _MOST_WORK, _LEAST = 20_000, 100  # to follow a branch, in intervals of Newton's iterations; iterations on any grid
+_LEAST_WORK = 40_000  # the same of these iterations: on the finest grids they are fewer
+_SAME_PLACE = 0.01  # of the way: two grids that lose the branch as near to each other lose it there
 _SOUND = 0.5  # of the largest determinant: nearer to a fold an error is that of the place of the fold
 _NEAR_END = 0.98  # of a path: a fold that a coarse grid finds beyond it may lie behind the end
 _SURE = 1e-3  # estimated error of a shape on that grid below which the end of the branch after it is believed
@@ -131,6 +134,8 @@ class BlockedSolver:
             return failed_step(
                 situation.pressure, found.situation.pressure, found.folded, found.stopped, spent, began
             ), None
+        if self._is_rough(found):
+            return inaccurate_step(situation.pressure, found, spent, began), None
         try:
             found = self._closed(found)
         except DisputedError as error:
@@ -162,19 +167,25 @@ class BlockedSolver:
             if not isinstance(found, Blocked):
                 found, more = self._searched(situation, pressed, free, plane, intervals, start)
                 spent += more
-        target = self.poses.numerics.accuracy / 3
-        while isinstance(found, Blocked):
-            intervals = found.grid.intervals
-            wanted = self.poses.next_intervals(found.refinement_error, intervals, target)
-            if wanted is None or intervals >= MOST_INTERVALS:
-                break
-            finer = self._refined(found, self.grid(min(wanted, MOST_INTERVALS), plane))
-            if finer is None:
-                break
-            spent += finer.solution.iterations
-            found = finer
         assert found is not None
+        found, more = self._to_accuracy(found, plane)
+        spent += more
+        if usable and self._is_rough(found):  # the neighbour's grid was too coarse for this shape: its word is no good
+            found, more = self._searched(situation, pressed, free, plane, first, None)
+            found, further = self._to_accuracy(found, plane)
+            spent += more + further
         return found, spent
+
+    def _is_rough(self, found: Blocked | Ended) -> bool:
+        """Whether a solution misses the accuracy on grids that nobody chose."""
+        return isinstance(found, Blocked) and self.numerics.intervals is None and found.error > self.numerics.accuracy
+
+    def _to_accuracy(self, found: Blocked | Ended, plane: Array | None) -> tuple[Blocked | Ended, int]:
+        """Return a solution on a grid that meets the accuracy, or the finest that has it, and the iterations."""
+        if isinstance(found, Ended):
+            return found, 0
+        wanted = partial(self.poses.next_intervals, target=self.poses.numerics.accuracy / 3)
+        return to_accuracy(found, wanted, lambda there, size: self._refined(there, self.grid(size, plane)))
 
     def _searched(
         self, situation: Situation, pressed: Array, free: Free, plane: Array | None, first: int, near: Blocked | None
@@ -187,7 +198,7 @@ class BlockedSolver:
         own, given, left = self.numerics.transcription, self.numerics.intervals is not None, _MOST_WORK
         like = first if own == SEARCHED_BY else 2 * first  # intervals of shooting that show as much
         tried = search_grids(first, own, SEARCHED_BY, once=given or near is not None)
-        before: Reached | None = None
+        before, lost = None, 0.0
 
         def searched(size: int) -> BlockedGrid:
             return self.grid(size, plane, SEARCHED_BY)
@@ -195,13 +206,17 @@ class BlockedSolver:
         for size, name in tried:
             cost, shown = iteration_cost(size, name), name == own and size >= first
             grid = self.grid(size, plane, name)
-            most = max(left // cost, _LEAST)
+            most = max(left // cost, min(_LEAST, _LEAST_WORK // size))
             found = self._followed(grid, route, situation, pressed, free, plane, near, most, before)
             before = found.before if isinstance(found, Ended) else None
             more = found.solution.iterations if isinstance(found, Blocked) else found.iterations
             spent, left = spent + more, left - more * cost
             if isinstance(found, Ended) and found.folded and (shown or size >= like or found.error <= _SURE):
                 break
+            if isinstance(found, Ended):
+                if lost > 0 and not found.stopped and abs(found.fraction - lost) <= _SAME_PLACE:
+                    break  # a finer grid loses it where the last one did
+                lost = found.fraction
             if isinstance(found, Blocked):
                 finer = found if shown else stepwise(found, self.grid(first, plane), searched, self._refined)
                 if finer is not None:
@@ -377,7 +392,7 @@ class BlockedSolver:
         folded = not stopped and len(sizes) > 1 and (grid.is_minimum or sizes[-1] < _NEAR_FOLD * max(sizes))
         error = sound_error(grid, self.equations.shape, path, sound, before) if folded and fraction < _NEAR_END else 1.0
         before = point_before(grid, trace, points, sound, fraction, (begin, end), pressed, free) or before
-        return Ended(reached, folded, spent, error, stopped, before)
+        return Ended(reached, folded, spent, error, stopped, before, fraction)
 
     def _refined(self, found: Blocked, grid: BlockedGrid) -> Blocked | None:
         """Return a solution solved again on a finer grid, or None where that leads elsewhere."""

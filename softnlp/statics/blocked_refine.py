@@ -12,6 +12,7 @@ from softnlp.nlp.solver import Solution
 from softnlp.statics.blocked_grid import Blocked, BlockedGrid, transferred, unjudged
 from softnlp.statics.blocked_resume import LARGEST_JUMP
 from softnlp.statics.free_shape import Free
+from softnlp.statics.grid_size import MOST_INTERVALS
 from softnlp.statics.pose import Mapped
 from softnlp.statics.wall import Situation
 
@@ -19,7 +20,7 @@ Array = NDArray[np.float64]
 
 _SAME = 0.05  # scaled change of a solution on a finer grid below which it is the same one
 _CONTRACTION = 0.1  # share of a larger change that Newton's first step leaves where it is the same one as well
-_SLOWLY = 2**0.25  # by what grids grow where a jump leads elsewhere
+_SLOWLY = 2**0.25  # by what grids grow where a jump leads elsewhere, and its root where that does too
 _FINE = 2e-3  # estimated error from which the jump is tried again
 
 
@@ -68,13 +69,36 @@ def stepwise(
 
     finer : the grid of so many intervals, of the kind whose steps are cheap. refine : a solution on a grid.
     """
-    at, size = refine(found, grid), float(found.grid.intervals)
-    while at is None and size < grid.intervals / _SLOWLY:
-        size *= _SLOWLY
-        next_one = refine(found, finer(round(size)))
-        if next_one is None:
+    at, ratio = refine(found, grid), _SLOWLY
+    while at is None and found.grid.intervals * ratio < grid.intervals:
+        size = round(found.grid.intervals * ratio)
+        between = refine(found, finer(size)) if size > found.grid.intervals else None
+        if between is not None:
+            found = between
+            if found.refinement_error <= _FINE:
+                return refine(found, grid)
+        elif ratio < _SLOWLY:
             return None
-        found = next_one
-        if found.refinement_error <= _FINE:
-            return refine(found, grid)
+        else:
+            ratio = ratio**0.5
     return at
+
+
+def to_accuracy(
+    found: Blocked,
+    wanted: Callable[[float, int], int | None],
+    refine: Callable[[Blocked, int], Blocked | None],
+) -> tuple[Blocked, int]:
+    """Return a solution on a grid that meets the accuracy, or on the finest that has it, and the iterations.
+
+    wanted : the intervals for an error on so many, None where they do. refine : a solution on so many intervals.
+    """
+    spent = 0
+    while found.grid.intervals < MOST_INTERVALS:
+        intervals = wanted(found.refinement_error, found.grid.intervals)
+        finer = None if intervals is None else refine(found, min(intervals, MOST_INTERVALS))
+        if finer is None:
+            break
+        spent += finer.solution.iterations
+        found = finer
+    return found, spent

@@ -43,7 +43,7 @@ class Reached:
 class Ended:
     """Where a branch was lost, whether it had turned, the iterations, the error there and whether work ran out.
 
-    before : a point well before that, from which a finer grid may go on.
+    before : a point well before that, from which a finer grid may go on. fraction : of the way, where it was lost.
     """
 
     situation: Situation
@@ -52,6 +52,7 @@ class Ended:
     error: float = 0.0
     stopped: bool = False
     before: Reached | None = None
+    fraction: float = 0.0
 
 
 def point_before(

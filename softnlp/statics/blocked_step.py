@@ -63,6 +63,18 @@ def failed_step(pressure: Array, reached: Array, folded: bool, stopped: bool, it
     )
 
 
+def inaccurate_step(pressure: Array, found: Blocked, iterations: int, began: float) -> Step:
+    """Return the step of a solution that misses the accuracy on the finest grid that has it."""
+    return Step(
+        pressure,
+        Status.INACCURATE,
+        f"{Status.INACCURATE.advice}; with {found.grid.intervals} intervals it is {found.error:.2g} L_0",
+        residual=found.solution.residual,
+        iterations=iterations,
+        solve_time=time.perf_counter() - began,
+    )
+
+
 def solved_step(
     poses: PoseSolver,
     functions: RodFunctions,

@@ -144,10 +144,19 @@ def standing_wall(poses: PoseSolver, contact: ContactSettings, pressures: Array,
         if pose is not None:
             return _wall_at(contact.offset, rest, pose.tip_position + contact.tip_cap * pose.tip_rotation[:, 2])
     for pressure in (largest, 1e-3 * largest):
-        branch, arc = unloaded_arc(poses, pressure)
-        if branch.status is Status.SOLVED:
-            return _wall_at(contact.offset, rest, arc.tip_position + contact.tip_cap * arc.axis)
+        tip = _unloaded_tip(poses, pressure)
+        if tip is not None:
+            return _wall_at(contact.offset, rest, tip[0] + contact.tip_cap * tip[1])
     return _wall_at(contact.offset, rest, rest)
+
+
+def _unloaded_tip(poses: PoseSolver, pressure: Array) -> tuple[Array, Array] | None:
+    """Return the tip [m] of the shape without loads and its axis, None where the stretch ends before this pressure."""
+    if isinstance(poses, ChainSolver):  # several arcs, of which no closed form is kept
+        pose = poses.solve(pressure, Loads())[0].pose
+        return None if pose is None else (pose.tip_position, pose.tip_rotation[:, 2])
+    branch, arc = unloaded_arc(poses, pressure)
+    return (arc.tip_position, arc.axis) if branch.status is Status.SOLVED else None
 
 
 def slipping_pressure(begin: Situation, end: Situation, sideways: list[tuple[float, float]]) -> float | None:

@@ -39,6 +39,7 @@ Array = NDArray[np.float64]
 
 _TOUCH = 1e-9  # of the length, beside three times the estimated error of the free shape
 _SCAN = 9  # pressures at which the gap of the free shape is looked at
+_ROUGHLY = 1e-3  # accuracy of free shapes on the way, and of the part of it at which one meets the wall
 _FINER = (1, 2, 4, 8)  # times as many intervals as the free shape's, until the accuracy is met
 _PULL = 1e-6  # of what bends the robot: less is no pull
 
@@ -70,6 +71,8 @@ class ChainWall:
         poses = pose_solver(model, numerics.without_ipopt() if numerics.engine == "auto" else numerics)
         assert isinstance(poses, ChainSolver)
         self.poses, self._numerics, self._contact, self._loads = poses, numerics, contact, loads
+        coarse = replace(numerics.without_ipopt(), accuracy=max(numerics.accuracy, _ROUGHLY))
+        self._rough_poses = pose_solver(model, coarse)
 
     def solve(self, pressure: Array, wall: Wall, near: Held | None = None) -> tuple[Step, Held | None]:
         """Solve one blocked pose, from a neighbour of less pressure or from zero. Never raises for a hard one."""
@@ -96,9 +99,16 @@ class ChainWall:
         if answer.status is Status.SOLVED:
             values, engine = self._values(pressure, wall), self._numerics.engine
             answer = solve(answer.problem, values, answer, engine=engine, ipopt=dict(self._numerics.ipopt))
-        if answer.status is not Status.SOLVED:
-            seconds = time.perf_counter() - began
-            return Step(pressure, answer.status, answer.message, solve_time=seconds), None
+        status, message = answer.status, answer.message
+        if (
+            status is Status.SOLVED
+            and self._numerics.intervals is None
+            and not (error or 0.0) <= self._numerics.accuracy
+        ):
+            status = Status.INACCURATE
+            message = f"{status.advice}; with {finer * free.intervals} intervals it is {error:.2g} L_0"
+        if status is not Status.SOLVED:
+            return Step(pressure, status, message, solve_time=time.perf_counter() - began), None
         return self._step(pressure, wall, answer, step.pose, gap, began), Held(pressure, answer, free)
 
     def _gap(self, pose: Pose, wall: Wall) -> float:
@@ -141,7 +151,7 @@ class ChainWall:
         return bool(answer["tip_forces"][0] >= -_PULL * F_0)
 
     def _first_contact(self, pressure: Array, wall: Wall) -> tuple[float, Wall]:
-        """Return the fraction of the pressure at which the free shape meets the wall for good, and the wall there.
+        """Return about the part of the pressure at which the free shape meets the wall for good, and the wall there.
 
         Where the robot is pressed into it already at rest the wall is the one that touches it then.
         """
@@ -149,7 +159,7 @@ class ChainWall:
 
         def gap(part: float) -> float:
             nonlocal near
-            step, found = self.poses.solve(part * pressure, self._loads, near)
+            step, found = self._rough_poses.solve(part * pressure, self._loads, near)
             near = found or near
             return float("nan") if step.pose is None else self._gap(step.pose, wall)
 
@@ -159,7 +169,7 @@ class ChainWall:
         if not ahead.size:
             return 0.0, Wall(wall.point + min(float(known[0]), 0.0) * wall.normal, wall.normal)
         last = int(ahead[-1])
-        return float(brentq(gap, scan[last], scan[last + 1], xtol=1e-9)), wall
+        return float(brentq(gap, scan[last], scan[last + 1], xtol=_ROUGHLY)), wall
 
     def _step(self, pressure: Array, wall: Wall, answer: Answer, free: Pose, gap: float, began: float) -> Step:
         posed, solution, K = answer.problem, answer.solution, answer.problem.cases[0].method

@@ -70,6 +70,12 @@ class FreeConstants:
         """Return values [SI] by quantity."""
         return dict(zip(self.quantities, (float(v) for v in x), strict=True))
 
+    def those(self, wanted: NDArray[np.bool_]) -> FreeConstants:
+        """Return some of the constants (n,)."""
+        at = np.flatnonzero(wanted)
+        names, quantities = (tuple(every[int(k)] for k in at) for every in (self.names, self.quantities))
+        return FreeConstants(names, quantities, self.start[at], self.lower[at], self.upper[at], self.scale[at])
+
     def applied(self, x: Array, material: Material, coefficients: Coefficients) -> tuple[Material, Coefficients]:
         """Return material and coefficients with these values; raises `MaterialError` where they are no material."""
         fields = {c.quantity: c.field for c in COEFFICIENTS.values()}

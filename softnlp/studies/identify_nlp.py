@@ -38,6 +38,7 @@ from softnlp.studies.identified import FreeConstants, Identified, constants_text
 from softnlp.studies.measurements import COLUMNS, POSE_COLUMNS, RELATIVE_NOISE, Data, column_slice
 from softnlp.studies.predicted import STRAIGHT
 from softnlp.studies.registration import CLOCK, Registration, across, turned
+from softnlp.studies.registration import NAMES as REGISTRATION_NAMES
 
 Array = NDArray[np.float64]
 
@@ -229,7 +230,8 @@ def closed_fit(
 ) -> Identified:
     """Return constants with IPOPT's word on them, or with a warning where there are too many rods for it.
 
-    IPOPT starts at them, with all poses among its unknowns, each on the grid of its own.
+    IPOPT starts at them, with all poses among its unknowns, each on the grid of its own. Numbers of a registration that
+    the data leave open stay where the search left them, for any of them fits as well.
 
     Raises
     ------
@@ -242,7 +244,11 @@ def closed_fit(
     if rods > MOST_RODS:
         note = f"IPOPT did not close the constants: {rods} rods would be its unknowns, and it takes at most {MOST_RODS}"
         return replace(found, engine=numerics.engine, warnings=(*found.warnings, note))
-    nlp = AtOnce(found.free, numerics, registration, loads)
+    errors = found.uncertainty.standard_errors
+    settled = ~(np.isinf(errors) & np.array([name in REGISTRATION_NAMES for name in found.free.names]))
+    free, x, errors = found.free.those(settled), found.constants[settled], errors[settled]
+    nlp = AtOnce(free, numerics, registration, loads)
+    nlp.values |= {name: np.asarray(value) for name, value in found.free.values(found.constants).items()}
     if nlp.clock is not None:
         loads = turned(loads, -found.free.values(found.constants)[CLOCK])
     for k, data in enumerate(every):
@@ -253,19 +259,18 @@ def closed_fit(
             raise DisputedError(f"{Status.DISPUTED.advice}; {error.message}") from None
     problem = nlp.compiled()
     engine = Engine(problem, tolerance=TOLERANCE, options={**FROM_SOLUTION, **dict(numerics.ipopt)})
-    errors = found.uncertainty.standard_errors
-    close_to = np.fmax(_OF_ERROR * errors, numerics.accuracy * np.maximum(np.abs(found.constants), found.free.scale))
+    close_to = np.fmax(_OF_ERROR * errors, numerics.accuracy * np.maximum(np.abs(x), free.scale))
 
     def differs(solution: Solution) -> str:
         values = problem.free_values(solution.x)
-        constants = np.concatenate([values[name] for name in found.free.quantities])
-        if solution.holds(numerics.tolerance) and bool(np.all(np.abs(constants - found.constants) <= close_to)):
+        constants = np.concatenate([values[name] for name in free.quantities])
+        if solution.holds(numerics.tolerance) and bool(np.all(np.abs(constants - x) <= close_to)):
             return ""
-        keys = [file_name(name, found.material) for name in found.free.names]
-        here, there = (constants_text(keys, x, ".6g") for x in (found.constants, constants))
+        keys = [file_name(name, found.material) for name in free.names]
+        here, there = (constants_text(keys, values, ".6g") for values in (x, constants))
         return f"the search found {here} and IPOPT {there}"
 
-    p, start = nlp.packed(problem), nlp.start(problem, found.constants)
+    p, start = nlp.packed(problem), nlp.start(problem, x)
     solution = close(engine, Solution(start, p, 0.0, 0, ""), differs)
     return replace(found, engine=numerics.engine, ipopt=solution.ipopt)
 

@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 Start = tuple[Array, Point | Array | None, bool]
 """Pressures z [bar], states nearby (None: those of the arc), and whether it is where the last target's search ended."""
 
-_STARTS = 4
+_STARTS, _MORE_STARTS = 4, 12  # more where every answer of the first is one that no robot takes
 _COARSE_MET = 1e-7  # misfit of a coarse search that needs no better one [L_0]
 _ROUNDS = 4
 _SAME_SPOT = 1e-3  # of the cost: less is no nearer
@@ -47,7 +47,7 @@ _JUMP = 0.3  # of the bounds: more is a jump along a path
 _SAME_PLACE = 1e-4  # [bar]
 _FIRST_MOVE, _LAST_MOVE = 0.25, 1e-3  # of the search among stable poses, of the bounds
 _MOST_POSES = 150  # that it solves
-_NO_BODY = "the target is met only by a shape that no body can take"
+_NO_BODY = "the target was found to be met only by a shape that no body can take"
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,14 +111,17 @@ class InverseKinematics:
         best: Reached | None = None
         rejected: Step | None = None
         chosen = None
-        for found in self._ends(aim, near):
-            judged = self._finished(aim, found)
-            if isinstance(judged, Step):
-                rejected = judged
-                continue
-            if best is None or judged.cost < best.cost * (1 - _SAME_SPOT):
-                best, chosen = judged, found
-            if self._meets(aim, best) or judged.cost <= found.cost * (1 + _SAME_SPOT):
+        for ends in (self._ends(aim, near), self._more_ends(aim)):
+            for found in ends:
+                judged = self._finished(aim, found)
+                if isinstance(judged, Step):
+                    rejected = judged
+                    continue
+                if best is None or judged.cost < best.cost * (1 - _SAME_SPOT):
+                    best, chosen = judged, found
+                if self._meets(aim, best) or judged.cost <= found.cost * (1 + _SAME_SPOT):
+                    break
+            if rejected is None or (best is not None and self._meets(aim, best)):
                 break
         if rejected is not None and (best is None or not self._meets(aim, best)):
             searched = self._searched(aim, best)
@@ -157,6 +160,13 @@ class InverseKinematics:
             same=_SAME_PLACE,
             rank=lambda found: found.rank,
         )
+
+    def _more_ends(self, aim: Aim) -> Iterator[Found]:
+        """Yield where searches from further starts meet the target, where there are many ways to meet it."""
+        if self._redundant(aim):
+            tips = self._coarse.nearest(self._coarse.program(aim), _STARTS + _MORE_STARTS)[_STARTS:]
+            found = (self._search(aim, (tip.theta, tip, False)) for tip in tips)
+            yield from (one for one in found if one is not None and one.met)
 
     def _starts(self, aim: Aim, near: Reached | None) -> Iterator[Start]:
         """Yield where to begin: at the last pressure, then at places of the table."""
@@ -253,7 +263,9 @@ class InverseKinematics:
             return step
         fit, message = step.pose.fit, ""
         if step.pose.stable is False:
-            message = "the target is met by an equilibrium that is not stable only: the real robot buckles away from it"
+            message = (
+                "the target was found to be met only by an equilibrium that is not stable: a robot buckles away from it"
+            )
         elif fit.self_intersecting and SELF_INTERSECTION not in self.task.allow:
             message = f'{_NO_BODY}: {fit.warnings[-1]}; [robot] allow = ["{SELF_INTERSECTION}"] accepts it'
         if message:

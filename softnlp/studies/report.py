@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.errors import InputError, nearest
+from softnlp.base.ranges import too_uncertain
 from softnlp.base.units import BAR, NEWTON_MILLIMETRE
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.model.materials import Material
@@ -185,7 +186,10 @@ def named_tolerances(
             raise InputError(f"{key}: expected a number, got {value!r}", key="--tolerance") from None
         if not (np.isfinite(number) and number >= 0):
             raise InputError(f"{key}: expected a number that is not negative, got {value}", key="--tolerance")
-        if not value.endswith("%"):
+        share = value.endswith("%")
+        if refusal := too_uncertain(number / 100 if share else number, share):
+            raise InputError(f"{key}: {refusal}, got {value}", key="--tolerance")
+        if not share:
             found[name] = number * scale
         elif name == "pressure":
             for k, P in enumerate(pressure):

@@ -164,8 +164,8 @@ def _orders(
             found += [one for one in each if one is not None]
     least = min(one.squares for one in found)
     best = min((one for one in found if one.squares <= 2 * least), key=lambda one: (one.turn != 0, one.squares))
+    sets_of = [placed.set_order[k] if placed.set_order else int(k) + 1 for k in np.argsort(best.order)]
     if best.squares < _BETTER * with_turn.squares:
-        sets_of = [placed.set_order[k] if placed.set_order else int(k) + 1 for k in np.argsort(best.order)]
         clock = f" with clock_deg = {(placed.clock + best.turn) / DEGREE:.1f}" if best.turn else ""
         mirror = ", the mirror image of the sets" if _is_mirror(best.order) else ""
         likely = f"looks like set_order = {sets_of} in [registration]{clock}{mirror}"
@@ -176,6 +176,8 @@ def _orders(
         limit = max(2.0, 4 * with_turn.error / DEGREE)
         clock = f"{(placed.clock + with_turn.turn) / DEGREE:.1f}"
         likely = f'the sets are turned about the base\'s axis; [registration] clock_deg = {clock}, or "fit"'
+        if best.order != given:
+            likely += f"; or they stand in another order, set_order = {sets_of}, which leaves as little"
         yield Check("clock of the sets", with_turn.turn / DEGREE, (-limit, limit), _ANY, likely, "deg")
 
 
@@ -201,6 +203,9 @@ def _left(
         model, rotations = tips(o.pressure[:, list(order)], turned(loads, -clock))
         if not np.isfinite(model).all():
             return None
+        if turns:  # half a turn away no small one does better
+            (x, y), (u, v) = model[:, :2].T, placed.in_base(o.values)[:, :2].T
+            asked = replace(asked, clock=placed.clock + float(np.arctan2(x @ v - y @ u, x @ u + y @ v)))
         found = fitted(asked, model, rotations, o)
         clock = found.clock
     left = float(np.sum((sensor_places(found, model, rotations) - o.values) ** 2))

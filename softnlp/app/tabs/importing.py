@@ -29,7 +29,8 @@ from softnlp.app.imports import (
 from softnlp.app.parts import Chart, NumberTable, RunRow, while_open
 from softnlp.app.session import LARGEST_FILE, Session
 from softnlp.base.errors import InputError, SoftnlpError
-from softnlp.laboratory.recipe import SUFFIX, recipe_text
+from softnlp.base.reading import IMPORTED
+from softnlp.laboratory.recipe import recipe_text
 
 _LIMITS = f"expected at most {MOST_FILES} files of at most {LARGEST_FILE / 1e6:.0f} MB"
 _LOOK = f"{controls.BOX} debounce=800 maxlength=300"
@@ -86,7 +87,7 @@ class _Import:
                         self._use = controls.use_button("Use it", "import.use", self._hand_on)
                         self._files_made = [
                             controls.button(f"NAME{suffix}", "download", f"import{suffix}", partial(self._take, suffix))
-                            for suffix in (".csv", SUFFIX)
+                            for suffix in (".csv", IMPORTED)
                         ]
         self._more.set_visibility(False)
         self._results.set_visibility(False)
@@ -217,7 +218,7 @@ class _Import:
         """Offer the result as a file."""
         if self._reading is not None and (imported := self._reading.imported) is not None:
             folder = self._folder / str(self._drops)
-            text = recipe_text(imported, folder, folder) if suffix == SUFFIX else self._reading.csv
+            text = recipe_text(imported, folder, folder) if suffix == IMPORTED else self._reading.csv
             ui.download.content(text, f"{result_name(imported)}{suffix}", "text/plain")
 
 
