@@ -275,3 +275,14 @@ def test_a_motion_that_cannot_go_on_says_when() -> None:
     assert last.pose is None
     assert 1 < len(run.steps) < 11
     assert all(step.status is Status.SOLVED for step in run.steps[:-1])
+
+
+@pytest.mark.slow
+def test_random_runs_reach_their_end_and_none_does_so_falsely() -> None:
+    """Steps of pressure up to the branch's end, releases, loads over time; each residual is evaluated again."""
+    from benchmarks.dynamics import random
+
+    found = random(60, seed=7)
+    assert found["false"] == 0
+    assert found["reached_the_end"] >= 0.96 * found["runs"]
+    assert all(one["message"] for one in found["others"])
