@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp import BAR, Body, Loads, Segment, forward, material, robot
+from softnlp import BAR, Body, Loads, Numerics, Segment, forward, material, robot
 from softnlp.base.status import Status
 from softnlp.dynamics.drive import Series
 from softnlp.dynamics.grid import grid_of
@@ -23,7 +23,7 @@ from softnlp.dynamics.rules import rule
 from softnlp.dynamics.sections import Failed, Sections
 from softnlp.dynamics.simulation import Dynamics, Simulation
 from softnlp.model.robot import ROBOTS
-from softnlp.studies.dynamic import dynamic
+from softnlp.studies.dynamic import chosen_intervals, dynamic
 
 Array = NDArray[np.float64]
 
@@ -102,14 +102,9 @@ def random_run(draw: np.random.Generator) -> dict[str, Any]:
         output_step=0.05,
         release=kind == "release",
     )
-    simulation = Simulation(
-        body,
-        loads,
-        asked,
-        Series(np.array(times), rows),
-        Series(np.array(times), forces),
-        tolerance=1e-9,
-    )
+    both = Series(np.array(times), rows), Series(np.array(times), forces)
+    intervals, _ = chosen_intervals(body, loads, both, Numerics())
+    simulation = Simulation(body, loads, asked, *both, intervals=intervals, tolerance=1e-9)
     found: dict[str, Any] = {"robot": name, "rubber": rubber.name, "kind": kind, "bar": (P / BAR).tolist()}
     found |= {"rule": asked.rule, "step": asked.step, "gravity": gravity, "status": "solved", "false": False}
     largest, again, steps, began = 0.0, 0.0, 0, time.perf_counter()
@@ -119,7 +114,7 @@ def random_run(draw: np.random.Generator) -> dict[str, Any]:
             steps += output.steps
             energy = output.energy
             largest = max(largest, output.residual)
-            if output.steps:
+            if len(simulation.recent) > 1:
                 again = max(again, judged(simulation, fresh))
             found["false"] |= not np.isfinite(output.instant.at.position).all() or again > 1e-8
     except Failed as failure:

@@ -194,14 +194,15 @@ class Simulation:
         count = _Count(residual=residual)
         outputs, jumps = asked.outputs, self.jumps
         yield self._output(one, numbers, ledger, count)
-        before, kept = [one], 1
+        self.recent = before = [one]
+        kept = 1
         h = asked.step or min(_FIRST * asked.duration, asked.output_step)
         landings = self.landings()
         for start, end in pairwise(landings):
             try:
                 before, h = self._across(before, float(start), float(end), h, ledger, count)
             except Failed as error:
-                raise Failed(error.status, f"at t = {before[0].time:.6g} s: {error.message}") from None
+                raise Failed(error.status, f"at t = {self.recent[0].time:.6g} s: {error.message}") from None
             numbers = self.rod.sections.at(self.chambers.at(end, after=False))
             if kept < outputs.size and abs(end - outputs[kept]) <= _ROUND * asked.duration:
                 yield self._output(before[0], numbers, ledger, count)
@@ -210,7 +211,7 @@ class Simulation:
                 after = self.rod.sections.at(self.chambers.at(end))
                 behind = self._behind(before[0], after)
                 ledger.jump(numbers, after, behind, before[0])
-                before = [behind]
+                self.recent = before = [behind]
                 if asked.step is None:
                     h = min(h, _FIRST * asked.duration)
 
