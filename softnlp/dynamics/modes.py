@@ -125,13 +125,8 @@ def vibration(rod: Rod, pressures: Array, acting: Acting, radius: float, lag: fl
     n = rod.size
     numbers = rod.sections.at(pressures)
     pose, residual = Stepper(rod).pose(numbers, acting)
-    _, N, M, _, _ = at_end(rod, pose.e, pose.at, still(n), acting)
-    geometric = -rod.tangent(pose.at, N, M, 0.0, acting)
-    mass = -rod.tangent(pose.at, N, M, 1.0, acting) - geometric
-    elastic, damping = np.linalg.inv(pose.at.compliance), rod.viscosity
-    K, D = geometric, np.zeros((6 * n, 6 * n))
-    K.reshape(n, 6, n, 6)[range(n), :, range(n)] += elastic
-    D.reshape(n, 6, n, 6)[range(n), :, range(n)] += damping
+    K, D, mass = _matrices(rod, pose, acting)
+    elastic = np.linalg.inv(pose.at.compliance)
     move, turn = rod.kinematics(pose.at)
     values, left, right = scipy.linalg.eig(K, mass, left=True)
     order = np.argsort(values.real)
@@ -170,6 +165,23 @@ def vibration(rod: Rod, pressures: Array, acting: Acting, radius: float, lag: fl
     linear = _linear(rod, numbers, pressures, pose, (K, D, mass), move, lag)
     place = np.append(rod.grid.place, rod.grid.ends[-1]) / rod.grid.ends[-1]
     return Vibration(tuple(modes), linear, pressures, place, pose.at.position[-1], residual)
+
+
+def grows(rod: Rod, pose: Instant, acting: Acting) -> bool:
+    """Return whether a pose at rest buckles: whether a small motion about it grows."""
+    K, _, mass = _matrices(rod, pose, acting)
+    return bool(np.min(np.linalg.eigvals(np.linalg.solve(mass, K)).real) < 0)
+
+
+def _matrices(rod: Rod, pose: Instant, acting: Acting) -> tuple[Array, Array, Array]:
+    """Return K, D and M about a pose at rest."""
+    n = rod.size
+    _, N, M, _, _ = at_end(rod, pose.e, pose.at, still(n), acting)
+    K = -rod.tangent(pose.at, N, M, 0.0, acting)
+    mass, D = -rod.tangent(pose.at, N, M, 1.0, acting) - K, np.zeros((6 * n, 6 * n))
+    K.reshape(n, 6, n, 6)[range(n), :, range(n)] += np.linalg.inv(pose.at.compliance)
+    D.reshape(n, 6, n, 6)[range(n), :, range(n)] += rod.viscosity
+    return K, D, mass
 
 
 def _damped(K: Array, D: Array, mass: Array) -> NDArray[np.complex128]:

@@ -96,7 +96,7 @@ def _functions(model: Model) -> tuple[ca.Function, ca.Function, ca.Function | No
     numbers = ca.vertcat(*symbols.values())
     values = ca.Function("values", [P, numbers, stretch], [every], {"cse": True})
     linear = type(section).strains is Section.strains
-    strains = None if linear else _strains(section, len(state.own), len(centres))
+    strains = None if linear else _strains(model, len(state.own), len(centres))
     return branch_function(model), values, strains, len(state.centres)
 
 
@@ -121,12 +121,14 @@ def _stations(body: Body, grid: Grid, k: int) -> Stations:
     )
 
 
-def _strains(section: Section, own: int, centres: int) -> ca.Function:
+def _strains(model: Model, own: int, centres: int) -> ca.Function:
     """Return (state of a section, stretch, resultants) -> strains per length as cast (6,), their slope (36,)."""
     given, stretch, e = ca.SX.sym("given", _STATE + centres + own), ca.SX.sym("stretch"), ca.SX.sym("e", 6)
     F_P, M_x, M_y, mass = (given[7 + j] for j in range(4))
-    state = RodSection(given[_GA], given[_EA], given[_EI_X], given[_EI_Y], given[_GJ], F_P, M_x, M_y, mass, 1.0)
-    v, u = section.strains(state, ca.vertsplit(given[_STATE + centres :]) if own else [], e[:3], e[3:])
+    state = RodSection(
+        given[_GA], given[_EA], given[_EI_X], given[_EI_Y], given[_GJ], F_P, M_x, M_y, mass, stretch * model.length
+    )
+    v, u = model.section.strains(state, ca.vertsplit(given[_STATE + centres :]) if own else [], e[:3], e[3:])
     found = stretch * ca.vertcat(v, u)
     return ca.Function("strains", [given, stretch, e], [found, ca.reshape(ca.jacobian(found, e).T, 36, 1)])
 

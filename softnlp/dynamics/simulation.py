@@ -15,6 +15,7 @@ from softnlp.base.status import Status
 from softnlp.dynamics.drive import Chambers, Series
 from softnlp.dynamics.energy import Energy, Ledger
 from softnlp.dynamics.grid import grid_of
+from softnlp.dynamics.modes import grows
 from softnlp.dynamics.motion import TOLERANCE, Solved, Stepper
 from softnlp.dynamics.rod import Acting, Rod, still
 from softnlp.dynamics.rules import ERROR, Instant, RuleName, rule
@@ -172,13 +173,15 @@ class Simulation:
             begun, residual = Instant(0.0, e, self.rod.placed(numbers, e), still(self.rod.size)[0]), 0.0
         else:
             numbers = sections.at(self.chambers.at(0.0, after=False))
-            begun, residual = self.stepper.pose(numbers, self.acting(0.0, after=False))
-        before, numbers = numbers, sections.at(self.chambers.at(0.0))
-        if numbers is before:
+            begun, residual = self.stepper.pose(numbers, before := self.acting(0.0, after=False))
+            if grows(self.rod, begun, before):
+                self.warnings.append("the pose at rest that it begins at is not stable: the least push makes it buckle")
+        held, numbers = numbers, sections.at(self.chambers.at(0.0))
+        if numbers is held:
             return begun, numbers, residual, 0.0
         one, acting = self._behind(begun, numbers), self.acting(0.0)
         after = Ledger(self.rod, one, numbers, acting, 0.0).now.elastic
-        return one, numbers, residual, after - Ledger(self.rod, begun, before, acting, 0.0).now.elastic
+        return one, numbers, residual, after - Ledger(self.rod, begun, held, acting, 0.0).now.elastic
 
     def _behind(self, one: Instant, numbers: Numbers) -> Instant:
         """Return an instant with the resultants behind a jump, its shape and speeds as they are."""
