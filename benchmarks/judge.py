@@ -20,11 +20,14 @@ from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import COEFFICIENT_SETS, REPRODUCTION, Coefficients, Conventions
 from softnlp.model.materials import Material, material
 from softnlp.model.robot import robot
+from softnlp.rings import ENERGY
 from softnlp.statics.step import Step
 from softnlp.studies.blocked_force import blocked_force
 from softnlp.studies.forward import forward
 
 SETS = 3
+ELONGATION_FACTOR = 1.284
+"""c_m of the energy section with Mooney-Rivlin, from the mean elongation of the L60 robots, 38.67 mm."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,7 @@ class Variant:
 VARIANTS = (
     Variant("reproduction", 3, COEFFICIENT_SETS["reproduction"]),
     Variant("calibrated", 5, COEFFICIENT_SETS["calibrated"]),
+    Variant("energy", 1, Coefficients(modulus_factor=ELONGATION_FACTOR), ENERGY, closure="none"),
 )
 
 

@@ -44,6 +44,12 @@ if TYPE_CHECKING:
     from softnlp.model.materials import load_materials as load_materials
     from softnlp.model.materials import material as material
     from softnlp.model.numerics import Numerics as Numerics
+    from softnlp.model.obstacles import Capsule as Capsule
+    from softnlp.model.obstacles import Cylinder as Cylinder
+    from softnlp.model.obstacles import Plane as Plane
+    from softnlp.model.obstacles import Sphere as Sphere
+    from softnlp.model.obstacles import Trocar as Trocar
+    from softnlp.model.obstacles import Tube as Tube
     from softnlp.model.robot import ROBOTS as ROBOTS
     from softnlp.model.robot import Robot as Robot
     from softnlp.model.robot import robot as robot
@@ -58,6 +64,7 @@ if TYPE_CHECKING:
     from softnlp.results import save as save
     from softnlp.results import to_dataset as to_dataset
     from softnlp.results import to_json as to_json
+    from softnlp.rings.section_values import ENERGY as ENERGY
     from softnlp.scenario.design import run_design as run_design
     from softnlp.scenario.read import load_scenario as load_scenario
     from softnlp.scenario.run import run_scenario as run_scenario
@@ -117,11 +124,13 @@ _HOMES = {
     "model.numerics": ("Numerics",),
     "model.robot": ("ROBOTS", "Robot", "robot"),
     "model.segments": ("segmented_robot",),
+    "model.obstacles": ("Capsule", "Cylinder", "Plane", "Sphere", "Trocar", "Tube"),
     "model.rod": ("Loads",),
     "model.section": ("Section", "SectionRadii", "SectionState"),
     "nlp.constraint": ("Constraint",),
     "nlp.transcription": ("Collocation", "MultipleShooting"),
     "results": ("save", "to_dataset", "to_json"),
+    "rings.section_values": ("ENERGY",),
     "scenario.read": ("load_scenario",),
     "scenario.run": ("run_scenario",),
     "scenario.design": ("run_design",),

@@ -22,11 +22,18 @@ class NotedView:
         self.points_shown: Any = None
         self.colours_shown: Any = None
         self.targets_shown: Any = None
+        self.pins_shown: Any = []
         self.handlers: list[Callable[..., None]] = []
 
     def points(self, xyz_mm: Any, colours: Any = None) -> None:
         self.points_shown = None if xyz_mm is None else np.asarray(xyz_mm)
         self.colours_shown = colours
+
+    def pins(self, messages: Any) -> None:
+        self.pins_shown = messages
+
+    async def picture(self) -> bytes:
+        raise RuntimeError("there is no browser")
 
     def targets(self, xyz_mm: Any) -> None:
         self.targets_shown = None if xyz_mm is None else np.asarray(xyz_mm)

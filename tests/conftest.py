@@ -31,7 +31,8 @@ LONG = "test_units_only_change_the_numbers"
 
 # Files of five seconds and more, tests that take long among them, in the order of what they take.
 LONGEST = (
-    *("app_studies", "app_browser", "engine", "identify", "workspace_lane", "cli", "docs", "solver", "inverse"),
+    *("app_studies", "app_browser", "app_journey", "app_access", "engine", "identify", "workspace_lane", "cli"),
+    *("docs", "solver", "inverse"),
     *("sweep", "blocked_force", "forward", "sensitivity", "sweep_processes", "witness_blocked", "design"),
     *("shipped_blocked", "results", "shipped_scenarios", "plots", "workspace_docs", "compare_figures"),
     *("varying", "inverse_solver", "app_workspace", "pages", "view", "tensile", "paper", "problem", "app_session"),

@@ -190,7 +190,7 @@ def test_a_server_that_was_started_again_is_found_again(
         opened.type("pressure-number-1", "0.41")
         opened.page.wait_for_function(f"document.querySelector({force!r}).textContent !== {before!r}")
         opened.type("robot-length_mm", "-60")  # which the picture does not follow
-        opened.page.wait_for_selector("[data-testid=message]:has-text('Not used')")
+        opened.page.wait_for_selector("[data-testid=message]:has-text('Grey')")
         opened.settled()
         keeps(opened, "-60")
         shown, said = opened.numbers(), opened.text("message")

@@ -12,6 +12,7 @@ pytest.importorskip("nicegui", reason="the extra gui is not installed")
 
 from app_stage import NotedView, done, enter, field, opened, ran
 
+from softnlp.app.asking import Progress, run_steps, scenario_with
 from softnlp.app.session import Session
 from softnlp.app.tabs.inverse import (
     KINDS,
@@ -19,6 +20,7 @@ from softnlp.app.tabs.inverse import (
     count_of,
     inverse_tab,
     kind_of,
+    offer_target,
     rows_of,
     with_added,
     with_kind,
@@ -52,16 +54,35 @@ def test_the_only_target_stays_and_a_new_one_is_like_the_last() -> None:
     assert without(without(table, 0), 0) == without(table, 0)
 
 
+@pytest.mark.parametrize("robot", ["D10L40", "laparoscope-9"])
+def test_the_first_target_is_one_that_the_robot_reaches(robot: str) -> None:
+    session = Session()
+    session.change_all("robot", {"name": robot})
+    session.choose("inverse")
+    offer_target(session)
+    assert "target" in session.document.offered  # and is no change of the file
+    (step,) = run_steps(scenario_with(session, "inverse"), Progress()).steps
+    assert step.status.has_solution
+    assert step.aimed is not None
+    assert step.aimed.distance < 1e-3 * MILLIMETRE
+    session.change("target", "tip_position_mm", [[1.0, 2.0, 60.0]])
+    offer_target(session)  # a person's own stays
+    assert session.document.get("target", POSITION) == [[1.0, 2.0, 60.0]]
+    session.close()
+
+
 async def _visit() -> None:
     async with opened(inverse_tab, "inverse") as (user, stage):
         view, session = stage.view, stage.session
         assert isinstance(view, NotedView)
-        enter(user, "target.tip_position_mm.0.0", -12.0)
-        enter(user, "target.tip_position_mm.0.1", 5.0)
+        assert not session.is_used("inverse")
+        assert "target" in session.document.offered
+        await ran(user, "inverse", "Reached at")  # what it begins with
+        for place, value in enumerate((-12.0, 5.0, 62.0)):
+            enter(user, f"target.tip_position_mm.0.{place}", value)
         assert view.targets_shown.tolist() == [[-12.0, 5.0, 62.0]]
         words = await ran(user, "inverse", "Reached at")
         assert "mm left" in words
-        user.find(marker="inverse.use").click()
         scenario = session.scenario
         assert scenario is not None
         run, _ = session.live.pose(scenario, session.pressure)
@@ -75,14 +96,13 @@ async def _visit() -> None:
         view.handlers[0]((0.0, 0.0, 170.123456))
         assert session.document.get("target", POSITION) == [[-12.0, 5.0, 62.0], [0.0, 0.0, 170.1]]
         # the second is out of reach; the nearest place is on the axis, as it must be
-        await ran(user, "inverse", "A click on a row")
+        await ran(user, "inverse", "a click on a row")
         table = field(user, "inverse.table")
         assert [row["failed"] for row in table.rows] == [False, True]
         for listener in table._event_listeners.values():
             if listener.type == "rowClick":
                 listener.handler(type("Click", (), {"args": [None, {"row": 1}, 1]}))
         assert "No pressure within the bounds" in field(user, "inverse.message").text
-        user.find(marker="inverse.use").click()
         assert session.pressure == pytest.approx(np.full(3, 1.5e5), rel=1e-6)
         # bounds and wild input
         enter(user, "bounds.highest", -1.0)

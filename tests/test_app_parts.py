@@ -55,7 +55,7 @@ def test_a_slow_pose_leaves_what_was_said_of_the_sliders(monkeypatch: pytest.Mon
             session, view = Session(WEAK), NotedView()
             view.show = lambda frame: None  # type: ignore[attr-defined]
             sessions.append(session)
-            live_view.LiveView(Stage(session, view), lambda run: None, said.append).request()  # type: ignore[arg-type]
+            live_view.LiveView(Stage(session, view), lambda run: None, lambda words, _: said.append(words)).request()  # type: ignore[arg-type]
 
         async def until(poses: int, words: str) -> None:
             for _ in range(1200):

@@ -135,6 +135,10 @@ def test_a_formula_with_code_in_it_is_refused(session: Session) -> None:
 def test_a_shipped_scenario_opens_with_its_files(session: Session, file: Path) -> None:
     if "study" not in file.read_text():
         pytest.skip("a material file")
+    if file.parent.name == "contact":
+        with pytest.raises(InputError, match=r"this page takes no \[\[obstacle\]\] so far"):
+            session.open_path(file)
+        return
     if file.stem in ("two_segments", "cone"):
         with pytest.raises(InputError, match="this page takes a robot of one uniform segment so far"):
             session.open_path(file)

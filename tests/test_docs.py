@@ -27,6 +27,7 @@ from softnlp.model.formula import FUNCTIONS
 from softnlp.model.ipopt_options import IPOPT_OPTIONS
 from softnlp.model.laws import LAWS
 from softnlp.scenario.check import SCHEMAS
+from softnlp.scenario.obstacle_schema import ObstacleTable
 from softnlp.scenario.read import scenario_from_text
 from softnlp.scenario.schema import BlockedForceFile, OffsetRampTable, RampTable
 from softnlp.scenario.segments import SegmentTable
@@ -135,7 +136,7 @@ def tables(model: type[BaseModel]) -> Iterator[tuple[str, type[BaseModel]]]:
 
 def keys_of_tables() -> set[str]:
     found = {key for _, table in tables(BlockedForceFile) for key in table.model_fields}
-    found |= set(SegmentTable.model_fields) - {"robot", "material"}
+    found |= set(SegmentTable.model_fields) - {"robot", "material"} | set(ObstacleTable.model_fields)
     return found | set(IPOPT_OPTIONS) | set(RampTable.model_fields) | set(OffsetRampTable.model_fields)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from softnlp.cli import main
-from softnlp.cli.example import shipped_scenarios
+from softnlp.scenario.examples import shipped_scenarios
 from softnlp.scenario.read import load_scenario
 
 CHECKOUT = Path(__file__).parents[1] / "scenarios"

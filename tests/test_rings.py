@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from softnlp import material, robot
+from softnlp.model.energies import from_uniaxial, invariant_energy, mooney_rivlin, ogden
 from softnlp.rings import (
     Circle,
     Curve,
@@ -20,7 +21,6 @@ from softnlp.rings import (
     ring_response,
     robot_response,
 )
-from softnlp.rings.energy import from_uniaxial, invariant_energy, mooney_rivlin, ogden
 from softnlp.rings.equilibrium import Equilibrium
 from softnlp.rings.mesher import mesh
 from softnlp.rings.response import follow, response_on

@@ -6,8 +6,8 @@ import numpy as np
 
 from docs.figures._shared import markdown
 from softnlp import material, robot
+from softnlp.model.energies import PlaneEnergy
 from softnlp.rings import RingResponse, energy_of, robot_response
-from softnlp.rings.energy import PlaneEnergy
 
 ROBOTS = ("D25L60", "D20L60", "D15L60", "D10L60", "laparoscope-9", "laparoscope-3")
 LAWS = ("mooney-rivlin", "neo-hookean", "yeoh", "ogden", "linear")

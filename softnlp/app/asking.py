@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from threading import Event
+from time import perf_counter
 from typing import Any
 
 from softnlp.app.document import Document
@@ -31,6 +32,7 @@ class Progress:
         self.fraction = 0.0
         self.text = ""
         self._stop = Event()
+        self._began = perf_counter()
 
     def __call__(self, done: float, total: float, text: str = "") -> None:
         """Note how far the work is.
@@ -45,6 +47,14 @@ class Progress:
         self.fraction = min(1.0, done / total) if total else 0.0
         self.text = text
 
+    def words(self) -> str:
+        """Return how far the work is, with the part that is done and how long the rest takes at the same pace."""
+        if not 0 < self.fraction < 1:
+            return self.text
+        left = (perf_counter() - self._began) * (1 - self.fraction) / self.fraction
+        part = f"{100 * self.fraction:.0f} %, about {duration(left)} left"
+        return f"{self.text}, {part}" if self.text else part.capitalize()
+
     @property
     def stopping(self) -> bool:
         """Whether a person wants the work to end."""
@@ -53,6 +63,15 @@ class Progress:
     def stop(self) -> None:
         """Ask the work to end at its next step."""
         self._stop.set()
+
+
+def duration(seconds: float) -> str:
+    """Return a time in words, as a person would say it."""
+    if seconds < 1:
+        return "1 s"
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
 def scenario_with(session: Session, study: str, tables: Tables | None = None) -> Scenario:
@@ -71,7 +90,10 @@ def scenario_with(session: Session, study: str, tables: Tables | None = None) ->
         document.replace(name, values)
     asked = scenario_from_text(document.text(study), session.folder / session.name)
     if study == session.document.study:
+        first = not session.is_used(study)
         session.use()
+        if first:
+            session.reread()  # what is said of a study that nobody asked goes
     return asked
 
 

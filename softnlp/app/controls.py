@@ -69,7 +69,7 @@ def toggle(options: Any, name: str, value: str | None = None, test: str = "") ->
 
 def heading(words: str) -> ui.label:
     """Show the heading of a part of a tab."""
-    return ui.label(words).classes("text-base font-medium")
+    return ui.label(words).classes("text-base font-medium").props("role=heading aria-level=2")
 
 
 def problem_label(name: str) -> ui.label:

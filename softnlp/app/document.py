@@ -10,6 +10,7 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable, Table
 
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.reading import one_line
 from softnlp.model.robot import ROBOTS
@@ -36,9 +37,15 @@ sequence_bar = [[0.8, 0.0, 0.0]]
 _NEEDED: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "workspace": {"workspace": {"levels": 8, "to_bar": 1.2}},
     "inverse": {"target": {"tip_position_mm": [[-20.0, 0.0, 62.0]]}, "bounds": {"pressure_bar": [0.0, 1.5]}},
+    "design": {
+        "choices": {"robot": {"chamber_diameter_mm": {"from": 3.0, "to": 5.0}}},
+        "actuation": {"sets": [1], "pressure_bar": 0.8},
+        "objective": {"maximise": OUTPUTS["bending_angle"].key},
+    },
 }
 """Tables without which a study cannot start, as the app first shows them."""
 _TOP = ""
+_DEEP, _DOTTED = ("choices", "requirements", "actuation"), ("robot", "material")  # of [choices]
 MOST_SETS = 24
 
 
@@ -47,7 +54,8 @@ class Document:
 
     `text` writes the file of one study: with the tables that this study has, and with its comments.
 
-    sweeps_wall : whether a workspace pushes against the wall of the blocked force, which may be there for that alone.
+    offered : tables that a study started with, which nobody has changed. sweeps_wall : whether a workspace pushes
+    against the wall of the blocked force, which may be there for that alone.
     """
 
     def __init__(self, text: str = START) -> None:
@@ -59,6 +67,7 @@ class Document:
             raise InputError(f"not valid TOML: {one_line(str(error)) or 'nested too deeply'}") from None
         study = self._tables.get("study")
         self.study = str(study) if isinstance(study, str) else "forward"
+        self.offered: set[str] = set()
         self.sweeps_wall = self.study == "workspace" and "contact" in self._tables
 
     def get(self, table: str, key: str, default: Any = None) -> Any:
@@ -71,6 +80,11 @@ class Document:
         """Return a whole table as plain Python; empty where there is none."""
         found = self._tables.get(name)
         return dict(found.unwrap()) if isinstance(found, Table | InlineTable) else {}
+
+    def own(self) -> dict[str, Any]:
+        """Return as plain Python what a person has put into the document, of every study."""
+        every: dict[str, Any] = self._tables.unwrap()
+        return {key: value for key, value in every.items() if key != "study" and key not in self.offered}
 
     def source(self) -> str:
         """Return everything that the document holds, of every study."""
@@ -96,6 +110,7 @@ class Document:
 
     def set(self, table: str, key: str, value: Any) -> None:
         """Set a key, or remove it for None; a table that this leaves empty is removed too."""
+        self.offered.discard(table)
         if value is not None:
             if table == _TOP:
                 self._tables[key] = value
@@ -113,8 +128,13 @@ class Document:
 
     def replace(self, table: str, values: Mapping[str, Any] | None) -> None:
         """Put these keys in place of those that the table has; None removes it. Comments of kept keys stay."""
+        self.offered.discard(table)
         if not values:
             self._tables.pop(table, None)
+            return
+        if table in _DEEP:  # of which single keys cannot be replaced
+            if self.table(table) != values:
+                self._tables[table] = _new_table(values)
             return
         for key in self.table(table):
             if key not in values:
@@ -155,10 +175,12 @@ class Document:
         for name, values in _NEEDED.get(study, {}).items():
             if name not in self._tables:
                 self._tables[name] = _new_table(values)
+                self.offered.add(name)
         schema = SCHEMAS.get(study)
         if schema is not None and "pressure" in schema.model_fields and "pressure" not in self._tables:
             self._tables["pressure"] = _new_table({"sequence_bar": [[0.0]]})
             self.fit_pressures()
+            self.offered.add("pressure")
 
     def fit_pressures(self) -> None:
         """Give each row of pressures as many columns as the robot has sets: zeros are added, columns left out."""
@@ -179,6 +201,21 @@ class Document:
 
 
 def _new_table(values: Mapping[str, Any]) -> Table:
+    """Return a table as a person would write it: inner tables by dotted keys, innermost ones in a line."""
     table = tomlkit.table()
-    table.update(values)
+    for name, value in values.items():
+        if isinstance(value, Mapping) and name in _DOTTED:
+            for key, inner in value.items():
+                table.append(tomlkit.key([name, key]), _in_line(inner))
+        else:
+            table[name] = _in_line(value)
     return table
+
+
+def _in_line(value: Any) -> Any:
+    if not isinstance(value, Mapping):
+        return value
+    line = tomlkit.inline_table()
+    for key, inner in value.items():
+        line.append(key, getattr(inner, "unwrap", lambda inner=inner: inner)())
+    return line

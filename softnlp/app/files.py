@@ -12,7 +12,8 @@ from nicegui import events, ui
 
 from softnlp.app.controls import dismiss_refusals, plain_words, refuse
 from softnlp.app.document import Document
-from softnlp.app.parts import while_open
+from softnlp.app.examples import example_choice
+from softnlp.app.parts import DROP, while_open
 from softnlp.app.session import LARGEST_FILE, Session
 from softnlp.base.errors import InputError, SoftnlpError
 from softnlp.model.robot import Robot
@@ -73,13 +74,21 @@ def open_dialog(session: Session) -> ui.dialog:
         refuse(f"not opened: expected .toml and .csv files of at most {LARGEST_FILE / 1e6:.0f} MB")
 
     with ui.dialog() as dialog, ui.card().classes("w-96"):
-        ui.label("Open a scenario").classes("text-lg")
+        ui.label("Open a scenario").classes("text-lg").props("role=heading aria-level=2")
         ui.label("A .toml file; drop the CSV and material files that it names together with it.").classes("text-sm")
         # Files that belong together come together only where their handler is given here
+        ui.add_css(DROP)
         upload = ui.upload(
-            multiple=True, auto_upload=True, max_file_size=LARGEST_FILE, on_multi_upload=taken, on_rejected=refused
+            label="Drop files here, or click +",
+            multiple=True,
+            auto_upload=True,
+            max_file_size=LARGEST_FILE,
+            on_multi_upload=taken,
+            on_rejected=refused,
         )
-        upload.props('flat bordered accept=".toml,.csv,.txt" data-testid=open-upload').classes("w-full")
+        upload.props('flat bordered accept=".toml,.csv,.txt" data-testid=open-upload color=transparent')
+        upload.props("text-color=primary").classes("w-full softnlp-drop")
+        example_choice(session, dialog)
         ui.button("Cancel", on_click=dialog.close).props("flat no-caps data-testid=open-cancel")
     return dialog
 

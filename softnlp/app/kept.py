@@ -10,6 +10,7 @@ from nicegui import Client, ui
 from starlette.requests import Request
 from starlette.responses import Response
 
+from softnlp.app.links import unpacked
 from softnlp.app.session import Session
 from softnlp.app.theme import Redraw
 from softnlp.base.errors import SoftnlpError
@@ -48,9 +49,15 @@ def keep(session: Session) -> None:
     soon()
 
 
-async def recall(session: Session) -> None:
-    """Show what the browser tab kept."""
-    kept, files = [await _read(key) for key in (_KEPT, _FILES)]
+async def recall(session: Session, link: str = "") -> None:
+    """Show the state of a link, or else what the browser tab kept; the link then leaves the address."""
+    kept, files = [await read_kept(key) for key in (_KEPT, _FILES)]
+    if link:
+        ui.run_javascript("history.replaceState(null, '', location.pathname)")  # a reload shows what the tab kept
+        try:
+            kept, files = unpacked(link)
+        except SoftnlpError as error:
+            ui.notify(f"the link could not be opened: {error}", type="warning", multi_line=True)
     if kept:
         try:
             session.recall(kept, files or "{}")
@@ -58,13 +65,20 @@ async def recall(session: Session) -> None:
             ui.notify(f"what this tab showed before could not be opened again: {error}", type="warning")
 
 
-async def _read(key: str) -> str:
+async def read_kept(key: str) -> str:
     """Return what the browser tab keeps under a key, "" for nothing."""
     stored = f"(sessionStorage.getItem({json.dumps(key)}) ?? '')"
     size = await ui.run_javascript(f"return {stored}.length", timeout=10.0)
     starts = range(0, size or 0, _PIECE)
     pieces = [await ui.run_javascript(f"return {stored}.slice({k}, {k + _PIECE})", timeout=10.0) for k in starts]
     return "".join(map(str, pieces))
+
+
+async def wants_dark() -> bool:
+    """Return whether a person turned the page dark before, or else whether the browser prefers dark pages."""
+    preferred = "String(matchMedia('(prefers-color-scheme: dark)').matches)"
+    told = await ui.run_javascript(f"return sessionStorage.getItem('softnlp.dark') ?? {preferred}", timeout=10.0)
+    return bool(told == "true")
 
 
 def tell_when_closed() -> None:

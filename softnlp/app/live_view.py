@@ -10,7 +10,7 @@ import numpy as np
 from nicegui import background_tasks, ui
 from numpy.typing import NDArray
 
-from softnlp.app.asking import bars
+from softnlp.app.asking import bars, sentence
 from softnlp.app.session import Session, Stage
 from softnlp.app.theme import Redraw
 from softnlp.app.view import frame_of
@@ -34,13 +34,14 @@ _NUMBERS_AFTER_S = 0.04
 class LiveView:
     """Solves the pose of the session in a thread whenever it changes, and hands it to the view and the panels.
 
-    shown : called with each run of one step. say : called with a line about what is not shown, "" when all is well.
+    shown : called with each run of one step. say : called with a line about what is not shown, "" when all is well, and
+    whether the picture is not of the controls.
     """
 
-    def __init__(self, stage: Stage, shown: Callable[[Run], None], say: Callable[[str], None]) -> None:
+    def __init__(self, stage: Stage, shown: Callable[[Run], None], say: Callable[[str, bool], None]) -> None:
         self._stage = stage
         self._say = say
-        self._words = ""
+        self._words, self._stale = "", False
         self._wanted = False
         self._working = False
         self._last: tuple[Scenario, Array] | None = None
@@ -74,38 +75,40 @@ class LiveView:
         task = asyncio.create_task(asyncio.to_thread(solve, scenario, pressure))
         if not (await asyncio.wait({task}, timeout=_PATIENCE_S))[0]:
             with self._client:
-                self._say(_SOLVING)
+                self._say(_SOLVING, True)
             await asyncio.wait({task})
             with self._client:
-                self._say(self._words)
+                self._say(self._words, self._stale)
         try:
             run, ghost = await task
         except InputError as error:
             with self._client:
-                self._said(str(error))
+                self._said(sentence(error.message), True)
             return
         with self._client:
             step = run.steps[0]
             if not step.status.has_solution and self._stays(scenario, pressure):
                 assert self._last is not None
-                self._said(f"{step.message}. The sliders stay at {bars(self._last[1], 3)} bar.")
+                self._said(f"{sentence(step.message)} The sliders stay at {bars(self._last[1], 3)} bar.")
                 session.set_pressure(self._last[1])
                 return
             if step.pose is not None and step.status.has_solution:
                 self._show(scenario, pressure, step, step.pose, ghost)
             else:
-                self._said(f"{step.message}. The picture is of the last pose that was solved.")
+                self._said(f"{sentence(step.message)} Grey: the last pose that was solved.", True)
         self._run = run
         self._tell()
 
-    def _said(self, words: str) -> None:
-        """Say words that stay when a later pose takes long."""
-        self._words = words
-        self._say(words)
+    def _said(self, words: str, stale: bool = False) -> None:
+        """Say words that stay when a later pose takes long. stale : whether the picture is not of the controls."""
+        self._words, self._stale = words, stale
+        self._say(words, stale)
 
     def _show(self, scenario: Scenario, pressure: Array, step: Step, pose: Pose, ghost: Pose | None) -> None:
         if self._last is None or not np.array_equal(self._last[1], pressure) or self._last[0] is not scenario:
             self._said("")
+        if self._last is not None and vars(self._last[0].robot) != vars(scenario.robot):
+            self._stage.view.clear_trail()  # of another robot
         self._last, loads, contact = (scenario, pressure), scenario.loads, step.contact
         stands = contact is not None and contact.normal.any()  # else the chambers alone are held
         self._stage.view.show(

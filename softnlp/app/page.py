@@ -7,14 +7,18 @@ from functools import partial
 
 from nicegui import ui
 
+from softnlp.app.asking import sentence
 from softnlp.app.controls import button
 from softnlp.app.files import mesh_menu, open_dialog, save
 from softnlp.app.live_view import LiveView
 from softnlp.app.panels.equations import coefficients_panel, loads_panel, solver_panel
 from softnlp.app.panels.material import material_panel
+from softnlp.app.panels.past import Past
+from softnlp.app.panels.pins import PinsPanel
 from softnlp.app.panels.pressure import pressure_panel
 from softnlp.app.panels.results import ResultsPanel
 from softnlp.app.panels.robot import robot_panel
+from softnlp.app.report import report_menu
 from softnlp.app.session import Session, Stage
 from softnlp.app.tabs.blocked import blocked_tab
 from softnlp.app.tabs.identify import identify_tab
@@ -24,67 +28,117 @@ from softnlp.app.tabs.sequence import sequence_tab
 from softnlp.app.tabs.workspace import workspace_tab
 from softnlp.app.theme import style_page
 from softnlp.app.view import RobotView
+from softnlp.statics.step import Run
 
-STUDIES = {
+
+def _design(stage: Stage) -> None:
+    from softnlp.app.tabs.design import design_tab  # these three when they are opened: the page is there sooner
+
+    design_tab(stage)
+
+
+def _compare(stage: Stage) -> None:
+    from softnlp.app.tabs.compare import compare_tab
+
+    compare_tab(stage)
+
+
+def _sensitivity(stage: Stage) -> None:
+    from softnlp.app.tabs.sensitivity import sensitivity_tab
+
+    sensitivity_tab(stage)
+
+
+STUDIES: dict[str, tuple[str, str | None, Callable[[Stage], None]]] = {
     "kinematics": ("Kinematics", "forward", sequence_tab),
     "blocked": ("Blocked force", "blocked-force", blocked_tab),
     "workspace": ("Workspace", "workspace", workspace_tab),
     "inverse": ("Inverse", "inverse", inverse_tab),
     "identify": ("Identification", "identify", identify_tab),
+    "design": ("Design", "design", _design),
+    "compare": ("Compare", None, _compare),
+    "sensitivity": ("Sensitivity", None, _sensitivity),
 }
-"""The tabs: label, study of the scenario while it is open, and what builds it."""
-_TAB_OF = {study: name for name, (_, study, _) in STUDIES.items()}
+"""The tabs: label, study of the scenario while it is open (None: any), and what builds it."""
+_TAB_OF = {study: name for name, (_, study, _) in STUDIES.items() if study is not None}
 SCENARIO = "scenario"
 _LINE = "border-neutral-300 dark:border-neutral-700"
-_HEADER = f"h-12 px-3 py-0 items-center no-wrap gap-2 border-b softnlp-surface {_LINE}"
+_HEADER = f"softnlp-header min-h-12 px-3 py-0 items-center gap-2 border-b softnlp-surface {_LINE}"
 _COLUMN = "softnlp-column shrink-0 h-full overflow-y-auto overflow-x-hidden p-3"
 _MESSAGE = "absolute bottom-2 left-2 right-2 text-sm rounded px-3 py-2 bg-orange-100 text-orange-950"
-_NOT_USED = "Not used:"
+_GREY = "Grey: the last robot that made sense."
+_PANELS = {
+    "robot": "robot",
+    "material": "material",
+    "gravity": "loads",
+    "tip_load": "loads",
+    "stiffening": "coefficients",
+    "corrections": "coefficients",
+    "solver": "solver",
+}
+"""The panel on the left that says what is wrong with a table."""
 
 
-def build_page(session: Session) -> None:
-    """Build one browser tab for a session."""
-    dark = ui.dark_mode()
+def build_page(session: Session, pins: str = "", is_dark: bool = False) -> None:
+    """Build one browser tab for a session. pins : those that the browser kept. is_dark : whether it begins dark."""
+    dark = ui.dark_mode(is_dark)
     style_page()
     chosen = _TAB_OF.get(session.document.study, SCENARIO)
     with ui.header(elevated=False).classes(_HEADER):
-        ui.label("softnlp").classes("text-lg font-semibold mr-2")
-        with ui.tabs().props("dense no-caps inline-label shrink").classes("min-w-0") as tabs:
+        ui.label("softnlp").classes("text-lg font-semibold mr-2").props("role=heading aria-level=1")
+        with ui.tabs().classes("softnlp-tabs min-w-0") as tabs:
+            tabs.props("dense no-caps inline-label shrink outside-arrows")
             for name, label in (*((name, label) for name, (label, *_) in STUDIES.items()), (SCENARIO, "Scenario")):
                 ui.tab(name, label=label).props(f"data-testid=tab-{name}")
         tabs.set_value(chosen)
         ui.space()
-        exports = _files(session, dark)
-    with ui.row().classes("w-full no-wrap gap-0").style("height: calc(100vh - 48px)"):
-        with ui.element("div").classes(f"w-[330px] border-r {_COLUMN} {_LINE}"):
-            _panels(session)
-        with ui.column().classes("grow min-w-0 h-full gap-0 relative"):
+        with ui.row().classes("items-center no-wrap gap-1"):
+            exports = _files(session, dark)
+    with ui.row().classes("softnlp-page w-full no-wrap gap-0"):
+        with ui.element("div").classes(f"softnlp-inputs border-r {_COLUMN} {_LINE}"):
+            panels = _panels(session)
+        with ui.column().classes("softnlp-middle min-w-0 gap-0 relative") as middle:
             view = RobotView().classes("w-full grow min-h-0").props("data-testid=view")
+            with ui.row().classes("absolute top-2 left-2 gap-1 z-10"):
+                Past(session)
+                pin = button("Pin", "push_pin", "pin", lambda: pinned.pin(), "flat dense no-caps")
+                pin.tooltip("Keep this state beside those to come")
             _view_buttons(view)
             message = ui.label().classes(_MESSAGE).props("data-testid=message role=status").mark("message")
             message.set_visibility(False)
         stage = Stage(session, view)
-        with ui.element("div").classes(f"w-[390px] border-l {_COLUMN} {_LINE}"):
-            results = ResultsPanel()
+        with ui.element("div").classes(f"softnlp-results border-l {_COLUMN} {_LINE}"):
+            with ui.element("div").classes("w-full softnlp-shown") as shown:
+                results = ResultsPanel()
+            pinned = PinsPanel(stage, lambda: results.run, pins)
             ui.separator()
             _studies(stage, tabs, chosen)
             ui.separator()
             results.details()
 
-    def say(words: str) -> None:
-        """Show a line below the view; while something makes no sense, that is said where there is nothing else."""
-        if not words and session.problem is not None and not awaits_data(session):
-            words = f"{_NOT_USED} {session.problem}"
+    def say(words: str, stale: bool = False) -> None:
+        """Show a line below the view, and in grey what is no picture of the controls."""
+        if session.is_stale and not awaits_data(session):
+            words, stale = stale_words(session), True
         message.set_text(words)
         message.set_visibility(bool(words))
+        for part in (middle, shown):
+            part.classes(add="softnlp-stale") if stale else part.classes(remove="softnlp-stale")
 
-    live = LiveView(stage, results.show, say)
+    def found(run: Run) -> None:
+        results.show(run)
+        pinned.show(run)
+
+    live = LiveView(stage, found, say)
     with exports:
+        report_menu(stage, lambda: results.run, lambda: pinned.pins)
         mesh_menu(session, lambda: None if results.run is None else results.run.steps[0].pose)
 
     def read_again() -> None:
-        if session.problem is not None or message.text.startswith(_NOT_USED):
+        if session.is_stale or message.text.startswith(_GREY):
             say("")
+        if session.is_stale and session.problem is not None and session.problem.table in _PANELS:
+            panels[_PANELS[session.problem.table]].set_value(True)  # where it is said
         opened = _TAB_OF.get(session.document.study, SCENARIO)
         if tabs.value != opened and tabs.value != SCENARIO:
             tabs.set_value(opened)
@@ -92,6 +146,15 @@ def build_page(session: Session) -> None:
     session.on_scenario(read_again)
     say("")
     live.request()
+
+
+def stale_words(session: Session) -> str:
+    """Return what to say of a picture that is not of what is on the screen: where it is told, or else what is wrong."""
+    problem = session.problem
+    table = "" if problem is None else problem.table or ""
+    if problem is None or table in _PANELS:
+        return f"{_GREY} See the field marked red."
+    return f"{_GREY} {sentence(problem.message)}"
 
 
 def awaits_data(session: Session) -> bool:
@@ -104,17 +167,23 @@ def _files(session: Session, dark: ui.dark_mode) -> ui.menu:
     """Build the buttons for files and return the menu of exports."""
     dialog = open_dialog(session)
     look = "flat dense no-caps"
-    button("Open", "folder_open", "open", dialog.open, look)
-    button("Save", "save", "save", partial(save, session), look)
-    with ui.button("Export", icon="view_in_ar").props(f"{look} data-testid=export"), ui.menu() as exports:
-        pass
-    turn = button("", "contrast", "dark", dark.toggle, "flat dense round").tooltip("Light or dark")
-    turn.props('aria-label="light or dark"')
+    button("Open", "folder_open", "open", dialog.open, look).props("aria-label=Open")
+    button("Save", "save", "save", partial(save, session), look).props("aria-label=Save")
+    with ui.button("Export", icon="view_in_ar").props(f"{look} data-testid=export aria-label=Export"):
+        exports = ui.menu()
+
+    def turned() -> None:
+        dark.toggle()
+        ui.run_javascript(f"sessionStorage.setItem('softnlp.dark', '{str(bool(dark.value)).lower()}')")
+
+    turn = button("", "contrast", "dark", turned, "flat dense round").tooltip("Light or dark")
+    turn.props('aria-label="Light or dark"')
     return exports
 
 
-def _panels(session: Session) -> None:
-    """Build what describes the robot, its silicone, its loads and the equations."""
+def _panels(session: Session) -> dict[str, ui.expansion]:
+    """Build what describes the robot, its silicone, its loads and the equations; return the panels by name."""
+    panels = {}
     for name, label, opened, build in (
         ("pressures", "Pressures", True, pressure_panel),
         ("robot", "Robot", True, robot_panel),
@@ -128,6 +197,8 @@ def _panels(session: Session) -> None:
         with panel:
             inside = ui.column().classes("w-full gap-2 pb-3")
         _when_open(panel, inside, partial(build, session))
+        panels[name] = panel
+    return panels
 
 
 def _when_open(panel: ui.expansion, inside: ui.element, build: Callable[[], None]) -> None:

@@ -102,7 +102,7 @@ class RunRow:
         begun = self.progress.fraction > 0
         self._bar.props(remove="indeterminate") if begun else self._bar.props("indeterminate")
         self._bar.set_value(self.progress.fraction)
-        self.say("Stopping after this step…" if self.progress.stopping else self.progress.text or "Working…")
+        self.say("Stopping after this step…" if self.progress.stopping else self.progress.words() or "Working…")
         if self._watch is not None:
             self._watch()
 
@@ -111,12 +111,12 @@ def study_row(
     marker: str,
     label: str,
     asked: Callable[[], Callable[[Progress], T]],
-    done: Callable[[T], None],
+    done: Callable[[T], Awaitable[None] | None],
     watch: Callable[[], None] | None = None,
 ) -> RunRow:
     """Show the row of a study: the button does the work that `asked` returns, `done` gets its result.
 
-    What is not possible is said. watch : as of `RunRow.do`.
+    What is not possible is said. done : may go on drawing (a coroutine). watch : as of `RunRow.do`.
     """
 
     async def begin() -> None:
@@ -126,8 +126,8 @@ def study_row(
             row.warn(plain_words(error))
             return
         found = await row.do(work, watch)
-        if found is not None:
-            done(found)
+        if found is not None and (drawing := done(found)) is not None:
+            await drawing
 
     row = RunRow(marker, label, begin)
     return row
@@ -308,7 +308,7 @@ def csv_drop(marker: str, label: str, take: Callable[[str, bytes], None]) -> ui.
         except SoftnlpError as error:
             ui.notify(plain_words(error), type="warning", multi_line=True)
 
-    ui.add_css(_DROP)
+    ui.add_css(DROP)
     box = ui.upload(
         label=label,
         on_upload=arrived,
@@ -337,7 +337,7 @@ def downloads(*files: tuple[str, str, str]) -> dict[str, Callable[[], str]]:
 
 
 # The list of files is empty at once: a dropped one is named by the tab.
-_DROP = """
+DROP = """
 .softnlp-drop .q-uploader__list, .softnlp-drop .q-uploader__subtitle { display: none }
 .softnlp-drop .q-uploader__header { background: transparent !important; color: inherit !important }
 .softnlp-drop .q-uploader__title { font-size: 0.85rem; font-weight: 400; line-height: 1.3 }

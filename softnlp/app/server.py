@@ -16,8 +16,9 @@ from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
 from softnlp.app.guard import Guard, root_path, trusted_host
-from softnlp.app.kept import CLOSED, close_all, closed, keep, recall, tell_when_closed
+from softnlp.app.kept import CLOSED, close_all, closed, keep, read_kept, recall, tell_when_closed, wants_dark
 from softnlp.app.page import build_page
+from softnlp.app.panels.pins import KEPT as PINS
 from softnlp.app.session import Session
 from softnlp.base.errors import InputError, SoftnlpError
 from softnlp.base.reading import shown
@@ -70,10 +71,10 @@ def serve(
     sys.setswitchinterval(0.0005)
 
     @ui.page("/", title="softnlp")
-    async def page(client: Client) -> None:
+    async def page(client: Client, state: str = "") -> None:
         await client.connected()
         if not client.is_deleted:
-            await open_tab(client, scenario)
+            await open_tab(client, scenario, state)
 
     def begin() -> None:
         assert app.middleware_stack is not None  # built by now; what NiceGUI adds stands behind the guard as well
@@ -101,8 +102,8 @@ def serve(
     )
 
 
-async def open_tab(client: Client, scenario: Path | None) -> None:
-    """Fill a page that a browser has opened: with what this tab kept, or else the scenario of a file."""
+async def open_tab(client: Client, scenario: Path | None, state: str = "") -> None:
+    """Fill a page that a browser has opened: with a link's state, or what this tab kept, or the file's scenario."""
     session = Session()
     client.on_delete(session.close)
     if scenario is not None:
@@ -110,8 +111,8 @@ async def open_tab(client: Client, scenario: Path | None) -> None:
             session.open_path(scenario)
         except SoftnlpError as error:  # it was there when the server started
             ui.notify(f"not opened: {error}", type="warning", multi_line=True)
-    await recall(session)
-    build_page(session)
+    await recall(session, state)
+    build_page(session, await read_kept(PINS), await wants_dark())
     keep(session)
     tell_when_closed()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -14,15 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.app.document import START, Document
+from softnlp.app.history import State
 from softnlp.app.live import LivePoses
 from softnlp.base.errors import InputError, located
 from softnlp.base.reading import IMPORTED, LARGEST_TOML, one_line, read_bytes, read_text, shown
 from softnlp.base.units import BAR
 from softnlp.model.segments import require_one_segment
 from softnlp.scenario.check import SCHEMAS
+from softnlp.scenario.data import require_no_obstacles
 from softnlp.scenario.read import Scenario, load_scenario, placed, scenario_from_text
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from softnlp.app.view import RobotView
 
 Array = NDArray[np.float64]
@@ -78,7 +82,7 @@ class Session:
         self.problem: InputError | None = None
         self.name = name
         self._start(Document(text))
-        self._sound = ""
+        self._sound, self._stale = "", False
         self.follows_file = True
         self.scenario = self._read()
         self.pressure = self._last_pressure()
@@ -109,7 +113,7 @@ class Session:
         for file, content in given.items():
             (self.folder / file).write_bytes(content)
         self._start(document)
-        self.problem, self._sound = None, document.text()
+        self.problem, self._sound, self._stale = None, document.text(), False
         self.scenario = replace(scenario, path=self.folder / name)
         self.name, self.follows_file = name, True
         self.pressure = self._last_pressure()
@@ -134,6 +138,7 @@ class Session:
                 (Path(folder) / file).write_bytes(content)
             found = scenario_from_text(document.text(), Path(folder) / name)
             require_one_segment(found.robot, "this page")
+            require_no_obstacles(found, "this page")
             return found
 
     def open_path(self, path: Path) -> None:
@@ -141,6 +146,7 @@ class Session:
         asked = load_scenario(path)  # says the same of a broken file as the commands
         with located(source=one_line(str(path))):
             require_one_segment(asked.robot, "this page")
+            require_no_obstacles(asked, "this page")
         document = Document(read_text(path, LARGEST_TOML))
         files = {}
         for file in document.files():
@@ -202,6 +208,11 @@ class Session:
             self.reread()
 
     @property
+    def is_stale(self) -> bool:
+        """Whether `scenario` is an earlier one, since what is on the screen makes no sense."""
+        return self.problem is not None and self._stale
+
+    @property
     def study(self) -> str:
         """The study of the file that is saved: that on the screen, once the file was of it or it was run or changed.
 
@@ -209,6 +220,10 @@ class Session:
         """
         looked = self.document.study
         return looked if looked in self._used or {looked, self._last_used} <= _POSES else self._last_used
+
+    def is_used(self, study: str) -> bool:
+        """Whether the file was of a study, or it was run or changed; a look at it is not enough."""
+        return study in self._used
 
     def use(self) -> None:
         """Make the study on the screen that of the file."""
@@ -260,7 +275,7 @@ class Session:
     def kept(self) -> str:
         """Return all that is on the screen as text, for `recall`."""
         kept: dict[str, Any] = {"name": self.name, "source": self.document.source(), "study": self.document.study}
-        kept |= {"last_used": self._last_used, "used": sorted(self._used)}
+        kept |= {"last_used": self._last_used, "used": sorted(self._used), "offered": sorted(self.document.offered)}
         sound = None if self.problem is None else self._sound  # what the picture shows meanwhile
         return json.dumps(kept | {"sound": sound, "pressure": None if self.follows_file else self.pressure.tolist()})
 
@@ -288,11 +303,32 @@ class Session:
             self.document = Document(str(source))
             self.document.study = str(study)
             self.reread()
+        self.document.offered |= {str(name) for name in kept.get("offered", [])}
         self._used |= used & set(SCHEMAS)
         self.choose(str(study))
         self._last_used = str(kept["last_used"]) if kept.get("last_used") in self._used else self._last_used
         if pressure is not None and len(pressure) == len(self.pressure):
             self.set_pressure(np.asarray(pressure, dtype=float))
+
+    def state(self) -> State:
+        """Return what is on the screen, for a way back."""
+        pressure = tuple(map(float, self.pressure))
+        return State(self.document.own(), pressure, self.name, self.kept(), self.kept_files())
+
+    def restore(self, state: State) -> None:
+        """Show a state of this session again; the tab on the screen stays, and so do its files."""
+        kept, looked = json.loads(state.kept), self.document.study
+        for name, content in json.loads(state.files).items():
+            (self.folder / plain_name(name)).write_bytes(b64decode(content))
+        document = Document(str(kept["source"]))
+        document.offered, document.sweeps_wall = set(kept["offered"]), self.document.sweeps_wall
+        document.start(looked)
+        self.document, self.name = document, state.name
+        self._used, self._last_used = set(kept["used"]), str(kept["last_used"])
+        self.follows_file = kept["pressure"] is None
+        self.pressure = np.asarray(state.pressure)
+        self.reread()
+        self._tell(self._pressure_listeners)
 
     def asked(self) -> Scenario:
         """Return the scenario of `text`, as a run of the saved file would have it; raises `InputError`."""
@@ -321,10 +357,11 @@ class Session:
             try:
                 text = self.document.text(study)
                 scenario = scenario_from_text(text, self.folder / self.name)
-                self._sound = text
+                self._sound, self._stale = text, False
                 return scenario
             except InputError as error:
                 self.problem = self.problem or type(error)(error.message, table=error.table, key=error.key)
+        self._stale = True
         return None
 
     def _last_pressure(self) -> Array:
@@ -344,7 +381,11 @@ class Session:
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """What panels and tabs of one page share: its scenario and its 3-D view."""
+    """What panels and tabs of one page share.
+
+    session, view : its scenario and its 3-D view. figures : what draws what tabs have found, by title, for reports.
+    """
 
     session: Session
     view: RobotView
+    figures: dict[str, Mapping[str, Callable[[], Figure]]] = field(default_factory=dict)

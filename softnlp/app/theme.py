@@ -19,8 +19,44 @@ body {{ overflow: hidden; }}
 .body--dark {{ --q-primary: {_SKY} !important; }}
 .body--dark {{ --q-negative: #FF8A80 !important; }}
 @layer overrides {{ .body--dark .bg-primary {{ color: #111 !important; }} }}
+.softnlp-stale .softnlp-view, .softnlp-column .softnlp-stale {{ filter: grayscale(1); opacity: 0.62; }}
+.softnlp-page {{ height: calc(100vh - 49px); }}
+.softnlp-middle {{ flex: 1 1 0; height: 100%; background: #f6f7f9; }}
+.body--dark .softnlp-middle {{ background: #14171b; }}
+.q-tooltip {{ font-size: 12px; }}
+.softnlp-inputs {{ width: 330px; }}
+.softnlp-results {{ width: 390px; }}
+.softnlp-tabs .q-tab {{ padding: 0 14px; }}
+.softnlp-tabs {{ order: 0; max-width: calc(100vw - 300px); }}
 .softnlp-panel .q-item {{ padding: 2px 0; min-height: 32px; }}
 .softnlp-panel .nicegui-expansion-content {{ padding: 0; }}
+/* What is read has at least 12 px, what is pressed at least 24. */
+.q-btn[style*="font-size: 10px"] {{ font-size: 12px !important; min-height: 26px !important; }}
+.q-field--dense .q-field__bottom {{ font-size: 12px; line-height: 1.2; padding: 3px 4px 0; }}
+.q-field--dense.q-field--float .q-field__label {{ transform: translateY(-38%) scale(0.86); }}
+.q-toggle--dense {{ min-height: 24px; }}
+.q-slider--h {{ padding: 4px 0; }}
+.q-btn-toggle .q-btn {{ min-width: 30px; min-height: 26px; }}
+.q-chip__icon--remove {{ font-size: 24px; margin-left: 2px; }}
+:focus-visible {{ outline: 2px solid var(--q-primary) !important; outline-offset: 1px; }}
+/* A tablet: the robot on top, what goes in and what comes out beside each other. */
+@media (max-width: 1023px) {{
+  .softnlp-header {{ flex-wrap: wrap; }}
+  .softnlp-tabs {{ order: 3; width: 100%; max-width: 100%; }}
+  .softnlp-page {{ height: calc(100vh - 90px); flex-wrap: wrap; overflow-y: auto; align-content: flex-start; }}
+  .softnlp-middle {{ order: -1; flex: 1 0 100%; height: 46vh; position: sticky; top: 0; z-index: 5; }}
+  .softnlp-column {{ height: auto; width: 50%; overflow: visible; }}
+}}
+/* A phone: one column, the robot on top, then its pressures and the numbers. */
+@media (max-width: 699px) {{
+  .softnlp-page {{ flex-direction: column; flex-wrap: nowrap; }}
+  .softnlp-middle {{ flex: 0 0 42vh; width: 100%; }}
+  .softnlp-column {{ display: contents; }}
+  .softnlp-column > * {{ order: 3; width: calc(100% - 24px) !important; margin: 0 12px; flex: none; }}
+  .softnlp-column > [data-testid=panel-pressures] {{ order: 1; }}
+  .softnlp-column > .softnlp-shown {{ order: 2; }}
+  .softnlp-inputs > * {{ order: 4; }}
+}}
 """
 
 
@@ -30,9 +66,31 @@ _QUIET = """window.addEventListener("unhandledrejection", event => {
 });"""
 
 
+# What the libraries leave without a name for those who hear the page: its language, files to choose, the editor.
+_NAMED = """document.documentElement.lang = "en";
+let waiting = null;
+const name = () => {
+  waiting = null;
+  for (const input of document.querySelectorAll(".q-uploader__input:not([aria-label])")) {
+    const title = input.closest(".q-uploader").querySelector(".q-uploader__title")?.textContent;
+    input.setAttribute("aria-label", title || "Choose files");
+    input.tabIndex = 0;  // the field itself is reached by the keyboard, and no button around it
+    const around = input.closest(".q-btn");
+    around?.removeAttribute("tabindex");
+    around?.removeAttribute("role");
+  }
+  for (const editor of document.querySelectorAll(".cm-content:not([aria-label])"))
+    editor.setAttribute("aria-label", "Scenario file");
+};
+const later = new MutationObserver(() => { waiting ??= setTimeout(name, 150); });
+later.observe(document.body, {childList: true, subtree: true});
+name();"""
+
+
 def style_page() -> None:
     """Give the page its colours and spacing; the accents are those of the figures."""
     ui.run_javascript(_QUIET)
+    ui.run_javascript(f"(() => {{ {_NAMED} }})()")
     ui.colors(primary=_BLUE, secondary=_VERMILION, accent=_GREEN, warning=_ORANGE, negative=WRONG)
     ui.add_css(_STYLE)
 
@@ -44,7 +102,7 @@ def figure_layout(dark: bool) -> dict[str, Any]:
     return {
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
-        "font": {"color": ink, "size": 11},
+        "font": {"color": ink, "size": 12},
         "xaxis": dict(axis),
         "yaxis": dict(axis),
         "legend": {"orientation": "h", "y": 1.12},

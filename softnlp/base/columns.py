@@ -219,7 +219,7 @@ _EVERY = (
     Output("blocked_force", N, "force with which the wall pushes the tip, not negative", group="wall",
            of="contact.force", short=("force",), others=("force",), form=".4f", page=".4f"),
     Output("chamber_reaction", N, "reaction T_i of each chamber, without the pressure's P A_c", _N, "wall",
-           title="Reaction {}", page=".4f"),
+           "contact.told_reaction", title="Reaction {}", page=".4f"),
     Output("gap", MM, "distance of the free shape's contact point in front of the wall, negative beyond it",
            group="wall", of="contact.wall.gap", title="Gap of the free shape"),
     Output("wall_point", MM, "a point of the wall", _X, "wall", "contact.wall.wall_point"),

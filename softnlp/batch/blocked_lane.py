@@ -29,7 +29,7 @@ from softnlp.statics.wall import Wall, standing_wall
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-CLOSURES = ("free", "compliant", "rigid")
+CLOSURES = ("free", "compliant", "rigid", "none")
 """Closures that are solved together; `weighted` is a minimum, not a root."""
 
 

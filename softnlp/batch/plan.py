@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from softnlp.batch.poses import row_type
 from softnlp.model.contact_settings import ContactSettings
-from softnlp.model.inputs import segment_tables
+from softnlp.model.inputs import conventions_table, segment_tables
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import LOADS, Model, contact_quantities
 from softnlp.model.rod import Loads
@@ -102,7 +102,7 @@ class Plan:
             "law": self.model.material.law.told,
             "quantities": {name: [float(v).hex() for v in values] for name, values in self.nominal.items()},
             "wall": {n: [float(v).hex() for v in q.nominal] for n, q in contact_quantities(self.model).items()},
-            "conventions": asdict(self.model.conventions),
+            "conventions": conventions_table(self.model.conventions),
             "numerics": asdict(self.numerics),
             "contact": None if self.contact is None else asdict(self.contact),
             "varied": list(self.varied),

@@ -41,6 +41,7 @@ class ReducedContact:
 
 def reduced_contact(functions: RodFunctions) -> ReducedContact:
     """Build the steps and maps from the rod functions with a contact at the tip."""
+    functions = functions.in_kernels
     nc, N, ny = functions.field.size1_in(1), functions.model.chambers, functions.tip_unknowns
     size = STATE + N
     data, s, h = ca.SX.sym("data", nc + 3), ca.SX.sym("s"), ca.SX.sym("h")

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from softnlp.base.errors import InputError, nearest
 from softnlp.cli.console import say, say_rows
 from softnlp.cli.study import require_writable
+from softnlp.scenario.examples import named_files, shipped_folder, shipped_scenarios
 
 
 def example(name: str | None = None, /, *, out: Path = Path("scenarios"), all: bool = False) -> None:
@@ -37,7 +35,7 @@ def example(name: str | None = None, /, *, out: Path = Path("scenarios"), all: b
         raise InputError(f"unknown example '{name}'{nearest(name, known)}", key="NAME")
     chosen = [known[name]] if name is not None else list(known.values())
     root = shipped_folder()
-    wanted = {path.relative_to(root) for file, table in chosen for path in (file, *_named_files(table, file.parent))}
+    wanted = {path.relative_to(root) for file, table in chosen for path in (file, *named_files(table, file.parent))}
     require_writable(out)
     for place in sorted(wanted):
         if (out / place).exists():
@@ -49,32 +47,3 @@ def example(name: str | None = None, /, *, out: Path = Path("scenarios"), all: b
         say(f"softnlp run {out / f'{name}.toml'}")
     else:
         say(f"{len(chosen)} scenarios in {out}")
-
-
-def shipped_scenarios() -> dict[str, tuple[Path, dict[str, Any]]]:
-    """Return file and content of every scenario of the package by name, those of the top folder first."""
-    root = shipped_folder()
-    found = {}
-    for file in sorted(root.rglob("*.toml"), key=lambda path: (len(path.parts), path)):
-        table = tomllib.loads(file.read_text(encoding="utf-8"))
-        if "study" in table:
-            found[file.relative_to(root).with_suffix("").as_posix()] = (file, table)
-    return found
-
-
-def shipped_folder() -> Path:
-    """Return where the scenarios are: beside the package when installed, at the top level of a checkout."""
-    package = Path(__file__).parents[1]
-    installed = package / "scenarios"
-    return installed if installed.is_dir() else package.parent / "scenarios"
-
-
-def _named_files(value: Any, folder: Path) -> Iterator[Path]:
-    """Yield the shipped files that the texts in a scenario name, relative to its folder."""
-    if isinstance(value, dict):
-        value = list(value.values())
-    if isinstance(value, list):
-        for entry in value:
-            yield from _named_files(entry, folder)
-    elif isinstance(value, str) and value.endswith((".csv", ".toml")):
-        yield (folder / value).resolve()

@@ -7,8 +7,8 @@ from pathlib import Path
 from softnlp.base.errors import InputError
 from softnlp.base.reading import choices, did_you_mean
 from softnlp.cli.console import say
-from softnlp.cli.example import shipped_folder
 from softnlp.cli.study import require_file
+from softnlp.scenario.examples import shipped_folder
 
 
 def new(study: str, /, *, robot: str = "D25L60", out: Path | None = None, force: bool = False) -> None:

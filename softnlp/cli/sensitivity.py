@@ -47,6 +47,7 @@ def sensitivity(
     from softnlp.model.segments import require_one_segment
     from softnlp.results.document import document_text
     from softnlp.results.sensitivity import sensitivity_document, table_rows
+    from softnlp.scenario.data import require_no_obstacles
     from softnlp.studies.report import named_tolerances, sensitivity_report
 
     asked = scenario_for(scenario, "forward", "expected study 'forward', got {}", all_errors)
@@ -57,10 +58,11 @@ def sensitivity(
     if samples < 0 or samples == 1:
         raise InputError(f"expected 0, or at least 2 samples, got {samples}", key="--samples")
     require_one_segment(asked.robot, "softnlp sensitivity")
+    require_no_obstacles(asked, "softnlp sensitivity")
     folder = results_folder(out, json, scenario.stem)
     pressure = asked.pressures[chosen - 1]
     model = (asked.robot, asked.material, asked.coefficients)
-    tolerances = named_tolerances(tolerance, *model, pressure)
+    tolerances = named_tolerances(tolerance, *model, pressure, asked.conventions)
     with progress(max(samples, 1) if tolerances else 1, asked.title) as (advance, _):
         report = sensitivity_report(
             asked.robot,

@@ -100,7 +100,7 @@ def _why(candidate: Candidate) -> str:
     return user_text(words, _LONGEST)
 
 
-def _against(done: Design) -> Output:
+def across(done: Design) -> Output:
     """Return what to draw the objective against: the first requirement on what a robot does, else the pressure."""
     task = done.task
     for name in task.requirements:
@@ -111,30 +111,30 @@ def _against(done: Design) -> Output:
 
 def _scatter(axes: Axes, done: Design) -> None:
     """Draw the objective against a requirement, with its limits; crosses are not feasible."""
-    across, objective = _against(done), done.task.objective
+    against, objective = across(done), done.task.objective
     groups = (
         ("not feasible", [c for c in done.candidates if not c.is_feasible], GREY, "x", 26),
         ("feasible", [c for c in done.feasible if c is not done.best], _FEASIBLE, "o", 22),
         ("best", [done.best] if done.best else [], _BEST, "*", 120),
     )
     for name, members, colour, marker, size in groups:
-        known = [c for c in members if across.name in c.outputs]
+        known = [c for c in members if against.name in c.outputs]
         # Where the objective was not worked out any more the cross stands at the foot.
         y = [c.outputs.get(objective.name, np.nan) / objective.scale for c in known]
         shown = name if np.all(np.isfinite(y)) else f"{name} (at 0: not worked out)"
         y = [0.0 if not np.isfinite(v) else v for v in y]
         if known:
-            x = [c.outputs[across.name] / across.scale for c in known]
+            x = [c.outputs[against.name] / against.scale for c in known]
             axes.scatter(x, y, s=size, c=colour, marker=marker, label=shown, zorder=3, clip_on=False)
-    limits = done.task.requirements.get(across.name)
+    limits = done.task.requirements.get(against.name)
     if limits is not None:
         for value, words in ((limits.lower, "at least"), (limits.upper, "at most")):
             if np.isfinite(value):
-                axes.axvline(value / across.scale, color=INK, linewidth=0.9, linestyle=(0, (5, 3)), zorder=2)
+                axes.axvline(value / against.scale, color=INK, linewidth=0.9, linestyle=(0, (5, 3)), zorder=2)
                 axes.text(
-                    value / across.scale, 1.01, f"{words} {value / across.scale:g}", size=SMALL, color=INK, ha="center",
-                    va="bottom", transform=axes.get_xaxis_transform(),
+                    value / against.scale, 1.01, f"{words} {value / against.scale:g}", size=SMALL, color=INK,
+                    ha="center", va="bottom", transform=axes.get_xaxis_transform(),
                 )  # fmt: skip
-    plain(axes, _axis(across), _axis(objective))
+    plain(axes, _axis(against), _axis(objective))
     if axes.collections:
         axes.legend(fontsize=SMALL, frameon=True, framealpha=0.9, edgecolor=PALE, labelcolor=INK, loc="best")

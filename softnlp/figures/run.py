@@ -29,6 +29,7 @@ from softnlp.figures.body import (
     tube,
 )
 from softnlp.figures.dynamic import dynamic_figure
+from softnlp.figures.obstacles import draw_obstacles
 from softnlp.figures.series import STEP, Abscissa, abscissa, finish_panels, new_panels, series
 from softnlp.figures.space import draw_faces, draw_lines
 from softnlp.figures.style import (
@@ -81,12 +82,17 @@ def run_figure(view: RunView, measured: Sequence[tuple[float, float]] = ()) -> F
     if view.moving is not None:
         return dynamic_figure(view, view.moving)
     figure = _begun(view, f"{len(view.solved)} of {len(view.status)} steps solved")
-    body_panel(figure, _CENTRE, view)
+    axes = body_panel(figure, _CENTRE, view)
+    if view.obstacles:
+        draw_obstacles(axes, view.obstacles, view.robot.length)
     x = abscissa(view)
-    panels = new_panels(figure, 3 if x.with_pressures else 2)
+    among = view.contact_force is not None
+    panels = new_panels(figure, 2 + among + x.with_pressures)
     series(panels[0], view, x, BENDING.shown(view.bending_angle), BENDING.heading, std=_std(view, BENDING))
     longer = ELONGATION.shown(view.backbone_length - view.robot.length)
     series(panels[1], view, x, longer, ELONGATION.axis, std=_std(view, ELONGATION))
+    if view.contact_force is not None:
+        series(panels[2], view, x, view.contact_force.sum(axis=1), "contact force [N]", least_span=0.01)
     finish_panels(figure, panels, view, x)
     _explain_steps(figure, view)
     return figure

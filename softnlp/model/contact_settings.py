@@ -11,6 +11,8 @@ from softnlp.base.units import MILLIMETRE
 
 _TOUCHES = 1e-4  # of the length: a tip behind a wall by less is pushed in front of it, a rounded number is no mistake
 CLOSURES = ("free", "compliant", "weighted", "rigid")
+NO_CLOSURE = "none"
+"""Of the energy section: the wall holds its tip, and the potential says how its chambers react."""
 
 Vector = tuple[float, float, float]
 
@@ -71,7 +73,7 @@ class ContactSettings:
     tip_cap
         L_t, length of the rigid cap on the tip [m].
     closure
-        Which equations close the problem, by name or as a `Closure` of your own.
+        Which equations close the problem, by name or as a `Closure` of your own; "none" with the energy section alone.
     wall_point
         (3,) a point of a wall anywhere, world frame [m]; given with `wall_normal` or not at all.
     wall_normal
@@ -83,7 +85,7 @@ class ContactSettings:
 
     offset: float = 0.0
     tip_cap: float = 0.0
-    closure: Literal["free", "compliant", "weighted", "rigid"] | Closure = "compliant"
+    closure: Literal["free", "compliant", "weighted", "rigid", "none"] | Closure = "compliant"
     wall_point: Vector | None = None
     wall_normal: Vector | None = None
     weights: ClosureWeights = field(default_factory=ClosureWeights)

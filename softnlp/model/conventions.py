@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Any
+
+Rings = Callable[[Any, Sequence[float]], tuple[Any, Any]]
+"""What thread that keeps its radius does to a robot's section: (robot, stretches) -> lambda T / 2 and a, (n,) each."""
 
 
 @dataclass(frozen=True)
@@ -20,12 +24,20 @@ class Conventions:
         t_f of (S3), (S4), (S6) [m].
     mean_pressure
         Eq. (12) with the mean pressure over all chambers, or with each chamber's own.
+    rings
+        Of the energy section: what the rings of thread do to it; None takes them for absent.
     """
 
     name: str
     stiffening_opposes_pressure: bool
     fibre_thickness: float
     mean_pressure: bool
+    rings: Rings | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def energy(self) -> bool:
+        """Whether the section is that of one potential, which none of the other readings is about."""
+        return self.name == "energy"
 
 
 REPRODUCTION = Conventions("reproduction", True, 0.0, True)
@@ -33,6 +45,9 @@ REPRODUCTION = Conventions("reproduction", True, 0.0, True)
 
 AS_PRINTED = Conventions("as_printed", False, 0.1e-3, False)
 """The equations as they are printed."""
+
+UNIAXIAL = Conventions("energy", True, 0.0, True)
+"""The energy section with its body in uniaxial stress, as if the rings of thread shrank with it."""
 
 CONVENTIONS = {c.name: c for c in (REPRODUCTION, AS_PRINTED)}
 
@@ -55,6 +70,8 @@ class Coefficients:
         phi in 0..1, how far beyond the bore towards the thread the pressure acts; a number [1].
     chamber_reaction
         k_c of the `compliant` closure of the blocked force; a number [1].
+    modulus_factor
+        c_m, multiplies the silicone's stress; of the energy section, which takes no other coefficient; a number [1].
     """
 
     elongation: Any = 0.41
@@ -63,6 +80,7 @@ class Coefficients:
     inertia: Any = 1.0
     bore_fraction: Any = 0.0
     chamber_reaction: Any = 1.45
+    modulus_factor: Any = 1.0
 
 
 COEFFICIENT_SETS = {

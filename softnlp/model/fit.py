@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
 from math import asin, inf, pi, sin
+from typing import Any
 
 from softnlp.base.errors import RobotError
 from softnlp.base.units import MILLIMETRE
 from softnlp.model.robot import DIMENSIONS, MINIMUM_WALL, ROUND_OFF, Robot, metres_hint, require_dimensions
-from softnlp.model.rules import in_mm
+from softnlp.model.rules import in_mm, rules
 
+_FAR = 1.0  # [m], beyond what is made of silicone
+_CLOSE = 1e-9  # of a size, to which its limit is found
+_PLACES = 120  # at which a value that can be made is looked for
 _WALL, _LENGTH = 0.5 * MILLIMETRE, 60 * MILLIMETRE  # of the library's robots
 Limits = tuple[float, float]
 
@@ -69,6 +74,63 @@ def fit_robot(
     if chambers_per_set > 1:
         limits["chamber_angle"] = (touching, (2 * pi / chamber_sets - touching) / (chambers_per_set - 1))
     return Fit(made, limits)
+
+
+def free_ranges(robot: Robot, minimum_wall: float = MINIMUM_WALL, allowed: Collection[str] = ()) -> dict[str, Limits]:
+    """Return between what each dimension of a robot may be changed alone, all others as they are.
+
+    By field of `Robot`, [m, rad]; a limit that nothing sets is 0 or infinite. Empty for a robot that breaks a rule.
+
+    minimum_wall : delta_s [m]. allowed : rules of manufacture that do not count.
+    """
+    found = {}
+    for field, highest in _changed_alone(robot):
+        now, made = float(getattr(robot, field)), partial(_is_made, robot, minimum_wall, allowed, field)
+        if made(now):
+            low, high = (_last(made, now, far) for far in (0.0, highest))
+            found[field] = (max(low, 0.0), high if high < highest else inf)
+    return found
+
+
+def mends(robot: Robot, minimum_wall: float = MINIMUM_WALL, allowed: Collection[str] = ()) -> dict[str, float]:
+    """Return the dimensions that mend a robot alone, each with its nearest value that can be made [m, rad].
+
+    By field of `Robot`; empty where none does. minimum_wall, allowed : as `free_ranges`.
+    """
+    found = {}
+    for field, highest in _changed_alone(robot):
+        now, made = float(getattr(robot, field)), partial(_is_made, robot, minimum_wall, allowed, field)
+        far = min(highest, 4 * now)
+        places = [far * (k + 0.5) / _PLACES for k in range(_PLACES)]
+        good = min((x for x in places if made(x)), key=lambda x: abs(x - now), default=None)
+        if good is not None and not made(now):
+            found[field] = _last(made, good, now)
+    return found
+
+
+def _changed_alone(robot: Robot) -> list[tuple[str, float]]:
+    """Return the dimensions that rules depend on, each with a value that is too large for any [m, rad]."""
+    names = [d.field for d in DIMENSIONS if d.scale is not None and d.field not in ("length", "chamber_angle")]
+    meet = robot.chamber_sets * (robot.chambers_per_set - 1)  # sets do, at 2 pi over it
+    return [*((name, _FAR) for name in names), *([("chamber_angle", 2 * pi / meet)] if meet else [])]
+
+
+def _is_made(robot: Robot, minimum_wall: float, allowed: Collection[str], field: str, value: float) -> bool:
+    """Whether a robot with another value of one dimension keeps the rules."""
+    change: dict[str, Any] = {field: value}
+    every = rules(replace(robot, **change), minimum_wall)
+    return all(rule.value >= rule.least - ROUND_OFF for rule in every if rule.name not in allowed)
+
+
+def _last(is_made: Callable[[float], bool], good: float, far: float) -> float:
+    """Return the last value on the way from a good one to a far one that is good, by halving."""
+    if is_made(far):
+        return far
+    bad = far
+    while abs(bad - good) > _CLOSE * abs(good):
+        middle = (good + bad) / 2
+        good, bad = (middle, bad) if is_made(middle) else (good, middle)
+    return good
 
 
 def _require(robot: Robot, limits: Mapping[str, Limits]) -> None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from softnlp.base.units import BAR, DEGREE, MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.model.body import Segment
 from softnlp.model.contact_settings import ContactSettings
-from softnlp.model.conventions import Coefficients, Conventions
+from softnlp.model.conventions import UNIAXIAL, Coefficients, Conventions
 from softnlp.model.gravity import gravity_words
 from softnlp.model.materials import Material
 from softnlp.model.robot import DIMENSIONS, Robot
@@ -116,9 +116,10 @@ def material_table(material: Material) -> dict[str, Any]:
     }
 
 
-def coefficients_table(coefficients: Coefficients) -> dict[str, float]:
-    """Return the dimensionless coefficients by name."""
-    return {f.name: tidy(getattr(coefficients, f.name)) for f in fields(coefficients)}
+def coefficients_table(coefficients: Coefficients, *, energy: bool = False) -> dict[str, float]:
+    """Return the dimensionless coefficients by name, those of the paper's section or of the energy section."""
+    own = [f.name for f in fields(coefficients) if (f.name == "modulus_factor") is energy]
+    return {name: tidy(getattr(coefficients, name)) for name in own}
 
 
 def contact_table(contact: ContactSettings) -> dict[str, Any]:
@@ -144,12 +145,20 @@ def contact_table(contact: ContactSettings) -> dict[str, Any]:
 def conventions_table(conventions: Conventions) -> dict[str, Any]:
     """Return how ambiguous equations were read."""
     table = asdict(conventions)
+    rings = table.pop("rings") is not None
+    if conventions.energy:
+        return {"name": conventions.name, "rings": rings}
     table["fibre_thickness_mm"] = tidy(table.pop("fibre_thickness"), MILLIMETRE)
     return table
 
 
 def conventions_of_table(table: Mapping[str, Any]) -> Conventions:
-    """Return the conventions of a `conventions_table`; KeyError or TypeError where one is missing."""
+    """Return the conventions of a `conventions_table`; KeyError or TypeError where one is missing.
+
+    Those of the energy section have no rings, which are not known here.
+    """
+    if table["name"] == UNIAXIAL.name:
+        return UNIAXIAL
     values = dict(table)
     values["fibre_thickness"] = float(values.pop("fibre_thickness_mm")) * MILLIMETRE
     return Conventions(**values)
@@ -182,7 +191,7 @@ def asked_tables(model: Model, loads: Loads) -> dict[str, Any]:
     return {
         **robot,
         **({"material_set": model.material.set} if model.material.set else {}),
-        "coefficients": coefficients_table(model.coefficients),
+        "coefficients": coefficients_table(model.coefficients, energy=model.conventions.energy),
         "loads": loads_table(loads),
     }
 

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
+from softnlp.model.energy_section import EnergySection
 from softnlp.model.materials import Material
 from softnlp.model.robot import Robot
 from softnlp.model.round_chambers import RoundChambers
@@ -18,7 +19,7 @@ from softnlp.model.section import Section, SectionType
 class Model:
     """A robot, its silicone, and how the equations are read. Numbers here are the nominal values of quantities.
 
-    section_type : makes the section of the others.
+    section_type : makes the section of the others; of round chambers the conventions choose between the two.
     """
 
     robot: Robot
@@ -30,7 +31,9 @@ class Model:
     @cached_property
     def section(self) -> Section:
         """The cross-section."""
-        return self.section_type(self.robot, self.material, self.coefficients, self.conventions)
+        energy = self.conventions.energy and self.section_type is RoundChambers
+        made: SectionType = EnergySection if energy else self.section_type
+        return made(self.robot, self.material, self.coefficients, self.conventions)
 
     @property
     def sets(self) -> int:

@@ -17,6 +17,8 @@ from softnlp.model.weight import Weight
 
 LOADS = ("tip_force", "tip_moment", "gravity")
 """Keys of the loads that every model has."""
+OF_ROBOT = ("robot.", "rings.")
+"""What the keys begin with that are of one robot; the others are of its silicone, or shared."""
 
 
 def quantities(model: Model) -> dict[str, Quantity]:
@@ -28,6 +30,15 @@ def quantities(model: Model) -> dict[str, Quantity]:
     pressure = quantity("pressure", "Pa", np.zeros(model.sets), scale=1e5, lower=0.0)
     loads = [*DeadTip().quantities(model), *Weight().quantities(model)]
     return {q.name: q for q in (pressure, *loads, *model.section.quantities())}
+
+
+def differentiable(model: Model) -> dict[str, Quantity]:
+    """Return the quantities by which a derivative says how the model answers.
+
+    Those of rings follow from the dimensions, so that with rings none of these but the length is such a one.
+    """
+    fixed = OF_ROBOT if model.conventions.rings is not None else OF_ROBOT[1:]
+    return {k: q for k, q in quantities(model).items() if k == "robot.length" or not k.startswith(fixed)}
 
 
 def contact_quantities(model: Model) -> dict[str, Quantity]:
@@ -55,10 +66,9 @@ def section_function(declared: Mapping[str, Quantity], build: Callable[[Any, Any
 
 
 def force_unit(model: Model, numbers: Mapping[str, Any] | None = None) -> Any:
-    """Return EI / L_0^2 [N], with EI the mean bending stiffness of the section without pressure.
+    """Return EI / L_0^2 [N], with EI the mean bending stiffness of the section without pressure, or near to it.
 
     numbers : of the section by key, symbols perhaps; None are the model's own.
     """
     own = model.numbers if numbers is None else numbers
-    rest = model.section.at(own, [0.0] * model.sets, 1.0)
-    return (rest.bending_stiffness[0] + rest.bending_stiffness[1]) / 2 / own["robot.length"] ** 2
+    return model.section.bending_at_rest(own) / own["robot.length"] ** 2

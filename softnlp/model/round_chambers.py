@@ -17,7 +17,8 @@ from softnlp.model.materials import Material
 from softnlp.model.robot import DIMENSIONS, LOWERABLE_RULES, Robot, check, touching_stretch
 from softnlp.model.section import Section, SectionRadii, SectionState
 
-_SIZES = tuple(d.field for d in DIMENSIONS if d.scale is not None)
+SIZES = tuple(d.field for d in DIMENSIONS if d.scale is not None)
+"""Dimensions that are numbers of a section, the length among them."""
 _COEFFICIENT_NAMES = {
     "elongation": "stiffening.elongation",
     "bending": "stiffening.bending",
@@ -25,6 +26,10 @@ _COEFFICIENT_NAMES = {
     "inertia": "corrections.inertia",
     "bore_fraction": "corrections.bore_fraction",
 }
+_ROUNDING = 1e-9  # of a stretch that is found by iterations
+FACTOR = "corrections.modulus_factor"
+OF_COEFFICIENTS = {**_COEFFICIENT_NAMES, "modulus_factor": FACTOR}
+"""Keys of coefficients, of which a section has its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,13 +163,40 @@ def deform(
 def with_numbers(
     robot: Robot, material: Material, coefficients: Coefficients, numbers: Mapping[str, Any]
 ) -> tuple[Robot, Material, Coefficients]:
-    """Return the same with other numbers or symbols, by the keys of `RoundChambers.quantities`."""
+    """Return the same with other numbers or symbols, by the keys of its section's `quantities`."""
     constants = {c.name: numbers[f"material.{c.name}"] for c in material.law.constants}
     return (
-        replace(robot, **{name: numbers[f"robot.{name}"] for name in _SIZES}),
+        replace(robot, **{name: numbers[f"robot.{name}"] for name in SIZES}),
         replace(material, constants=constants, density=numbers["material.density"]),
-        replace(coefficients, **{field: numbers[name] for field, name in _COEFFICIENT_NAMES.items()}),
+        replace(coefficients, **{field: numbers[name] for field, name in OF_COEFFICIENTS.items() if name in numbers}),
     )
+
+
+def of_model(robot: Robot, material: Material) -> list[Quantity]:
+    """Return the numbers of a robot and its silicone as quantities."""
+    declared = []
+    for name in SIZES:
+        value = float(getattr(robot, name))
+        unit = "rad" if name == "chamber_angle" else "m"
+        declared.append(quantity(f"robot.{name}", unit, value, scale=max(abs(value), 1e-4), lower=0.0))
+    for constant in material.law.constants:
+        value = float(material.constants[constant.name])
+        unit = "Pa" if constant.unit == "MPa" else constant.unit
+        declared.append(quantity(f"material.{constant.name}", unit, value, scale=abs(value) or 1.0))
+    declared.append(quantity("material.density", "kg/m^3", float(material.density), scale=1e3, lower=0.0))
+    return declared
+
+
+def chamber_warnings(robot: Robot, material: Material, stretch: float) -> list[str]:
+    """Say where the silicone was not fitted, and where neighbouring chambers touch."""
+    found = []
+    low, high = material.fitted_stretch
+    if not low - _ROUNDING <= stretch <= high:
+        found.append(f"stretch {stretch:.3f} is outside {low:g} to {high:g}, where {material.name} was fitted")
+    limit = touching_stretch(robot)
+    if stretch > limit:
+        found.append(f"stretch {stretch:.3f} is above {limit:.3f}, where neighbouring reinforced chambers touch")
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +238,7 @@ class RoundChambers(Section):
         check(self.robot if numbers is None else self._robot(numbers), allow=LOWERABLE_RULES)
 
     def _robot(self, numbers: Mapping[str, Any]) -> Robot:
-        return replace(self.robot, **{name: numbers[f"robot.{name}"] for name in _SIZES})
+        return replace(self.robot, **{name: numbers[f"robot.{name}"] for name in SIZES})
 
     def quantities(self) -> list[Quantity]:
         """Return the numbers of robot, material and coefficients.
@@ -214,17 +246,7 @@ class RoundChambers(Section):
         "robot.<dimension>" (m or rad), "material.<constant>", "material.density", "stiffening.elongation",
         "stiffening.bending", "corrections.area", "corrections.inertia", "corrections.bore_fraction".
         """
-        robot, material = self.robot, self.material
-        declared = []
-        for name in _SIZES:
-            value = float(getattr(robot, name))
-            unit = "rad" if name == "chamber_angle" else "m"
-            declared.append(quantity(f"robot.{name}", unit, value, scale=max(abs(value), 1e-4), lower=0.0))
-        for constant in material.law.constants:
-            value = float(material.constants[constant.name])
-            unit = "Pa" if constant.unit == "MPa" else constant.unit
-            declared.append(quantity(f"material.{constant.name}", unit, value, scale=abs(value) or 1.0))
-        declared.append(quantity("material.density", "kg/m^3", float(material.density), scale=1e3, lower=0.0))
+        declared = of_model(self.robot, self.material)
         for field, name in _COEFFICIENT_NAMES.items():
             declared.append(quantity(name, "1", float(getattr(self.coefficients, field)), lower=0.0))
         return declared
@@ -240,11 +262,4 @@ class RoundChambers(Section):
 
     def warnings(self, stretch: float) -> list[str]:
         """Say where the silicone was not fitted, and where neighbouring chambers touch."""
-        found = []
-        low, high = self.material.fitted_stretch
-        if not low <= stretch <= high:
-            found.append(f"stretch {stretch:.3f} is outside {low:g} to {high:g}, where {self.material.name} was fitted")
-        limit = touching_stretch(self.robot)
-        if stretch > limit:
-            found.append(f"stretch {stretch:.3f} is above {limit:.3f}, where neighbouring reinforced chambers touch")
-        return found
+        return chamber_warnings(self.robot, self.material, stretch)

@@ -159,6 +159,16 @@ class Section(Protocol):
         """Whether pressures enter the imbalance by their sum alone and only add to stiffnesses; batches are quicker."""
         return False
 
+    @property
+    def coupled(self) -> bool:
+        """Whether stretch and curvature without a load are found together, by `unloaded`."""
+        return False
+
+    @property
+    def splits_pressure(self) -> bool:
+        """Whether what the fluid carries is left out of the n and m that are shown, as the paper's are."""
+        return True
+
     def check(self, numbers: Mapping[str, Any] | None = None) -> None:
         """Raise `RobotError` for a section that cannot be made.
 
@@ -197,6 +207,59 @@ class Section(Protocol):
         """
         ...
 
+    def unloaded(self, numbers: Mapping[str, Any], pressures: Any, strains: Any) -> tuple[Sequence[Any], Sequence[Any]]:
+        """Return the generalised forces without a load; of a section that is `coupled`.
+
+        Parameters
+        ----------
+        numbers
+            By key.
+        pressures
+            (sets,) gauge [Pa].
+        strains
+            (3,) v_3, and two curvatures times a length of the section [1].
+
+        Returns
+        -------
+        tuple
+            (3,) forces, which are gradients of an energy and linear in the pressures [N], and the upper part of their
+            slopes, row by row (6,) [N]; none of another section.
+        """
+        return (), ()
+
+    def lengthening(self, own: Sequence[Any], centres: Sequence[tuple[Any, Any]], v: Any, u: Any) -> list[Any]:
+        """Return the rate of each chamber's length by s, Eq. (13).
+
+        Parameters
+        ----------
+        own, centres
+            (entries,) of `SectionState.own` and (N, 2) d_i, in any consistent system of units [SI].
+        v, u
+            (3,) of `strains` [1], [1/m].
+
+        Returns
+        -------
+        list
+            (N,) [1].
+        """
+        return [ca.norm_2(v + ca.cross(u, ca.vertcat(d_x, d_y, 0))) for d_x, d_y in centres]
+
+    def bending_at_rest(self, numbers: Mapping[str, Any]) -> Any:
+        """Return the mean bending stiffness without pressure, of which the unit of force is made.
+
+        Parameters
+        ----------
+        numbers
+            By key.
+
+        Returns
+        -------
+        number
+            EI, or what is near to it [N m^2].
+        """
+        rest = self.at(numbers, [0.0] * self.sets, 1.0)
+        return (rest.bending_stiffness[0] + rest.bending_stiffness[1]) / 2
+
     def strains(self, section: RodSection, own: Sequence[Any], force: Any, moment: Any) -> tuple[Any, Any]:
         """Return the strains under what wall and fluid carry together, Eq. (5): R^T M + M_P = K u.
 
@@ -218,6 +281,23 @@ class Section(Protocol):
         v = ca.vertcat(force[0] / section.shear, force[1] / section.shear, force[2] / section.axial + 1)
         return v, ca.vertcat(m[0] / section.bending_x, m[1] / section.bending_y, m[2] / section.torsion)
 
+    def quick_strains(self, section: RodSection, own: Sequence[Any], force: Any, moment: Any) -> tuple[Any, Any]:
+        """Return `strains` as machine code takes them, whose derivatives need not be exact; by default the same.
+
+        Parameters
+        ----------
+        section, own
+            As of `strains` (entries,) [SI].
+        force, moment
+            (3,) R^T N and R^T M [SI].
+
+        Returns
+        -------
+        tuple
+            (3,) v [1] and (3,) u [1/m].
+        """
+        return self.strains(section, own, force, moment)
+
     def outline(self, numbers: Mapping[str, Any], stretch: Any) -> SectionRadii:
         """Return the section's deformed radii.
 
@@ -234,6 +314,23 @@ class Section(Protocol):
             Of which "outer" bounds the body.
         """
         ...
+
+    def warnings_along(self, stretch: float, v: Any, u: Any) -> list[str]:
+        """Return what to know of the section where loads strain it.
+
+        Parameters
+        ----------
+        stretch
+            lambda without loads [1].
+        v, u
+            (M, 3) strains at points of the rod, as of `strains` [1], [1/m].
+
+        Returns
+        -------
+        list
+            One line each.
+        """
+        return []
 
     def warnings(self, stretch: float) -> list[str]:
         """Return what to know of the section at a stretch.

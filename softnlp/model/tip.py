@@ -15,7 +15,7 @@ import numpy as np
 from softnlp.base.errors import InputError
 from softnlp.base.quantity import Quantity, quantity
 from softnlp.model import rod
-from softnlp.model.contact_settings import Closure
+from softnlp.model.contact_settings import NO_CLOSURE, Closure
 from softnlp.model.load import AtTip as AtTip
 from softnlp.model.load import Load, Wrench
 from softnlp.model.model import Model
@@ -79,6 +79,7 @@ def _held(at: AtTip) -> Any:
 
 BUILT_IN: Mapping[str, Closure] = {
     "free": Closure("free", _no_reaction),
+    NO_CLOSURE: Closure(NO_CLOSURE, _no_reaction),
     "weighted": Closure("weighted", _no_reaction),  # with errors that are chosen elsewhere
     "compliant": Closure("compliant", _compliant),
     "rigid": Closure("rigid", _rigid, _held),

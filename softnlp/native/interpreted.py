@@ -20,6 +20,12 @@ Array = NDArray[np.float64]
 _COLUMNS = 256  # poses to a call of a map
 _WORTH_NARROWING = 0.8  # part of the poses still under way below which the finished ones are left out
 
+
+def _where(condition: Array, value: Array, out: Array) -> None:
+    """Put the value where the condition is not zero, else zero."""
+    out[...] = np.where(condition != 0, value, 0.0)
+
+
 _OPERATIONS: dict[int, tuple[Callable[..., Any], tuple[int, ...]]] = {
     ca.OP_ASSIGN: (np.positive, (0,)),
     ca.OP_ADD: (np.add, (0, 1)),
@@ -32,6 +38,13 @@ _OPERATIONS: dict[int, tuple[Callable[..., Any], tuple[int, ...]]] = {
     ca.OP_INV: (np.reciprocal, (0,)),
     ca.OP_SQRT: (np.sqrt, (0,)),
     ca.OP_FABS: (np.absolute, (0,)),
+    ca.OP_FLOOR: (np.floor, (0,)),
+    ca.OP_LT: (np.less, (0, 1)),
+    ca.OP_LE: (np.less_equal, (0, 1)),
+    ca.OP_EQ: (np.equal, (0, 1)),
+    ca.OP_NE: (np.not_equal, (0, 1)),
+    ca.OP_NOT: (np.logical_not, (0,)),
+    ca.OP_IF_ELSE_ZERO: (_where, (0, 1)),
     ca.OP_FMIN: (np.fmin, (0, 1)),
     ca.OP_FMAX: (np.fmax, (0, 1)),
 }
@@ -45,6 +58,7 @@ class Program:
         self._registers = function.sz_w()
         self.rows = int(function.size1_out(0))
         self._work: list[tuple[str, Any]] = []
+        nodes = function.instructions_sx() if function.find_functions() else None
         for k in range(function.n_instructions()):
             kind = function.instruction_id(k)
             takes, gives = function.instruction_input(k), function.instruction_output(k)
@@ -54,6 +68,8 @@ class Program:
                 self._work.append(("output", (gives[1], takes[0])))
             elif kind == ca.OP_CONST:
                 self._work.append(("constant", (gives[0], function.instruction_constant(k))))
+            elif kind == ca.OP_CALL and nodes is not None:
+                self._work.append(("call", (Program(nodes[k].which_function()), takes, gives)))
             else:
                 operation, operands = _OPERATIONS[kind]
                 self._work.append(("operation", (operation, [takes[i] for i in operands], gives[0])))
@@ -72,6 +88,12 @@ class Program:
             elif kind == "constant":
                 register, value = what
                 calls.append((np.copyto, (w[register], value)))
+            elif kind == "call":
+                program, takes, gives = what
+                given, found = (np.empty((len(rows), out.shape[1])) for rows in (takes, gives))
+                calls += [(np.copyto, (given[i], w[register])) for i, register in enumerate(takes)]
+                calls.append((program.bound([given], found), ()))
+                calls += [(np.copyto, (w[register], found[i])) for i, register in enumerate(gives)]
             else:
                 operation, operands, register = what
                 calls.append((operation, (*(w[i] for i in operands), w[register])))

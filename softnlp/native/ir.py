@@ -16,6 +16,9 @@ from softnlp.native.kernels import B_ENDS, B_MIDDLE, WIDTH, Kernels, Step
 LANES = 4
 """Poses to an instruction."""
 _V = f"<{LANES} x double>"
+_CALLED = "called_"
+REFINES, ENOUGH = "refine", 1e-6
+"""A function that brings its last entries nearer to a solution, and their last change below which it is left out."""
 _LIBRARY = {
     ca.OP_EXP: "exp",
     ca.OP_EXPM1: "expm1",
@@ -59,6 +62,7 @@ _OPERATIONS = {
     ca.OP_INV: f"fdiv {{V}} {_ONE}, {{0}}",
     ca.OP_SQRT: "call {V} @llvm.sqrt.v4f64({V} {0})",
     ca.OP_FABS: "call {V} @llvm.fabs.v4f64({V} {0})",
+    ca.OP_FLOOR: "call {V} @llvm.floor.v4f64({V} {0})",
     **{
         operation: f"call {{V}} @all_{name}({{V}} {{0}}{', {V} {1}' if name == 'pow' else ''})"
         for operation, name in _LIBRARY.items()
@@ -67,6 +71,9 @@ _OPERATIONS = {
 # A comparison, and what is chosen where it holds and where not.
 _CHOICES = {
     ca.OP_LT: ("olt", "{0}, {1}", _ONE, _ZERO),
+    ca.OP_LE: ("ole", "{0}, {1}", _ONE, _ZERO),
+    ca.OP_EQ: ("oeq", "{0}, {1}", _ONE, _ZERO),
+    ca.OP_NE: ("une", "{0}, {1}", _ONE, _ZERO),
     ca.OP_NOT: ("oeq", f"{{0}}, {_ZERO}", _ONE, _ZERO),
     ca.OP_IF_ELSE_ZERO: ("une", f"{{0}}, {_ZERO}", "{1}", _ZERO),
     ca.OP_FMIN: ("olt", "{0}, {1}", "{0}", "{1}"),
@@ -77,6 +84,7 @@ _CHOICES = {
 _HEAD = f"""
 declare {_V} @llvm.sqrt.v4f64({_V})
 declare {_V} @llvm.fabs.v4f64({_V})
+declare {_V} @llvm.floor.v4f64({_V})
 """
 
 
@@ -154,6 +162,10 @@ def llvm_text(kernels: Kernels) -> str | None:
     None where a function holds an operation that has no translation.
     """
     parts: list[str | None] = [_HEAD, _MOVES, *(_lane_by_lane(name) for name in LIBRARY)]
+    every = [f for step in kernels.steps.values() for f in step.functions.values()] + list(kernels.maps.values())
+    called = {f.name(): f for function in every for f in function.find_functions()}
+    called |= {f.name(): f for function in list(called.values()) for f in function.find_functions()}
+    parts += [_function(_CALLED + name, function, alone=True) for name, function in called.items()]
     for name, step in kernels.steps.items():
         for part, function in step.functions.items():
             parts.append(_function(f"{name}_{part}", function))
@@ -180,12 +192,21 @@ def _lane_by_lane(name: str) -> str:
     return "\n".join([*lines, f"  ret {_V} {before}", "}", ""])
 
 
-def _function(name: str, function: ca.Function) -> str | None:
-    """Return a function of scalars as one of vectors, (inputs, output) being arrays of them; None where it cannot."""
-    lines = [f"define internal void @{name}({''.join(f'ptr %x{k}, ' for k in range(function.n_in()))}ptr %y) {{"]
+def _function(name: str, function: ca.Function, *, alone: bool = False) -> str | None:
+    """Return a function of scalars as one of vectors, (inputs, output) being arrays of them; None where it cannot.
+
+    alone : whether it is called where it is needed and not made a part of what calls it.
+    """
+    operations = [function.instruction_id(k) for k in range(function.n_instructions())]
+    arrays = "".join(f"ptr %x{k}, " for k in range(function.n_in()))
+    lines = [f"define internal void @{name}({arrays}ptr %y) {'noinline ' if alone else ''}{{"]
+    nodes = function.instructions_sx() if function.find_functions() else None
+    calls = [] if nodes is None else [k for k in range(len(operations)) if operations[k] == ca.OP_CALL]
+    for k in calls:
+        rooms = (("in", function.instruction_input(k)), ("out", function.instruction_output(k)))
+        lines += [f"  %{way}{k} = alloca [{len(rows)} x {_V}], align 32" for way, rows in rooms]
     registers: dict[int, str] = {}
-    for k in range(function.n_instructions()):
-        operation = function.instruction_id(k)
+    for k, operation in enumerate(operations):
         takes, gives = function.instruction_input(k), function.instruction_output(k)
         words = [registers.get(i, "") for i in takes]
         if operation == ca.OP_INPUT:
@@ -201,16 +222,58 @@ def _function(name: str, function: ca.Function) -> str | None:
         elif operation == ca.OP_ASSIGN:
             registers[gives[0]] = words[0]
             continue
+        elif operation == ca.OP_CALL and nodes is not None:
+            if nodes[k].which_function().n_in() != 1:  # a derivative, which nothing here has
+                return None
+            lines += _call(k, nodes[k].which_function(), words, gives, registers)
+            continue
         elif operation in _CHOICES:
             how, compared, yes, no = (part.format(*words) for part in _CHOICES[operation])
             lines.append(f"  %c{k} = fcmp {how} {_V} {compared}")
             lines.append(f"  %v{k} = select <{LANES} x i1> %c{k}, {_V} {yes}, {_V} {no}")
         elif operation in _OPERATIONS:
-            lines.append(f"  %v{k} = {_OPERATIONS[operation].format(*words, V=_V)}")
+            text = _OPERATIONS[operation].format(*words, V=_V)
+            if alone and text[0] == "f":  # only a start is found by it: it need not be the same to the last bit
+                text = text.replace(" ", " contract ", 1)
+            lines.append(f"  %v{k} = {text}")
         else:
             return None
         registers[gives[0]] = f"%v{k}"
     return "\n".join([*lines, "  ret void", "}", ""])
+
+
+def _call(k: int, callee: ca.Function, words: list[str], gives: list[int], registers: dict[int, str]) -> list[str]:
+    """Return the call of a function of one column at instruction k; its results are registers from then on.
+
+    A function that refines is left out where the last entry of its column is below `ENOUGH` for all poses: its results
+    are then those entries that stand at the end of the column.
+    """
+    lines = []
+    for i, word in enumerate(words):
+        lines.append(f"  %i{k}_{i} = getelementptr {_V}, ptr %in{k}, i64 {i}")
+        lines.append(f"  store {_V} {word}, ptr %i{k}_{i}")
+    call = f"  call void @{_CALLED}{callee.name()}(ptr %in{k}, ptr %out{k})"
+    places = [f"  %o{k}_{i} = getelementptr {_V}, ptr %out{k}, i64 {i}" for i in range(len(gives))]
+    if callee.name() == REFINES:
+        kept = words[-len(gives) :]
+        lines += places
+        lines += [f"  store {_V} {word}, ptr %o{k}_{i}" for i, word in enumerate(kept)]
+        lines += [
+            f"  %near{k} = fcmp olt {_V} {kept[-1]}, {splat(ENOUGH)}",
+            f"  %bits{k} = bitcast <{LANES} x i1> %near{k} to i{LANES}",
+            f"  %all{k} = icmp eq i{LANES} %bits{k}, -1",
+            f"  br i1 %all{k}, label %past{k}, label %more{k}",
+            f"more{k}:",
+            call,
+            f"  br label %past{k}",
+            f"past{k}:",
+        ]
+    else:
+        lines += [call, *places]
+    for i, register in enumerate(gives):
+        lines.append(f"  %v{k}_{i} = load {_V}, ptr %o{k}_{i}")
+        registers[register] = f"%v{k}_{i}"
+    return lines
 
 
 def _room(sizes: dict[str, int]) -> str:

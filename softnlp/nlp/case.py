@@ -28,7 +28,8 @@ class Case(Protocol):
     same at half the step. equations : names of the rows. outputs : by name, SI. constants : what the equations take of
     the quantities, for warm starts.
     column : the values that the case takes of a problem, in its own order, SI.
-    length_unit, force_unit : of the scaled unknowns [m, N].
+    length_unit, force_unit : of the scaled unknowns [m, N]. once_differentiable : whether the second derivatives of
+    its residuals are not theirs, so that nothing may be made of them.
     """
 
     @property
@@ -53,3 +54,5 @@ class Case(Protocol):
     def length_unit(self) -> ca.MX: ...  # noqa: D102
     @property
     def force_unit(self) -> ca.MX: ...  # noqa: D102
+    @property
+    def once_differentiable(self) -> bool: ...  # noqa: D102

@@ -71,9 +71,10 @@ def _best(found: Comparison) -> dict[str, Any] | None:
 
 
 def _variant(task: CompareTask, found: Comparison, v: int) -> dict[str, Any]:
+    variant = found.variants[v]
     return {
         **_named(found, v),
-        "coefficient_values": coefficients_table(found.variants[v].coefficients),
+        "coefficient_values": coefficients_table(variant.coefficients, energy=variant.conventions.energy),
         "unsolved": found.lost(v),
         "self_intersecting": found.self_intersecting(v),
         "statistics": _statistics(found, v, None),

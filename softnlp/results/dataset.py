@@ -10,10 +10,13 @@ import numpy as np
 from softnlp.base.arrays import Array
 from softnlp.base.columns import OUTPUTS, Output
 from softnlp.base.netcdf import Variable, file_bytes, flag_attributes, said
+from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.model.inputs import file_attributes, pressure_bar
+from softnlp.model.obstacle_tables import obstacle_tables
 from softnlp.model.quantities import Model
 from softnlp.nlp.solver import EquationResidual
 from softnlp.results.document import require_run
+from softnlp.statics.obstacle_step import names_of
 from softnlp.statics.step import Run, Step
 from softnlp.studies.fields import (
     BLOCKED_FORCE,
@@ -102,9 +105,46 @@ def _parts(run: Run) -> tuple[dict[str, Variable], dict[str, Variable], dict[str
         variables["closure"] = _words("step", closures, "which equations close the blocked shape")
         if any(left := [left_by_weights(step) for step in steps]):
             variables |= _errors("weighted_residual", "weighted_equation", "weighted_residual_unit", left, _WEIGHTED)
+    if run.obstacles:
+        variables |= _contacts(run)
     model = Model(run.robot, run.material, run.coefficients, run.conventions)
-    about = file_attributes(run.study, model, run.loads, run.contact, {"warnings": list(run.warnings)})
+    own: dict[str, Any] = {"warnings": list(run.warnings)}
+    if run.obstacles:
+        own["obstacles"] = obstacle_tables(run.obstacles)
+    about = file_attributes(run.study, model, run.loads, run.contact, own)
     return variables, _coordinates(run, variables["arc"][1]), {"title": run.title, **about}
+
+
+def _contacts(run: Run) -> dict[str, Variable]:
+    """Return what each obstacle does in each step (step, obstacle), NaN without a touch or a solution."""
+    count, steps = len(run.obstacles), run.steps
+    force = np.full((len(steps), count, 3), np.nan)
+    ends, gap, left = (
+        np.full((2, len(steps), count), np.nan),
+        np.full((len(steps), count), np.nan),
+        np.full(len(steps), np.nan),
+    )
+    for k, step in enumerate(steps):
+        if solved_pose(step) is None:
+            continue
+        left[k] = np.nan if step.complementarity is None else step.complementarity / NEWTON_MILLIMETRE
+        for j, contact in enumerate(step.contacts):
+            force[k, j], gap[k, j] = contact.force, contact.gap / MILLIMETRE
+            if contact.start is not None and contact.end is not None:
+                ends[:, k, j] = contact.start, contact.end
+    dims = ("step", "obstacle")
+    return {
+        "contact_force_N": ((*dims, "axis"), force, said("N", "force of the obstacle on the robot, world frame")),
+        "contact_from_s": (dims, ends[0], said("1", "first point where it touches, s/L")),
+        "contact_to_s": (dims, ends[1], said("1", "last point where it touches, s/L")),
+        f"contact_{OUTPUTS['gap'].key}": (
+            dims,
+            gap,
+            said("mm", "least distance to the body, < 0 overlaps between nodes"),
+        ),
+        "complementarity_Nmm": (("step",), left, said("N mm", "sum of each contact's force times its gap")),
+        "obstacle": _words("obstacle", names_of(run.obstacles), "name of the obstacle"),
+    }
 
 
 def _words(along: str, texts: Sequence[str], meaning: str) -> Variable:

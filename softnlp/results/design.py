@@ -43,7 +43,9 @@ def design_document(done: Design) -> dict[str, Any]:
         found[f"{FORCE}_free_closure_{OUTPUTS[FORCE].unit}"] = done.free_closure_force
     return {
         **document_head(done.title, "design", setting.conventions.name),
-        **asked_tables(Model(setting.robot, setting.material, setting.coefficients), setting.loads),
+        **asked_tables(
+            Model(setting.robot, setting.material, setting.coefficients, setting.conventions), setting.loads
+        ),
         **({"contact": contact_table(setting.contact)} if task.needs_force else {}),
         "objective": {"maximise" if task.maximise else "minimise": task.objective.key},
         "requirements": limits,
@@ -235,13 +237,7 @@ def best_scenario(done: Design, asked: Mapping[str, Any]) -> str | None:
     best = done.best
     if best is None:
         return None
-    material = dict(asked["material"])
-    if "material" in best.choices:
-        kept = {key: material[key] for key in ("set", "file", "density_kg_m3") if key in material}
-        material = {"name": best.material.name, "model": best.material.law.name, **kept}
-    robot = robot_table(best.robot) | {
-        k: asked["robot"][k] for k in ("allow", "minimum_wall_mm") if k in asked["robot"]
-    }
+    robot, material = candidate_tables(best, asked)
     force = done.task.needs_force
     highest = tidy(best.outputs["pressure"], BAR)
     tables: dict[str, Any] = {
@@ -260,6 +256,16 @@ def best_scenario(done: Design, asked: Mapping[str, Any]) -> str | None:
         else:
             lines.append(f"{key} = {toml_text(value)}")
     return "\n".join(lines) + "\n"
+
+
+def candidate_tables(candidate: Candidate, asked: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the [robot] and the [material] of a candidate, of a scenario `asked` that was parsed."""
+    material = dict(asked["material"])
+    if "material" in candidate.choices:
+        kept = {key: material[key] for key in ("set", "file", "density_kg_m3") if key in material}
+        material = {"name": candidate.material.name, "model": candidate.material.law.name, **kept}
+    rules = {key: asked["robot"][key] for key in ("allow", "minimum_wall_mm") if key in asked["robot"]}
+    return robot_table(candidate.robot) | rules, material
 
 
 def pressure_words(pressure: float | Range | PressureSteps) -> str:

@@ -14,7 +14,9 @@ import numpy as np
 
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
+from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.model.inputs import asked_tables, contact_table, package_version, pressure_bar, tidy
+from softnlp.model.obstacle_tables import obstacle_tables
 from softnlp.model.quantities import Model
 from softnlp.nlp.solver import EquationResidual, Ipopt
 from softnlp.statics.step import Run, Step
@@ -36,9 +38,10 @@ def run_document(run: Run) -> dict[str, Any]:
     """Return a run as `softnlp.to_json` does."""
     return {
         **document_head(run.title, run.study, run.conventions.name),
-        **asked_tables(Model(run.robot, run.material, run.coefficients), run.loads),
+        **asked_tables(Model(run.robot, run.material, run.coefficients, run.conventions), run.loads),
         **({} if run.contact is None else {"contact": contact_table(run.contact)}),
         **({"uncertainty": dict(run.uncertainty)} if run.uncertainty else {}),
+        **({"obstacles": obstacle_tables(run.obstacles)} if run.obstacles else {}),
         "warnings": list(run.warnings),
         **({"energy": plain(run.energy) or None} if run.study == DYNAMIC else {}),
         "steps": [_step(run, step) for step in run.steps],
@@ -102,6 +105,9 @@ def _step(run: Run, step: Step) -> dict[str, Any]:
         table["closure"] = closure_of(run, step)
         if table["closure"] == "weighted":
             table["weighted_residual"] = _lines(left_by_weights(step))
+    if run.obstacles:
+        table["contacts"] = contacts_of(step)
+        table["complementarity_Nmm"] = number(step.complementarity, NEWTON_MILLIMETRE)
     table |= engine_table(step.engine, step.ipopt)
     table["residual"] = plain(step.residual)
     table["certificate"] = _lines(step.certificate)
@@ -116,6 +122,22 @@ def segments_of(step: Step) -> list[dict[str, Any]] | None:
     names = ("tip_position", "tip_rotation", "stretch", "bending_angle")
     return [
         {OUTPUTS[name].key: plain(OUTPUTS[name].shown(getattr(part, name))) for name in names} for part in pose.parts
+    ]
+
+
+def contacts_of(step: Step) -> list[dict[str, Any]] | None:
+    """Return what each obstacle does to the robot, None without a solution."""
+    if solved_pose(step) is None:
+        return None
+    return [
+        {
+            "obstacle": contact.obstacle,
+            "force_N": plain(contact.force),
+            "from_s": contact.start,
+            "to_s": contact.end,
+            OUTPUTS["gap"].key: number(contact.gap, MILLIMETRE),
+        }
+        for contact in step.contacts
     ]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
@@ -19,12 +19,14 @@ from softnlp.base.errors import InputError
 from softnlp.base.files import make_folder, write_whole
 from softnlp.base.status import Status
 from softnlp.model.inputs import loads_of_table, robot_of_attributes, silicone_of_attributes, versions
+from softnlp.model.obstacle_tables import obstacles_of_tables
+from softnlp.model.obstacles import Obstacle
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.results.dataset import netcdf_bytes
 from softnlp.results.document import json_text, require_run
 from softnlp.results.table import table_text
-from softnlp.statics.step import Run, SectionRadii
+from softnlp.statics.step import ObstacleContact, Run, SectionRadii
 from softnlp.studies.fields import (
     BLOCKED_FORCE,
     DYNAMIC,
@@ -135,6 +137,7 @@ class RunView:
     backbone_length : (S,) [m]. bodies : S entries. contact : of a blocked force, else None. targets : of inverse
     kinematics, else None. moving : of a run in time, else None. std : standard deviations (S,) of outputs by name
     [SI], none where nothing scatters.
+    obstacles : what the body may touch. contact_force : (S, obstacles) size of what each pushes with [N], or None.
     """
 
     title: str
@@ -155,6 +158,8 @@ class RunView:
     targets: TargetView | None = None
     moving: MovingView | None = None
     std: Mapping[str, Array] = field(default_factory=dict)
+    obstacles: tuple[Obstacle, ...] = ()
+    contact_force: Array | None = None
 
     @property
     def solved(self) -> tuple[int, ...]:
@@ -190,6 +195,8 @@ def view_of_run(run: Run) -> RunView:
         pressure=np.array([step.pressure for step in run.steps], dtype=float),
         time=None if np.all(np.isnan(times)) else np.array(times),
         std=[name for name in DEVIATING if f"std_{name}" in known],
+        obstacles=run.obstacles,
+        contact_force=_pushed([step.contacts for step in run.steps], len(run.obstacles)),
     )
 
 
@@ -236,6 +243,8 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
         pressure=number("pressure"),
         time=values.get(OUTPUTS["t"].key),
         std=[name for name in DEVIATING if OUTPUTS[f"std_{name}"].key in values],
+        obstacles=obstacles_of_tables(json.loads(attributes["obstacles"])) if "obstacles" in attributes else (),
+        contact_force=np.linalg.norm(values["contact_force_N"], axis=2) if "contact_force_N" in values else None,
     )
 
 
@@ -275,6 +284,17 @@ def _view(number: Callable[[str], Any], body: Callable[[int, str], Body | None],
         targets=targets,
         moving=moving,
     )
+
+
+def _pushed(contacts: Sequence[Sequence[ObstacleContact]], count: int) -> Array | None:
+    """Return the size of the force of each obstacle (S, obstacles) [N], NaN without a solution; None without any."""
+    if not count:
+        return None
+    found = np.full((len(contacts), count), np.nan)
+    for k, step in enumerate(contacts):
+        for j, contact in enumerate(step):
+            found[k, j] = np.linalg.norm(contact.force)
+    return found
 
 
 def _material_label(name: str, law: str) -> str:

@@ -17,6 +17,7 @@ table{border-collapse:collapse;display:block;overflow-x:auto;font-size:.9rem}
 th,td{padding:.2rem .7rem;text-align:left;border-bottom:1px solid #e5e8ec;font-variant-numeric:tabular-nums}
 td.warned{background:#fff3cd}td.failed{background:#f8d7da}
 pre{background:#f4f6f8;padding:1rem;overflow-x:auto;font-size:.85rem}img{max-width:100%}
+@media print{body{margin:0;max-width:none}pre{white-space:pre-wrap}h2{break-after:avoid}img,tr{break-inside:avoid}}
 """
 _LONGEST, _FEW = 200, 30  # rows of a table; of one that stands before the numbers
 _SKIPPED = ("notes", "warnings", "checks", "ipopt_multipliers", "correlation")

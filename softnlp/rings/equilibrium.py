@@ -15,8 +15,8 @@ import numpy as np
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
+from softnlp.model.energies import PlaneEnergy
 from softnlp.rings.elements import elements
-from softnlp.rings.energy import PlaneEnergy
 from softnlp.rings.freedom import Freedom
 from softnlp.rings.mesher import Mesh
 from softnlp.rings.outline import Array, PlaneSection, RingError

@@ -16,9 +16,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from softnlp.model.energies import PlaneEnergy, mooney_rivlin
 from softnlp.model.robot import Robot
 from softnlp.rings.curve import Curve, fitted, nodes
-from softnlp.rings.energy import PlaneEnergy, mooney_rivlin
 from softnlp.rings.equilibrium import Balance, Equilibrium, Failed
 from softnlp.rings.mesher import Mesh, mesh
 from softnlp.rings.outline import Array, PlaneSection, RingError, of_robot

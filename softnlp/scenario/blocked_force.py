@@ -32,10 +32,11 @@ _OFFSETS = ("offset_mm", "offsets_mm", "offset_ramp")
 _PLACE = ("wall_point_mm", "wall_normal")
 
 
-def contact_settings(table: ContactTable, robot: Robot | None = None) -> ContactSettings:
+def contact_settings(table: ContactTable, robot: Robot | None = None, *, energy: bool = False) -> ContactSettings:
     """Return where the wall stands and how the problem is closed.
 
     robot : whose unbent tip may not start behind a wall given by a point; None leaves that to the study.
+    energy : whether the conventions are, which have no closure.
 
     Raises
     ------
@@ -60,7 +61,7 @@ def contact_settings(table: ContactTable, robot: Robot | None = None) -> Contact
     settings = ContactSettings(
         offset=(table.offset_mm or 0.0) * MILLIMETRE,
         tip_cap=table.tip_cap_mm * MILLIMETRE,
-        closure=table.closure,
+        closure="none" if energy else table.closure,
         wall_point=point,
         wall_normal=table.wall_normal,
         weights=ClosureWeights(**weights),

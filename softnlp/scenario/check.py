@@ -16,12 +16,13 @@ from softnlp.scenario.dynamic import DynamicFile
 from softnlp.scenario.identify import IdentifyFile
 from softnlp.scenario.inverse import InverseFile
 from softnlp.scenario.near_keys import meant
-from softnlp.scenario.schema import BlockedForceFile, ForwardFile, ScenarioFile
+from softnlp.scenario.obstacle_schema import AmongObstaclesFile
+from softnlp.scenario.schema import BlockedForceFile, ScenarioFile
 from softnlp.scenario.segments import OF_SEGMENTS, of_segment, of_segments
 from softnlp.scenario.workspace import WorkspaceFile
 
 SCHEMAS: Mapping[str, type[ScenarioFile]] = {
-    "forward": ForwardFile,
+    "forward": AmongObstaclesFile,
     "blocked-force": BlockedForceFile,
     "inverse": InverseFile,
     "workspace": WorkspaceFile,

@@ -17,12 +17,13 @@ from softnlp.base.errors import InputError, listed, located, nearest
 from softnlp.base.ranges import noise_note, unit_note
 from softnlp.base.reading import choices, read_text, shown
 from softnlp.model.contact_settings import CLOSURES, ContactSettings, ContactTask
-from softnlp.model.conventions import CONVENTIONS, Coefficients, Conventions
+from softnlp.model.conventions import Coefficients, Conventions
 from softnlp.model.materials import Material, load_materials
 from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.model.segments import require_one_segment
-from softnlp.scenario.data import Scenario
+from softnlp.rings import ALL_CONVENTIONS
+from softnlp.scenario.data import Scenario, require_no_obstacles
 from softnlp.scenario.laboratory import import_notes, laboratory_columns
 from softnlp.scenario.measured_rows import (
     ALIASES,
@@ -196,6 +197,7 @@ def _require_study(scenario: Scenario) -> None:
     source = str(scenario.path)
     with located(source=source):
         require_one_segment(scenario.robot, "a comparison with measurements")
+        require_no_obstacles(scenario, "a comparison with measurements")
     if scenario.study not in STUDIES:
         raise InputError(f"expected {choices(STUDIES)}, got {scenario.study!r}", source=source, key="study")
     task = scenario.task
@@ -273,7 +275,7 @@ def _variants(scenario: Scenario, asked: Asked, against_wall: bool) -> tuple[Var
 
 
 def _conventions(name: str) -> Conventions:
-    return CONVENTIONS[_known(name.replace("-", "_"), CONVENTIONS, "--conventions")]
+    return ALL_CONVENTIONS[_known(name.replace("-", "_"), ALL_CONVENTIONS, "--conventions")]
 
 
 def _coefficients(given: Coefficients, names: Sequence[str]) -> dict[str, Coefficients]:

@@ -16,6 +16,7 @@ from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import Coefficients, Conventions
 from softnlp.model.materials import Material
 from softnlp.model.numerics import Numerics
+from softnlp.model.obstacles import Obstacle
 from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
@@ -66,6 +67,8 @@ class Scenario:
         Of measured tips that the scenario is compared with, where it says so.
     uncertainty
         What scatters, where it says so.
+    obstacles
+        What the body may touch.
     """
 
     path: Path
@@ -85,6 +88,7 @@ class Scenario:
     warnings: tuple[str, ...]
     registration: RegistrationTable | None = None
     uncertainty: Uncertainty | None = None
+    obstacles: tuple[Obstacle, ...] = ()
 
     @property
     def model(self) -> Model:
@@ -136,9 +140,16 @@ def scenario_of(given: object, study: str | None, function: str) -> Scenario:
     return given
 
 
+def require_no_obstacles(scenario: Scenario, what: str) -> None:
+    """Raise `InputError` for a scenario with obstacles, where something takes none. what : what takes none."""
+    if scenario.obstacles:
+        raise InputError(f"{what} takes no [[obstacle]] so far", table="obstacle")
+
+
 def run_of(scenario: Scenario, steps: Iterable[Step], *notes: str) -> Run:
     """Return the run that these steps make of a scenario, with its warnings and then `notes`."""
     same = ("study", "robot", "material", "coefficients", "conventions", "loads", "title", "contact")
     asked: dict[str, Any] = {key: getattr(scenario, key) for key in same}
     told = {} if scenario.uncertainty is None else scenario.uncertainty.written
-    return Run(steps=tuple(steps), warnings=(*scenario.warnings, *notes), uncertainty=told, **asked)
+    warnings = (*scenario.warnings, *notes)
+    return Run(steps=tuple(steps), warnings=warnings, uncertainty=told, obstacles=scenario.obstacles, **asked)

@@ -36,6 +36,7 @@ class Key:
 
     unit : "" where it has none. default : TOML or words, "" where it has none. example : TOML of a value that it takes.
     words : those that it takes, if only some. table : the schema of its own keys; named : each under a name of its own.
+    several : whether there may be more than one table of it, in two brackets.
     """
 
     name: str
@@ -47,11 +48,12 @@ class Key:
     required: bool
     table: type[BaseModel] | None
     named: bool
+    several: bool = False
 
     @property
     def is_short(self) -> bool:
         """Whether it is written on one line."""
-        return self.table is None or (len(self.table.model_fields) <= _FEW and not self.named)
+        return self.table is None or (len(self.table.model_fields) <= _FEW and not (self.named or self.several))
 
     @property
     def comment(self) -> str:
@@ -81,6 +83,7 @@ def _key(table: type[BaseModel], name: str, field: FieldInfo) -> Key:
         text, example = "", text.removeprefix("as in ")
     meaning, _, default = text.partition("; by default ")
     inner, named = _table_in(field.annotation)
+    several = inner is not None and get_origin(field.annotation) is list
     if inner is not None and not meaning:
         meaning = about(inner)
     if not default and not field.is_required() and not isinstance(field.default, BaseModel | None):
@@ -90,9 +93,11 @@ def _key(table: type[BaseModel], name: str, field: FieldInfo) -> Key:
         keys = keys_of(inner)
         chosen = [key for key in keys if key.required] or keys[:1]
         example = "{ " + ", ".join(f"{key.name} = {key.example}" for key in chosen) + " }"
+    if several:
+        example, default = f"[{example}]", ""
     example = example or _example(default, words)
     unit = next((unit for end, unit in UNITS.items() if name.endswith(end)), "")
-    return Key(name, unit, default, meaning, example, words, field.is_required(), inner, named)
+    return Key(name, unit, default, meaning, example, words, field.is_required(), inner, named, several)
 
 
 def _example(default: str, words: tuple[str, ...]) -> str:

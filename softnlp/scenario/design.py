@@ -317,7 +317,15 @@ def finished_design(scenario: Scenario, candidates: Sequence[Candidate]) -> Desi
     """Return the design of a scenario that was stopped after some candidates."""
     from softnlp.studies.design import finished
 
+    so_far = design_so_far(scenario, candidates)
+    return finished(so_far.setting, so_far.task, candidates, scenario.title)
+
+
+def design_so_far(scenario: Scenario, candidates: Sequence[Candidate]) -> Design:
+    """Return the design of the candidates that have come, while others are at work; nothing is solved for it."""
+    from softnlp.studies.design import Design
+
     assert isinstance(scenario.task, DesignTask)
     contact = scenario.contact or ContactSettings()
     setting = Setting(scenario.robot, scenario.material, contact=contact, **scenario.settings)
-    return finished(setting, scenario.task, candidates, scenario.title)
+    return Design(setting, scenario.task, tuple(sorted(candidates, key=lambda c: c.number)), scenario.title)

@@ -69,7 +69,8 @@ UNUSED_BY_TENSILE = ("robots", "sigma", "contact", "gravity", "tip_load", "stiff
 class MeasurementsTable(DataTable):
     """[measurements]: of one robot or several, and the constants to identify.
 
-    free : the constants to find: k_e, k_b, k_a, k_i, phi, k_c, and constants of the law; as in ["k_e", "k_b"]
+    free : the constants to find: k_e, k_b, k_a, k_i, phi, k_c (c_m with "energy"), and constants of the law; as in
+        ["k_e", "k_b"]
     bounds : lowest and highest, by name; as in { k_e = [0.0, 5.0] }
     """
 

@@ -17,21 +17,25 @@ from softnlp.base.ranges import file_unit_note
 from softnlp.base.reading import BACKSLASH_HINT, LARGEST_TOML, LONGEST_NAME, one_line, read_text, toml_tables
 from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE, STANDARD_GRAVITY
 from softnlp.model.body import Segment
-from softnlp.model.conventions import COEFFICIENT_SETS, CONVENTIONS, Coefficients
+from softnlp.model.conventions import COEFFICIENT_SETS, Coefficients
 from softnlp.model.materials import Material, material_from_table
 from softnlp.model.numerics import Numerics
+from softnlp.model.obstacles import Obstacle
 from softnlp.model.quantities import Model
 from softnlp.model.robot import DIMENSIONS, MOST_CHAMBERS, Robot, Violation, violations
 from softnlp.model.rod import Loads
 from softnlp.model.segments import SegmentedRobot, segmented_robot
+from softnlp.rings import ALL_CONVENTIONS
 from softnlp.scenario.blocked_force import contact_settings, contact_task
 from softnlp.scenario.check import HOW, parse, parse_parts
 from softnlp.scenario.data import Read, Task
 from softnlp.scenario.data import Scenario as Scenario
 from softnlp.scenario.design import design_task
 from softnlp.scenario.dynamic import dynamic_task
+from softnlp.scenario.energy import misplaced
 from softnlp.scenario.identify import identify_task
 from softnlp.scenario.inverse import inverse_task
+from softnlp.scenario.obstacles import obstacles_of
 from softnlp.scenario.pressures import PressurePath, pressure_path
 from softnlp.scenario.schema import ScenarioFile
 from softnlp.scenario.segments import OF_SEGMENTS, read_segments
@@ -112,6 +116,7 @@ def _scenario(text: str, path: Path) -> Scenario:
     """Build a scenario; errors do not name the file yet."""
     data = parse_toml(text)
     file, errors, bad = parse_parts(data)  # what does not fit is in no table of the file
+    errors += misplaced(data)
     made, chosen, unlikely = _robot(file, data, path.parent, errors, bad)
     alone: list[Any] = getattr(file, "segment", None) or []
     if len(alone) == 1:  # a robot like any other, of which studies read what they read elsewhere
@@ -123,7 +128,8 @@ def _scenario(text: str, path: Path) -> Scenario:
             steps = _attempt(errors, "pressure", lambda: _steps(file, min(sets, MOST_CHAMBERS), path.parent))
     if "contact" not in bad and (wall := getattr(file, "contact", None)) is not None:
         single = None if made is None or file.study == "design" else made[0]  # a design judges each candidate
-        contact = _attempt(errors, "contact", lambda: contact_settings(wall, single))
+        energy = file.corrections.conventions == "energy"
+        contact = _attempt(errors, "contact", lambda: contact_settings(wall, single, energy=energy))
     if file.study in TASKS and not bad and made is not None and chosen is not None and steps is not None:
         table, read_task = TASKS[file.study]
         given = Read(file, data, made[0], chosen, steps, path.parent)
@@ -141,11 +147,14 @@ def _scenario(text: str, path: Path) -> Scenario:
         )
     if said is not None and not errors and made is not None and chosen is not None:
         silicone = data.get("material") or file.material.model_dump(exclude_none=True)
-        model = Model(made[0], chosen, _coefficients(file), CONVENTIONS[file.corrections.conventions])
+        model = Model(made[0], chosen, _coefficients(file), ALL_CONVENTIONS[file.corrections.conventions])
         pressed = contact if file.study == "blocked-force" else None
         scatter = _attempt(
             errors, "uncertainty", lambda: uncertainty_of(said, model, silicone, path.parent, pressed, task)
         )
+    obstacles: tuple[Obstacle, ...] = ()
+    if "obstacle" not in bad and (asked_for := getattr(file, "obstacle", [])):
+        obstacles = _attempt(errors, "obstacle", lambda: obstacles_of(file, asked_for)) or ()
     if errors or made is None or chosen is None or steps is None or numerics is None:
         raise first_of(errors, HOW)
     robot, warnings = made
@@ -157,7 +166,7 @@ def _scenario(text: str, path: Path) -> Scenario:
         robot=robot,
         material=chosen,
         coefficients=_coefficients(file),
-        conventions=CONVENTIONS[file.corrections.conventions],
+        conventions=ALL_CONVENTIONS[file.corrections.conventions],
         loads=_loads(file),
         pressures=steps.pressures,
         times=steps.times,
@@ -167,6 +176,7 @@ def _scenario(text: str, path: Path) -> Scenario:
         warnings=(*warnings, *unlikely, *file_unit_note(data), *steps.notes),
         registration=getattr(file, "registration", None) if "registration" in data else None,
         uncertainty=scatter,
+        obstacles=obstacles,
     )
 
 

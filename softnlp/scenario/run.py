@@ -102,6 +102,7 @@ def partial_run(scenario: Scenario, steps: Sequence[Step]) -> Run:
 def _forward(scenario: Scenario, progress: Progress | None, branches: int) -> Run:
     asked = {"title": scenario.title, "progress": progress, **scenario.settings}
     times = None if scenario.times is None else scenario.times.tolist()
+    asked["obstacles"] = scenario.obstacles
     return forward(scenario.robot, scenario.material, scenario.pressures, times=times, **asked)
 
 

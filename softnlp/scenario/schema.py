@@ -168,13 +168,15 @@ class CorrectionsTable(Table):
     area : k_a, multiplies the section's area; by default 1.0
     inertia : k_i, multiplies the silicone's second moments of area; by default 1.0
     bore_fraction : phi, how far beyond the bore the pressure acts, from 0 to 1; by default the set's; as in 0.0
-    conventions : how ambiguous equations are read
+    conventions : how ambiguous equations are read; "energy" is a section of its own, which takes modulus_factor alone
+    modulus_factor : c_m, of "energy": multiplies the silicone's stress; by default 1.0
     """
 
     area: Positive | None = None
     inertia: Positive | None = None
     bore_fraction: NotNegative | None = None
-    conventions: Literal["reproduction", "as_printed"] = "reproduction"
+    conventions: Literal["reproduction", "as_printed", "energy"] = "reproduction"
+    modulus_factor: Positive | None = None
 
 
 class GravityTable(Table):
@@ -253,7 +255,7 @@ class ContactTable(Table):
     offset_ramp : the same in equal steps; as in { from_mm = 0.0, to_mm = -10.0, steps = 5 }
     target_force_N : find the pressure that gives this force; the last step of [pressure] bounds it; as in 0.5
     tip_cap_mm : L_t, length of the rigid cap on the tip
-    closure : which equations close the problem
+    closure : which equations close the problem; "none" is that of conventions = "energy", and there the default
     chamber_reaction : k_c of the closure "compliant"; by default the set's; as in 1.45
     wall_point_mm : a point of a wall anywhere, with wall_normal; as in [-5.0, 0.0, 0.0]
     wall_normal : the direction in which that wall pushes the robot; as in [1.0, 0.0, 0.0]
@@ -270,7 +272,7 @@ class ContactTable(Table):
     offset_ramp: OffsetRampTable | None = None
     target_force_N: Positive | None = None
     tip_cap_mm: NotNegative = 0.0
-    closure: Literal["free", "compliant", "weighted", "rigid"] = "compliant"
+    closure: Literal["free", "compliant", "weighted", "rigid", "none"] = "compliant"
     chamber_reaction: NotNegative | None = None
     wall_point_mm: Vector | None = None
     wall_normal: Normal | None = None
@@ -374,7 +376,7 @@ class UncertaintyTable(Table):
 
 
 class ForwardFile(ScenarioFile):
-    """A whole scenario of `forward`."""
+    """What scenarios of `forward` and `blocked-force` may hold."""
 
     uncertainty: UncertaintyTable | None = None
     registration: RegistrationTable = RegistrationTable()

@@ -74,9 +74,9 @@ def table_lines(key: Key, values: Mapping[str, Any] | None, fit: Mapping[str, st
     assert key.table is not None
     place = place or (f"{key.name}.mine" if key.named else key.name)
     off = "# " if values is None else ""
-    yield (
-        f"{off}[{place}]".ljust(_WIDTH) + f"  # {'several, each with a name: ' if key.named else ''}{about(key.table)}"
-    )
+    head, count = (f"[[{place}]]", "one or more: ") if key.several else (f"[{place}]", "")
+    count = "several, each with a name: " if key.named else count
+    yield f"{off}{head}".ljust(_WIDTH) + f"  # {count}{about(key.table)}"
     later = []
     for one in keys_of(key.table):
         value = None if values is None else values.get(one.name)

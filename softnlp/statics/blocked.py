@@ -39,7 +39,7 @@ from softnlp.statics.loadcase import RodFunctions
 from softnlp.statics.pose_grid import iteration_cost
 from softnlp.statics.solver import SEARCHED_BY, PoseSolver
 from softnlp.statics.step import Step
-from softnlp.statics.wall import Situation, Wall, keeps_plane, slipping_pressure
+from softnlp.statics.wall import Situation, Wall, keeps_plane, slipping_pressure, with_closure
 
 Array = NDArray[np.float64]
 
@@ -74,7 +74,7 @@ class BlockedSolver:
     ) -> None:
         self.model = model
         self.numerics = numerics
-        self.contact = contact
+        self.contact = with_closure(model, contact)
         self.has_wall = wall
         # Without loads the free lengths and tip are taken from the closed form, so the grid need not show it.
         self.poses = poses or PoseSolver(model, numerics, unloaded_accuracy=numerics.accuracy)

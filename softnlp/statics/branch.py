@@ -19,6 +19,8 @@ from softnlp.base.status import Status
 from softnlp.base.units import BAR
 from softnlp.model.quantities import Model, quantities, section_function
 from softnlp.model.section import STIFFNESSES
+from softnlp.model.stretch_curve import BODY
+from softnlp.statics.unloaded_branch import COUPLED, followed, unloaded_function
 
 Array = NDArray[np.float64]
 
@@ -53,7 +55,10 @@ def branch_function(model: Model) -> ca.Function:
     """Return (quantities, stretch) -> rows that `stretch_on_branch` needs, for symbols in place of the model's numbers.
 
     Rows: A_0 sigma_e; what balances it at full pressure; the `STIFFNESSES` without pressure, then at full pressure.
+    Of a section that is `coupled` it is another function, see `softnlp.statics.unloaded_branch`.
     """
+    if model.section.coupled:
+        return unloaded_function(model)
 
     def build(numbers: Mapping[str, Any], stretch: Any) -> Sequence[Any]:
         at_rest, loaded = (model.section.at(numbers, P, stretch) for P in ([0.0] * model.sets, numbers["pressure"]))
@@ -69,6 +74,8 @@ def stretch_on_branch(function: ca.Function, column: Array, pressures: Array) ->
 
     function : of `branch_function`. column : every quantity in its order, SI, with `pressures` [Pa] in it.
     """
+    if function.n_in() == COUPLED:
+        return _coupled(function, column, pressures)
     rest = np.asarray(function(column, 1.0))[SILICONE]
     if not np.all(rest > 0):
         message = f"{Status.UNSTABLE_MATERIAL.advice}: the section has no {_lost(rest)} even without any pressure"
@@ -134,6 +141,24 @@ def stretch_on_branch(function: ca.Function, column: Array, pressures: Array) ->
     ]  # where each that vanishes there is negative, not just the first
     how = f"meets a section whose {_lost(beyond)} loses its sign"
     return _ended(Status.UNSTABLE_MATERIAL, end, fraction(end), pressures, how)
+
+
+def _coupled(function: ca.Function, column: Array, pressures: Array) -> BranchPoint:
+    """Return the same of a section whose curvature is found with its stretch."""
+    if not np.any(pressures):
+        column = np.concatenate([np.zeros(pressures.size), column[pressures.size :]])
+    found = followed(function, column)
+    if found is None:
+        message = f"{Status.UNSTABLE_MATERIAL.advice}: the section is not stable even without any pressure"
+        return BranchPoint(Status.UNSTABLE_MATERIAL, 1.0, 0.0, message)
+    strains, fraction = found
+    if fraction == 1.0:
+        return BranchPoint(Status.SOLVED, float(strains[0]), 1.0, "on the branch from zero pressure")
+    if strains[0] >= 0.999 * BODY.high:
+        beyond = f"goes beyond a stretch of {BODY.high:g}, up to which the silicone's law is taken,"
+        return _ended(Status.NO_EQUILIBRIUM, float(strains[0]), fraction, pressures, beyond)
+    how = "meets a section whose stiffness is no longer positive definite"
+    return _ended(Status.UNSTABLE_MATERIAL, float(strains[0]), fraction, pressures, how)
 
 
 def _crossing(excess: Callable[[float], float], a: float, b: float) -> float:

@@ -75,6 +75,11 @@ class Chain:
     whole_length: ca.MX
 
     @property
+    def once_differentiable(self) -> bool:
+        """Whether it is so for any segment."""
+        return any(equations.functions.model.section.coupled for equations in self.equations_of)
+
+    @property
     def transcribed(self) -> tuple[Transcribed, ...]:
         """Of each part."""
         return tuple(part.transcribed for part in self.parts)

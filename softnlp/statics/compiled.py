@@ -102,9 +102,12 @@ class RodEquations:
         """Count the directions in which the energy falls, 0 where the pose is stable; see `conjugate_points`."""
         return conjugate_points(self.transition(nodes.shape[1] - 1), nodes, constants)
 
-    def transition(self, intervals: int, *, varies: bool = False) -> ca.Function:
-        """Return what `conjugate_points` takes for a grid, of the uniform rod or of the one that varies."""
-        K = min(intervals, MOST_INTERVALS)
+    def transition(self, intervals: int, *, varies: bool = False, every: bool = False) -> ca.Function:
+        """Return what `conjugate_points` takes for a grid, of the uniform rod or of the one that varies.
+
+        every : of each interval, however many.
+        """
+        K = intervals if every else min(intervals, MOST_INTERVALS)
         if (K, varies) not in self._mapped:
             self._mapped[K, varies] = (self.varying.transition if varies else self._transition).map(K)
         return self._mapped[K, varies]

@@ -22,6 +22,7 @@ from softnlp.statics.chain_grid import ChainEquations, chain_equations
 from softnlp.statics.chain_solver import ChainSolver
 from softnlp.statics.compiled import RodEquations, rod_equations
 from softnlp.statics.solver import PoseSolver
+from softnlp.statics.wall import with_closure
 
 MOST_KINDS = 8
 """How many rods are kept; those that were used least recently go."""
@@ -36,6 +37,7 @@ def pose_solver(model: Model, numerics: Numerics, **settings: Any) -> PoseSolver
 
 def blocked_solver(model: Model, numerics: Numerics, contact: ContactSettings, *, wall: bool = True) -> BlockedSolver:
     """Return a solver for use in this thread, which shares what it compiles as `pose_solver`."""
+    with_closure(model, contact)
     poses = pose_solver(model, numerics, unloaded_accuracy=numerics.accuracy)
     kept = kept_equations(model, (TipContact(contact.closure, wall),))
     return BlockedSolver(model, numerics, contact, wall=wall, poses=poses, equations=kept)

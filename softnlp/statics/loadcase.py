@@ -48,7 +48,7 @@ class RodFunctions:
     contact : (x, c, y, a, units) -> T_i (N), e_L, e_h where there is a `TipContact`. arc : (quantities, stretch, s) ->
     state without gravity or tip load, exact there and the first guess elsewhere. by_machine : whether machine
     code may take the place of the virtual machine where that pays: the same numbers but for round-off, from when on
-    depends on what was solved before.
+    depends on what was solved before. quick : see `in_kernels`.
     """
 
     model: Model
@@ -62,11 +62,24 @@ class RodFunctions:
     contact: ca.Function
     arc: ca.Function
     by_machine: bool = True
+    quick: RodFunctions | None = None
+
+    @property
+    def in_kernels(self) -> RodFunctions:
+        """What machine code is made of: the same, or what gives the same numbers in less time."""
+        return self.quick or self
 
     @property
     def state_size(self) -> int:
         """The number of entries of x."""
         return int(self.field.size1_in(0))
+
+    def resultants(self, x: Any, c: Any) -> tuple[Any, Any]:
+        """Return n and m as they are shown, of a scaled state p, R, N, M and the constants of the load case."""
+        if self.model.section.splits_pressure:
+            return rod.wall_resultants(x, unpack_section(c))
+        _, _, N, M = rod.unpack(x)
+        return N, M
 
     @property
     def tip_unknowns(self) -> int:
@@ -120,12 +133,19 @@ def rod_functions(
     probed = model.section.at(model.numbers, np.zeros(model.sets), 1.0)
     own = [ca.SX.sym("own") for _ in probed.own]
     c = ca.vertcat(*section, *line.symbols[:1], *flat, chamber, *own, *line.symbols[1:])
-    v, u = model.section.strains(section, own, *rod.in_body(x))
-    rates = [ca.norm_2(v + ca.cross(u, ca.vertcat(d_x, d_y, 0))) for d_x, d_y in centres]
-    along = ca.vertcat(*rates, ca.norm_2(u[:2]), ca.norm_2(v))
-    lengths = ca.Function("lengths", [x, c], [section.length * along], {"cse": True})
-    field = ca.vertcat(rod.field(x, v, u, *line.wrench(x, section)), along[:with_lengths])
-    strains = ca.Function("strains", [x[: rod.STATE_SIZE], c], [v, u])
+
+    def rates(strains: Any) -> tuple[ca.Function, ca.Function, ca.Function]:
+        """Return the field, the rates of lengths, and the strains."""
+        v, u = strains(section, own, *rod.in_body(x))
+        along = ca.vertcat(*model.section.lengthening(own, centres, v, u), ca.norm_2(u[:2]), ca.norm_2(v))
+        every = ca.vertcat(rod.field(x, v, u, *line.wrench(x, section)), along[:with_lengths])
+        return (
+            ca.Function("field", [x, c], [section.length * every], {"cse": True}),
+            ca.Function("lengths", [x, c], [section.length * along], {"cse": True}),
+            ca.Function("strains", [x[: rod.STATE_SIZE], c], [v, u]),
+        )
+
+    field, lengths, strains = rates(model.section.strains)
 
     def build(numbers: Mapping[str, Any], stretch: Any) -> list[Any]:
         L_0, F_0 = numbers["robot.length"], force_unit(model, numbers)
@@ -154,12 +174,12 @@ def rod_functions(
         arc = ca.vertcat(arc, s * lengths(full, at_rest)[:chambers])
 
     given, tip, contact = tip_rows(model, loads, x, section, centres, chamber)
-    return RodFunctions(
+    made = RodFunctions(
         model=model,
         loads=loads,
         taken=tuple(declared),
         section=packed,
-        field=ca.Function("field", [x, c], [section.length * field], {"cse": True}),
+        field=field,
         lengths=lengths,
         strains=strains,
         tip=ca.Function("tip", [x, c, *given], [tip], {"cse": True}),
@@ -167,6 +187,10 @@ def rod_functions(
         arc=ca.Function("arc", [column, stretch, s], [arc]),
         by_machine=by_machine,
     )
+    if model.section.coupled:
+        field, lengths, strains = rates(model.section.quick_strains)
+        return replace(made, quick=replace(made, field=field, lengths=lengths, strains=strains))
+    return made
 
 
 @lru_cache(maxsize=8)
@@ -237,6 +261,11 @@ class LoadCase:
     outputs: Mapping[str, ca.MX]
     length_unit: ca.MX
     force_unit: ca.MX
+
+    @property
+    def once_differentiable(self) -> bool:
+        """Whether strains are found by iterations, whose derivative is the last one's."""
+        return self.functions.model.section.coupled
 
     @property
     def whole_length(self) -> ca.MX:

@@ -22,7 +22,7 @@ SHAPE_POINTS = 61
 LEAST_STRAIN, MOST_STRAIN = 0.5, 2.0
 """Strains v_z by loads outside these are told of: the stiffness is that at the stretch from pressure alone."""
 
-_SUBSTEPS = 4
+_SUBSTEPS = 4  # to a point between nodes; 1 where the strains are dear
 # Of the bending angle's quadrature.
 _SAMPLES, _ZOOMS, _MOST_PARTS = 6, 12, 225
 _ENDS = (1 - np.cos(np.pi * np.arange(_SAMPLES) / (_SAMPLES - 1))) / 2  # Chebyshev points, 0 and 1 among them
@@ -42,11 +42,10 @@ def shape_function(functions: RodFunctions) -> ca.Function:
     field = functions.field
     x, c, h = ca.SX.sym("x", field.size1_in(0)), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("h")
     step = rk_step(field, RK4)
-    end = x
-    for _ in range(_SUBSTEPS):
-        end = step(end, c, h / _SUBSTEPS)
-    section = unpack_section(c)
-    every = ca.vertcat(end, *functions.strains(end[: rod.STATE_SIZE], c), *rod.wall_resultants(end, section))
+    end, substeps = x, 1 if functions.model.section.coupled else _SUBSTEPS
+    for _ in range(substeps):
+        end = step(end, c, h / substeps)
+    every = ca.vertcat(end, *functions.strains(end[: rod.STATE_SIZE], c), *functions.resultants(end, c))
     return ca.Function("shape", [x, c, h], [every])
 
 
@@ -166,7 +165,9 @@ def pose_of(
 
 def pose_warnings(model: Model, pose: Pose) -> tuple[str, ...]:
     """Return what a designer should know of a solved pose: fitted range, touching chambers, stability, its body."""
-    return (*model.section.warnings(pose.stretch), *shape_warnings(pose))
+    own, shape = model.section, pose.shape
+    along = own.warnings_along(pose.stretch, shape.shear_extension, shape.curvature)
+    return (*own.warnings(pose.stretch), *along, *shape_warnings(pose))
 
 
 def shape_warnings(pose: Pose) -> tuple[str, ...]:

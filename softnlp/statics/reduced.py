@@ -51,6 +51,7 @@ class ReducedRod:
 
 def reduced_rod(functions: RodFunctions) -> ReducedRod:
     """Build the steps from the field of a load case with dead loads."""
+    functions = functions.in_kernels
     nc = functions.field.size1_in(1)
     data, s, h = ca.SX.sym("data", nc + 6), ca.SX.sym("s"), ca.SX.sym("h")
     c, force, moment = data[:nc], data[nc : nc + 3], data[nc + 3 :]

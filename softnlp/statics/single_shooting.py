@@ -15,12 +15,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from softnlp.model import rod
 from softnlp.model.quantities import LOADS
 from softnlp.model.rod import STATE_SIZE
 from softnlp.native.kernels import Kernels, Step
 from softnlp.native.shooting import Compiled, shooting
-from softnlp.statics.loadcase import RodFunctions, unpack_section, whole_weight
+from softnlp.statics.loadcase import RodFunctions, whole_weight
 from softnlp.statics.reduced import MOMENT, POSITION, ROTATION, STATE, base_state, function, reduced_rod
 from softnlp.statics.stretches import Stretches, stretch_maps
 
@@ -174,14 +173,16 @@ def _pushes_back(R: Array, turned: Array, J: Array) -> bool:
 def single_shooting(functions: RodFunctions) -> SingleShooting | None:
     """Compile what finds poses of a rod with dead loads; None where there is nothing to compile with."""
     reduced = reduced_rod(functions)
+    functions = functions.in_kernels
     size, nc = functions.state_size, functions.field.size1_in(1)
     x, data, s = ca.SX.sym("x", size), ca.SX.sym("data", nc + 1), ca.SX.sym("s")
     c, h = data[:nc], data[nc]
     with_integrals = ca.SX.sym("x", size + functions.lengths.size1_out(0))
     along = [functions.field(with_integrals[:size], c), functions.lengths(with_integrals[:size], c)]
     state = ca.SX.sym("x", size + nc)
-    section = unpack_section(state[size:])
-    strains = ca.vertcat(*functions.strains(state[:size], state[size:]), *rod.wall_resultants(state[:size], section))
+    strains = ca.vertcat(
+        *functions.strains(state[:size], state[size:]), *functions.resultants(state[:size], state[size:])
+    )
     maps = stretch_maps(functions)
     given = ca.SX.sym("given", maps["section"].size1_in(0))
     arc = functions.arc(given[:-1], given[-1], 1.0)

@@ -183,7 +183,8 @@ class PoseSolver:
         numerics = self.numerics
         if numerics.transcription != "multiple-shooting" or numerics.engine == "ipopt":
             return None
-        single = self.equations.single_shooting() if self.model.section.by_sum else None
+        section = self.model.section
+        single = self.equations.single_shooting() if section.by_sum or section.coupled else None
         if single is None:
             return None
         nodes = None if near is None else near.nodes

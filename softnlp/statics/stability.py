@@ -65,14 +65,25 @@ def conjugate_points(transition: ca.Function, nodes: Array, constants: Array) ->
     return answered(transition, nodes, constants, np.zeros((6, 6)))[0]  # a dead load answers with nothing
 
 
-def answered(transition: ca.Function, nodes: Array, constants: Array, beyond: Array) -> tuple[int, Array]:
+def answered(
+    transition: ca.Function,
+    nodes: Array,
+    constants: Array,
+    beyond: Array,
+    springs: Array | None = None,
+    steps: Array | None = None,
+) -> tuple[int, Array]:
     """Return the count over one rod, and the stiffness (6, 6) with which its left end answers.
 
-    transition, nodes : as of `conjugate_points`. beyond : the stiffness of what is behind its right end.
+    transition, nodes : as of `conjugate_points`. beyond : the stiffness of what is behind its right end. springs,
+    steps : (K + 1, 6, 6) with which each node is held, and the shares (K,) of the intervals, which are all taken then;
+    the nodes are behind what holds them.
     """
-    K = min(nodes.shape[1] - 1, MOST_INTERVALS)
+    K = nodes.shape[1] - 1 if steps is not None else min(nodes.shape[1] - 1, MOST_INTERVALS)
     chosen = np.linspace(0, nodes.shape[1] - 1, K + 1).round().astype(int)
-    nodes, h = nodes[:, chosen], np.diff(chosen) / chosen[-1]
+    nodes, h = nodes[:, chosen], np.diff(chosen) / chosen[-1] if steps is None else steps
+    held = np.zeros((K + 1, 6, 6)) if springs is None else springs
+    beyond = beyond + held[K]
     Phi = np.asarray(transition(nodes[:, :K], constants, h[None, :])).reshape(12, K, 12).transpose(1, 0, 2)
     A, B, C, D = Phi[:, :6, :6], Phi[:, :6, 6:], Phi[:, 6:, :6], Phi[:, 6:, 6:]
     before = D @ np.linalg.inv(B)  # force at a node by its pose, with the node before it held
@@ -80,7 +91,7 @@ def answered(transition: ca.Function, nodes: Array, constants: Array, beyond: Ar
     for k in range(K - 1, -1, -1):
         every[k] = before[k] - beyond
         # Carry the stiffness of the rod beyond over the interval: f_left as a function of the pose at its left.
-        beyond = np.linalg.solve(D[k] - beyond @ B[k], beyond @ A[k] - C[k])
+        beyond = np.linalg.solve(D[k] - beyond @ B[k], beyond @ A[k] - C[k]) + held[k]
     return int(np.sum(np.linalg.eigvalsh((every + every.transpose(0, 2, 1)) / 2) < 0)), beyond
 
 

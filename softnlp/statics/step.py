@@ -11,14 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.status import Status
-from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.contact_settings import NO_CLOSURE, ContactSettings
 from softnlp.model.conventions import Coefficients, Conventions
 from softnlp.model.materials import Material
+from softnlp.model.obstacles import Obstacle
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.model.section import SectionRadii as SectionRadii
 from softnlp.nlp.solver import EquationResidual, Ipopt
 from softnlp.statics.body import Fit, fit_of
+from softnlp.statics.moving import Moving as Moving
+from softnlp.statics.obstacle_contact import ObstacleContact as ObstacleContact
 
 Array = NDArray[np.float64]
 
@@ -222,6 +225,11 @@ class Contact:
         return self if self.normal.any() else None
 
     @property
+    def told_reaction(self) -> Array | None:
+        """The reactions (N,); None where the section has no closure, so that there are none [N]."""
+        return None if self.closure == NO_CLOSURE else self.chamber_reaction
+
+    @property
     def elasticities(self) -> dict[str, float]:
         """The elasticity of the force to each weight by its name [1]."""
         return {line.weight: line.elasticity for line in self.sensitivity}
@@ -271,28 +279,6 @@ class Deviation:
 
 
 @dataclass(frozen=True, eq=False)
-class Moving:
-    """What a step of a run in time holds beside its pose.
-
-    Attributes
-    ----------
-    tip_velocity
-        (3,) world frame [m/s].
-    regulator
-        (sets,) pressures at the regulators; those of the step are in the chambers [Pa].
-    energy
-        (entries,) by the names of `softnlp.dynamics.energy.Energy`, until now [J].
-    time_steps
-        How many steps of time were taken since the step before.
-    """
-
-    tip_velocity: Array
-    regulator: Array
-    energy: Mapping[str, float]
-    time_steps: int
-
-
-@dataclass(frozen=True, eq=False)
 class Step:
     """One step of a run: its input, how it ended, and the pose when it was solved.
 
@@ -330,6 +316,10 @@ class Step:
         Where uncertainties were given, else None.
     moving
         Of a run in time, else None.
+    contacts
+        Of obstacles, one each.
+    complementarity
+        Sum of what each contact pushes with times its gap, None without obstacles [N m].
     """
 
     pressure: Array
@@ -350,6 +340,8 @@ class Step:
     ipopt: Ipopt | None = None
     deviation: Deviation | None = None
     moving: Moving | None = None
+    contacts: tuple[ObstacleContact, ...] = ()
+    complementarity: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -372,6 +364,8 @@ class Run:
         Of a blocked force, else None.
     uncertainty
         What scatters and how much, by the keys of a scenario and in their units; empty where nothing was said.
+    obstacles
+        What the body may touch.
     """
 
     study: str
@@ -385,6 +379,7 @@ class Run:
     warnings: tuple[str, ...] = field(default=())
     contact: ContactSettings | None = None
     uncertainty: Mapping[str, Any] = field(default_factory=dict)
+    obstacles: tuple[Obstacle, ...] = ()
 
     @property
     def failed(self) -> tuple[Step, ...]:

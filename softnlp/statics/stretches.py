@@ -13,15 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.units import BAR
+from softnlp.model.stretch_curve import BODY
 from softnlp.native.shooting import Shooting
 from softnlp.statics.branch import SILICONE, branch_function
 from softnlp.statics.loadcase import RodFunctions
+from softnlp.statics.unloaded_branch import REST, step_function
 
 Array = NDArray[np.float64]
 
 _LARGEST = {True: 10.0, False: 3.0}
 _SAMPLES = {True: 1800, False: 100}  # of a curve that all poses share, and of a pose's own
 _NEWTON_STEPS = 8
+_PARTS, _NEAR = 6, 1e-3  # of the pressure of a section that bends with it; how near the strains are on the way
 
 
 def stretch_maps(functions: RodFunctions) -> dict[str, ca.Function]:
@@ -34,12 +37,18 @@ def stretch_maps(functions: RodFunctions) -> dict[str, ca.Function]:
     column, stretch = ca.SX.sym("column", size), ca.SX.sym("stretch")
     given = ca.vertcat(column, stretch)
     constants, balance, units = functions.section(column, stretch)
+    branch = branch_function(functions.model)
+    coupled = functions.model.section.coupled
     found = {
-        "branch": branch_function(functions.model)(column, stretch),
+        "branch": given if coupled else branch(column, stretch),
         "balance": ca.vertcat(balance, ca.jacobian(balance, stretch)),
         "section": ca.vertcat(constants, balance, units),
     }
-    return {name: ca.Function(name, [given], [ca.densify(rows)], {"cse": True}) for name, rows in found.items()}
+    maps = {name: ca.Function(name, [given], [ca.densify(rows)], {"cse": True}) for name, rows in found.items()}
+    if coupled:
+        del maps["balance"]
+        maps["branch"] = step_function(branch)
+    return maps
 
 
 class Stretches:
@@ -54,12 +63,15 @@ class Stretches:
         self._shared = shared
         self._sets = model.sets
         self._by_sum = model.section.by_sum
+        self._coupled = model.section.coupled
         self._grid = np.linspace(1.0, _LARGEST[shared], _SAMPLES[shared])
         self._curve: tuple[Array, Array] | None = None
 
     def find(self, columns: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Return the stretch of each pose, and whether it is on the branch for certain; NaN where it is not."""
         n = columns.shape[1]
+        if self._coupled:
+            return self._followed(columns)
         total = columns[: self._sets].sum(axis=0)
         stretch = np.full(n, np.nan)
         if not self._by_sum:
@@ -85,6 +97,25 @@ class Stretches:
         stretch[known] = start[known]
         stretch[known & (total == 0)] = 1.0
         return stretch, known
+
+    def _followed(self, columns: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the same of sections that bend with the pressure: followed in equal parts of it."""
+        n = columns.shape[1]
+        strains = np.repeat(np.array(REST)[:, None], n, axis=1)
+        known, slope = np.ones(n, bool), np.zeros((3, n))
+        with np.errstate(all="ignore"):
+            for part in range(_PARTS + 1):
+                strains = strains + slope / _PARTS
+                fraction = np.full((1, n), part / _PARTS)
+                for _ in range(_NEWTON_STEPS):
+                    rows = self._shooting.apply("branch", np.vstack([columns, strains, fraction]))
+                    strains = strains + rows[:3]
+                    moved = np.abs(rows[:3]).max(axis=0)
+                    if not np.any(moved > (1e-13 if part == _PARTS else _NEAR)):
+                        break
+                slope = rows[3:6]
+                known &= (moved < (1e-11 if part == _PARTS else _NEAR)) & (rows[6] > 0) & (strains[0] <= BODY.high)
+        return np.where(known, strains[0], np.nan), known
 
     def _sampled(self, columns: Array) -> tuple[Array, NDArray[np.intp]]:
         """Return the sum of pressures on the grid of stretches (poses, samples), and how many samples are safe."""

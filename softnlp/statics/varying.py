@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from softnlp.model import rod
 from softnlp.nlp.transcription import RK4, rk_step
-from softnlp.statics.loadcase import RodFunctions, centres_of, unpack_section
+from softnlp.statics.loadcase import RodFunctions, centres_of
 from softnlp.statics.stability import transition_function
 
 Array = NDArray[np.float64]
@@ -106,7 +106,7 @@ def varying_rod(functions: RodFunctions) -> VaryingRod:
         for k in range(0, d.numel(), 2)
     ]
     along = ca.vertcat(*chambers, L * ca.norm_2(u[:2]), L * ca.norm_2(v))
-    n, m = rod.wall_resultants(local, unpack_section(c_here))
+    n, m = functions.resultants(local, c_here)
     wall = ca.vertcat(v, u, n * F_here / F_0, m * F_here / F_0)
     given, options = [x, ca.vertcat(a, b, part, F_0)], {"cse": True}
     return VaryingRod(

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from softnlp.base.errors import InputError
 from softnlp.base.ranges import POSITION
 from softnlp.base.status import Status
-from softnlp.model.contact_settings import CLOSURES, Closure, ContactSettings, require_in_front
+from softnlp.model.contact_settings import CLOSURES, NO_CLOSURE, Closure, ContactSettings, require_in_front
+from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.statics.arc import unloaded_arc
@@ -57,6 +58,16 @@ def _wall_at(offset: float, rest: Array, furthest: Array) -> Wall:
     return Wall(np.array([offset, 0.0, 0.0]), np.array([-np.sign(moved), 0.0, 0.0]))
 
 
+def with_closure(model: Model, contact: ContactSettings) -> ContactSettings:
+    """Return the settings, or raise `InputError` for a closure that the model's section does not have."""
+    if model.section.coupled and contact.closure != NO_CLOSURE:
+        text = f"{contact.closure_name!r} is not used with conventions energy; expected 'none'"
+        raise InputError(text, key="closure")
+    if contact.closure == NO_CLOSURE and not model.section.coupled:
+        raise InputError("expected 'none' only with conventions energy", key="closure")
+    return contact
+
+
 def checked_contact(
     contact: ContactSettings, robots: Iterable[Robot] = (), offsets: Iterable[float] = ()
 ) -> ContactSettings:
@@ -64,7 +75,7 @@ def checked_contact(
 
     robots, offsets : whose unbent tips may not start behind the wall, and how far that is moved (`require_in_front`).
     """
-    if contact.closure not in CLOSURES and not isinstance(contact.closure, Closure):
+    if contact.closure not in (*CLOSURES, NO_CLOSURE) and not isinstance(contact.closure, Closure):
         raise InputError(f"expected one of {', '.join(CLOSURES)}, got {contact.closure!r}", key="closure")
     numbers = {"offset": contact.offset, "tip_cap": contact.tip_cap}
     for key, value in numbers.items():

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from softnlp.base.columns import DEG, OUTPUTS
 from softnlp.base.errors import InputError, nearest
 from softnlp.base.quantity import Quantity
+from softnlp.model.quantities import differentiable
 from softnlp.model.section import RodSection
 from softnlp.nlp.implicit import ImplicitDerivatives
 from softnlp.nlp.problem import CompiledProblem
@@ -67,10 +68,11 @@ def entries_of(names: Sequence[str], wanted: str) -> list[int]:
 
 def quantities_of(solver: PoseSolver | BlockedSolver) -> dict[str, Quantity]:
     """Return what outputs can be differentiated by, by name: the model's quantities, and the wall's where there is."""
+    own = differentiable(solver.model)
     if isinstance(solver, PoseSolver):
-        return dict(solver.quantities)
+        return {k: q for k, q in solver.quantities.items() if k in own}
     declared = solver.functions.declared(solver.model)
-    return {k: q for k, q in declared.items() if not k.startswith("contact.") or k in _CONTACT}
+    return {k: q for k, q in declared.items() if k in own or k in _CONTACT}
 
 
 def checked_names(names: Sequence[str], known: Sequence[str], key: str) -> tuple[str, ...]:

@@ -300,6 +300,9 @@ def check_task(task: DesignTask, setting: Setting) -> None:
     for key, value in (("starts", task.starts), ("trials", task.trials)):
         if value is not None and not (_is_whole(value) and value >= 1):
             raise InputError(f"expected a number of at least 1, got {value}", key=key)
+    if setting.conventions.energy and task.is_continuous:
+        text = "expected lists of choices: ranges are not searched with conventions energy so far"
+        raise InputError(text, key=next(iter(task.ranges), "pressure"))
     if task.needs_force and task.is_continuous and setting.contact.closure == "weighted":
         raise InputError(
             "expected 'free', 'compliant' or 'rigid' where something continuous is chosen by the force: 'weighted' "

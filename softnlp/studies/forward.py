@@ -14,11 +14,13 @@ from softnlp.base.ranges import PRESSURE
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.model.materials import Material
 from softnlp.model.numerics import Numerics
+from softnlp.model.obstacles import Obstacle
 from softnlp.model.quantities import Model
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
 from softnlp.statics.guards import LIMITS
 from softnlp.statics.kept import pose_solver
+from softnlp.statics.obstacle_solver import among_obstacles
 from softnlp.statics.step import Run, Step
 
 
@@ -34,6 +36,7 @@ def forward(
     times: Sequence[float] | None = None,
     title: str = "",
     progress: Callable[[int, Step], None] | None = None,
+    obstacles: Sequence[Obstacle] = (),
 ) -> Run:
     """Solve the pose at each pressure in order, warm-started along the sequence.
 
@@ -55,6 +58,9 @@ def forward(
         Kept with the run.
     progress
         Called with the index and the step as each is done.
+    obstacles
+        What the body may touch, without friction; each step is followed from the last one, and the first from the
+        unpressurised shape.
 
     Returns
     -------
@@ -66,7 +72,8 @@ def forward(
     RobotError
         For a robot that is geometrically impossible; the rules that a scenario may lower are warnings here.
     InputError
-        For pressures or loads of the wrong shape, not finite, or out of their ranges.
+        For pressures or loads of the wrong shape, not finite, or out of their ranges, and for obstacles that the robot
+        overlaps at rest or that it cannot have.
     """
     warnings = check(robot, allow=LOWERABLE_RULES)
     P = pressure_table(pressures, robot.chamber_sets)
@@ -74,8 +81,10 @@ def forward(
     if times is not None and len(times) != len(P):
         raise InputError(f"expected one time a step, got {len(times)} times for {len(P)} steps", key="times")
     solver = pose_solver(Model(robot, material, coefficients, conventions), numerics)
-    steps = followed(lambda pressure, near: solver.solve(pressure, loads, near), P, progress, times)
-    return Run("forward", robot, material, coefficients, conventions, loads, steps, title, warnings)
+    among: Any = among_obstacles(solver, obstacles) if obstacles else solver
+    steps = followed(lambda pressure, near: among.solve(pressure, loads, near), P, progress, times)
+    run = Run("forward", robot, material, coefficients, conventions, loads, steps, title, warnings)
+    return replace(run, obstacles=tuple(obstacles))
 
 
 def followed(

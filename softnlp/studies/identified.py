@@ -46,6 +46,7 @@ COEFFICIENTS: Mapping[str, Coefficient] = MappingProxyType(
         "k_a": Coefficient("corrections.area", "area", 0.05, 20.0),
         "k_i": Coefficient("corrections.inertia", "inertia", 0.05, 20.0),
         "phi": Coefficient("corrections.bore_fraction", "bore_fraction", 0.0, 1.0),
+        "c_m": Coefficient("corrections.modulus_factor", "modulus_factor", 0.05, 20.0),
         "k_c": Coefficient("contact.chamber_reaction", "chamber_reaction", 0.0, 100.0),
     }
 )

@@ -21,7 +21,7 @@ from softnlp.base.status import Status
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import Conventions
 from softnlp.model.numerics import Numerics
-from softnlp.model.quantities import LOADS, Model
+from softnlp.model.quantities import LOADS, OF_ROBOT, Model
 from softnlp.model.rod import Loads
 from softnlp.nlp.constraint import Constraint
 from softnlp.nlp.problem import CompiledProblem, compile_problem
@@ -96,7 +96,7 @@ class AtOnce:
         poses = pose_solver(model, self.numerics)
         given = {}
         for name, q in poses.quantities.items():
-            if name.startswith("robot."):
+            if name.startswith(OF_ROBOT):
                 given[name] = self.own(f"{label}.{name}", q, q.nominal)
             else:  # shared by all robots
                 given[name] = self.declared.setdefault(name, q)

@@ -15,7 +15,7 @@ from softnlp.base.units import BAR, NEWTON_MILLIMETRE
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.model.materials import Material
 from softnlp.model.numerics import Numerics
-from softnlp.model.quantities import Model, quantities
+from softnlp.model.quantities import Model, differentiable, quantities
 from softnlp.model.robot import DIMENSIONS, Robot
 from softnlp.model.rod import Loads
 from softnlp.statics.step import Pose
@@ -113,7 +113,7 @@ def sensitivity_report(
     InputError
         As `softnlp.sensitivities` and `softnlp.error_bars`.
     """
-    every = list(quantities(Model(robot, material, coefficients, conventions)))
+    every = list(differentiable(Model(robot, material, coefficients, conventions)))
     found = sensitivities(
         robot,
         material,
@@ -145,7 +145,7 @@ def sensitivity_report(
 
 def tolerance_keys(model: Model) -> dict[str, tuple[str, float]]:
     """Return the quantity of each key that may have a tolerance, and the size of the key's unit."""
-    declared = quantities(model)
+    declared = differentiable(model)
     keys: dict[str, tuple[str, float]] = {
         d.file_key: (f"robot.{d.field}", d.scale) for d in DIMENSIONS if d.scale is not None
     }
@@ -161,7 +161,12 @@ def tolerance_keys(model: Model) -> dict[str, tuple[str, float]]:
 
 
 def named_tolerances(
-    given: Sequence[str], robot: Robot, material: Material, coefficients: Coefficients, pressure: Array
+    given: Sequence[str],
+    robot: Robot,
+    material: Material,
+    coefficients: Coefficients,
+    pressure: Array,
+    conventions: Conventions = REPRODUCTION,
 ) -> dict[str, float]:
     """Return tolerances, SI, by the quantity's name, from "NAME=VALUE" or "NAME=VALUE%" with the keys of a scenario.
 
@@ -170,7 +175,7 @@ def named_tolerances(
     InputError
         For a name that is not known, a value that is not a number, or a percentage of what is 0.
     """
-    model = Model(robot, material, coefficients)
+    model = Model(robot, material, coefficients, conventions)
     declared, keys = quantities(model), tolerance_keys(model)
     found: dict[str, float] = {}
     for text in given:

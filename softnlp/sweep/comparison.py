@@ -20,6 +20,7 @@ from softnlp.model.inputs import conventions_of_table, loads_of_table
 from softnlp.model.materials import material_from_table
 from softnlp.model.quantities import Model
 from softnlp.model.rod import Loads
+from softnlp.rings import ENERGY
 from softnlp.statics.step import Run, Step
 from softnlp.studies.forward import forward
 from softnlp.sweep.measured import Measured
@@ -193,7 +194,8 @@ def model_of(workspace: Workspace) -> tuple[Model, Loads]:
         made = replace(material_from_table(tables["material"]), set=tables.get("material_set", ""))
         known = {f.name for f in fields(Coefficients)}
         coefficients = Coefficients(**{k: float(v) for k, v in tables["coefficients"].items() if k in known})
-        conventions = conventions_of_table(tables["conventions_in_full"])
+        told = tables["conventions_in_full"]
+        conventions = ENERGY if told.get("rings") else conventions_of_table(told)
         return Model(workspace.robot, made, coefficients, conventions), loads_of_table(tables["loads"])
     except (KeyError, TypeError, ValueError) as error:
         reason = error.message if isinstance(error, InputError) else f"no {error}"

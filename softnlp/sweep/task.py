@@ -89,7 +89,7 @@ def varied_quantities(material: Material, gravity: Vector) -> dict[str, Varied]:
     kinds["material.density_kg_m3"] = Varied("material.density", None, "kg/m^3", 1.0, "density of the silicone")
     for table, names in (
         ("stiffening", ("elongation", "bending")),
-        ("corrections", ("area", "inertia", "bore_fraction")),
+        ("corrections", ("area", "inertia", "bore_fraction", "modulus_factor")),
     ):
         for name in names:
             kinds[f"{table}.{name}"] = Varied(

@@ -8,8 +8,9 @@ from nicegui import ui
 
 from softnlp.app.controls import HINT, button, choice_field, dashed, number_field, vector_field
 from softnlp.app.session import Session
-from softnlp.model.conventions import COEFFICIENT_SETS, CONVENTIONS
+from softnlp.model.conventions import COEFFICIENT_SETS
 from softnlp.model.gravity import DIRECTIONS, gravity_named, gravity_words
+from softnlp.rings import ALL_CONVENTIONS
 
 _GRAVITY = {
     "off": "off",
@@ -28,6 +29,7 @@ _COEFFICIENTS = (
 _CONVENTIONS = {
     "reproduction": "reproduction: as the published results need",
     "as_printed": "as printed in the paper",
+    "energy": "energy: one potential, no other coefficient",
 }
 _ENGINES = {
     "auto": "Newton, closed by IPOPT",
@@ -67,8 +69,12 @@ def coefficients_panel(session: Session) -> None:
     with ui.row().classes("w-full no-wrap gap-2"):
         button("No stiffening", None, "no-stiffening", partial(switch_off, session)).tooltip("k_e = k_b = 0")
         button("Back to the set", None, "coefficients-back", partial(back_to_set, session))
-    conventions = {name: _CONVENTIONS[name] for name in CONVENTIONS}
+    conventions = {name: _CONVENTIONS[name] for name in ALL_CONVENTIONS}
     choice_field(session, "corrections", "conventions", "Conventions", conventions, test="conventions")
+    factor = "c_m, factor of the stress (energy section alone)"
+    number_field(session, "corrections", "modulus_factor", factor, step=0.01, test="corrections-modulus_factor").props(
+        "clearable"
+    )
 
 
 def switch_off(session: Session) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from nicegui import ui
 
-from softnlp.app.controls import button, named
+from softnlp.app.controls import SMALL, button, named
 from softnlp.app.parts import Chart, csv_text, line
 from softnlp.base.columns import MM, OUTPUTS, PER_M, TABLES, Output, written
 from softnlp.base.units import MILLIMETRE
@@ -45,9 +45,13 @@ class ResultsPanel:
         self._run: Run | None = None
         self._labels: dict[str, ui.label] = {}
         self._drawn: Shape | None = None
-        with ui.row().classes("w-full items-start no-wrap gap-2"):
+        self._headline = ui.element("div").classes("w-full grid grid-cols-2 gap-x-3 gap-y-1")
+        with ui.row().classes("w-full items-center no-wrap gap-2 mt-1"):
             self._icon = ui.icon("hourglass_empty").classes("text-xl shrink-0")
-            self._certificate = named(ui.label("solving …").classes("text-sm"), "certificate")
+            self._ended = named(ui.label("Solving …").classes("text-sm grow"), "ended").props("role=status")
+            self._fold = button("How well", "expand_more", "certificate-fold", self._turn, SMALL)
+        self._certificate = named(ui.label("").classes("text-sm opacity-90 pl-7"), "certificate")
+        self._certificate.set_visibility(False)
         self._warnings = ui.label().classes("text-xs text-orange-800 dark:text-orange-300 whitespace-pre-line")
         self._warnings.props("data-testid=warnings")
         self._numbers = ui.grid(columns=_GRID).classes("w-full gap-x-2 gap-y-0 text-sm mt-2")
@@ -84,6 +88,7 @@ class ResultsPanel:
         self._run = run
         step = run.steps[0]
         solved = step.status.has_solution
+        self._ended.set_text(ended_words(run))
         self._certificate.set_text(certificate_words(run))
         icon, tint = _ENDS["failed" if not solved else "warned" if step.warnings else "well"]
         self._icon.name = icon
@@ -91,13 +96,46 @@ class ResultsPanel:
         self._warnings.set_text("\n".join((*run.warnings, *step.warnings)))
         self._warnings.set_visibility(bool(self._warnings.text))
         lines = step_lines(run)
-        self._fill(self._numbers, "numbers", lines.numbers)
+        cards = headline(lines.numbers)
+        first = [line for _, group in cards for line in group]
+        self._fill_headline(cards)
+        self._fill(self._numbers, "numbers", [line for line in lines.numbers if line not in first])
         self._fill(self._chambers, "chambers", lines.chambers)
         equations = [
             Line(f"equation.{line.equation}", line.equation, f"{line.value:.1e}", line.unit)
             for line in step.certificate
         ]
         self._fill(self._equations, "equations", equations)
+
+    def _turn(self) -> None:
+        """Unfold or fold how well the equations hold."""
+        wanted = not self._certificate.visible
+        self._certificate.set_visibility(wanted)
+        self._fold.props(f"icon={'expand_less' if wanted else 'expand_more'} aria-expanded={str(wanted).lower()}")
+
+    def _fill_headline(self, cards: list[tuple[str, list[Line]]]) -> None:
+        """Write what matters first, in large digits."""
+        lines = [line for _, group in cards for line in group]
+        keys = [f"headline/{line.key}" for line in lines]
+        if [key for key in self._labels if key.startswith("headline/")] != keys:
+            for key in [key for key in self._labels if key.startswith("headline/")]:
+                del self._labels[key]
+            self._headline.clear()
+            with self._headline:
+                for title, group in cards:
+                    wide = "col-span-2" if len(group) > 1 else ""
+                    with ui.column().classes(f"gap-0 {wide}"):
+                        ui.label(title).classes("text-xs opacity-80")
+                        with ui.row().classes("items-baseline gap-3 no-wrap"):
+                            for line in group:
+                                size = "text-lg" if len(group) > 1 else "text-2xl"
+                                label = ui.label(line.text).classes(f"tabular-nums font-medium leading-tight {size}")
+                                self._labels[f"headline/{line.key}"] = named(
+                                    label, f"value.{line.key}", f"value-{line.key}"
+                                )
+                            ui.label(group[0].unit).classes("text-sm opacity-80 -ml-2")
+        for key, line in zip(keys, lines, strict=True):
+            self._labels[key].set_text(line.text)
 
     def _fill(self, grid: ui.grid, group: str, lines: list[Line]) -> None:
         """Write numbers into a grid; its rows are made anew only when there are others."""
@@ -174,12 +212,17 @@ def _part(label: str, test: str) -> ui.expansion:
 
 @dataclass(frozen=True)
 class Line:
-    """A number with its name and unit. key : of the JSON document, with the index of an entry, `tip_position_mm.0`."""
+    """A number with its name and unit.
+
+    key : of the JSON document, with the index of an entry, `tip_position_mm.0`. value : in full, or
+    None.
+    """
 
     key: str
     label: str
     text: str
     unit: str
+    value: float | None = None
 
 
 @dataclass(frozen=True)
@@ -204,9 +247,10 @@ def _numbers(run: Run, step: dict[str, Any]) -> list[Line]:
     backbone, length = step[OUTPUTS["backbone_length"].key], longer.shown(run.robot.length)
     elongation = None if backbone is None else backbone - length
     lines = _lines({**step, longer.key: elongation}, [*names, *TABLES["page, wall"]], run)
-    relative = written(None if elongation is None else 100 * elongation / length, ".2f", NOTHING)
+    share = None if elongation is None else 100 * elongation / length
     at = 1 + next(k for k, line in enumerate(lines) if line.key == longer.key)
-    return [*lines[:at], Line(f"{longer.name}_percent", lines[at - 1].label, relative, "% of L₀"), *lines[at:]]
+    percent = Line(f"{longer.name}_percent", lines[at - 1].label, written(share, ".2f", NOTHING), "% of L₀", share)
+    return [*lines[:at], percent, *lines[at:]]
 
 
 def _lines(step: dict[str, Any], names: Sequence[str], run: Run) -> list[Line]:
@@ -216,14 +260,18 @@ def _lines(step: dict[str, Any], names: Sequence[str], run: Run) -> list[Line]:
         found, title = step[output.key], output.title or output.label.capitalize()
         if not output.dims:
             text = written(found, output.page, NOTHING) + _spread(step, output)
-            lines.append(Line(output.key, title, text, output.unit.sign))
+            lines.append(Line(output.key, title, text, output.unit.sign, _float(found)))
             continue
         indices = list("xyz") if output.dims == ("axis",) else [str(n + 1) for n in range(run.robot.chambers)]
         for k, index in enumerate(indices):
             entry = None if found is None or k >= len(found) else found[k]
             text = written(entry, output.page, NOTHING) + _spread(step, output, k)
-            lines.append(Line(f"{output.key}.{k}", title.format(index), text, output.unit.sign))
+            lines.append(Line(f"{output.key}.{k}", title.format(index), text, output.unit.sign, _float(entry)))
     return lines
+
+
+def _float(value: Any) -> float | None:
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
 def _spread(step: dict[str, Any], output: Output, entry: int | None = None) -> str:
@@ -232,6 +280,25 @@ def _spread(step: dict[str, Any], output: Output, entry: int | None = None) -> s
     if entry is not None:
         found = found[entry] if found is not None and entry < len(found) else None
     return "" if found is None else f" ± {written(found, output.page)}"
+
+
+def headline(lines: Sequence[Line]) -> list[tuple[str, list[Line]]]:
+    """Return what matters first: the bending, the force where the robot pushes, else its length, and the tip."""
+    known = {line.key: line for line in lines}
+    second = next(known[key] for key in (OUTPUTS[n].key for n in ("blocked_force", "backbone_length")) if key in known)
+    tip = [known[f"{OUTPUTS['tip_position'].key}.{k}"] for k in range(3)]
+    bending = known[OUTPUTS["bending_angle"].key]
+    return [(bending.label, [bending]), (second.label, [second]), ("Tip x, y, z", tip)]
+
+
+def ended_words(run: Run) -> str:
+    """Return in a few words how a step ended; what a person has to do is told in full."""
+    step = run.steps[0]
+    if not step.status.has_solution or step.residual is None:
+        return certificate_words(run)
+    if step.status.value != "solved":
+        return "No contact: the robot does not reach the wall."
+    return "Solved, with warnings." if step.warnings else "Solved."
 
 
 def certificate_words(run: Run) -> str:

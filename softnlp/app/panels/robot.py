@@ -14,6 +14,7 @@ from softnlp.app.asking import sentence
 from softnlp.app.controls import BOX, button, dashed, number_field, say_beside, select, tell_problem, typed
 from softnlp.app.document import Document
 from softnlp.app.live_view import PoseStretch
+from softnlp.app.mending import mending_words, range_words
 from softnlp.app.section_svg import section_svg
 from softnlp.app.session import Session
 from softnlp.app.theme import Redraw
@@ -21,6 +22,8 @@ from softnlp.base.errors import InputError, RobotError
 from softnlp.base.ranges import SIZE
 from softnlp.base.reading import shown
 from softnlp.base.units import MILLIMETRE
+from softnlp.model.fit import fit_robot
+from softnlp.model.inputs import robot_table
 from softnlp.model.robot import (
     ALLOWABLE,
     DIMENSIONS,
@@ -31,6 +34,7 @@ from softnlp.model.robot import (
     Robot,
     Violation,
     is_number,
+    metres_hint,
     touching_stretch,
     violations,
 )
@@ -58,7 +62,7 @@ _FIELDS = {
     "chamber_wall_mm": ("Chamber wall", 0.05),
     "length_mm": ("Length", 1.0),
     "chamber_sets": ("Chamber sets", 1.0),
-    "chambers_per_set": ("Chambers a set", 1.0),
+    "chambers_per_set": ("Chambers per set", 1.0),
     "chamber_angle_deg": ("Chamber angle", 1.0),
     _WALL: ("Thinnest wall", 0.1),
 }
@@ -91,7 +95,7 @@ class _RobotPanel:
         self.lines: dict[str, ui.label] = {}
         with ui.column().classes("w-full gap-2").props("data-testid=robot-panel") as self.root:
             self._choice()
-            self.picture = dashed(ui.html(sanitize=False).classes("w-full"), "robot.section")
+            self.picture = dashed(ui.html(sanitize=False).classes("w-full max-w-80 mx-auto"), "robot.section")
             self.caption = dashed(ui.label().classes("text-xs opacity-80 w-full"), "robot.caption")
             self.stretched = self._switch(_STRETCHED, "robot.stretched", lambda _: self._draw())
             with ui.element("div").classes("grid grid-cols-2 gap-x-2 gap-y-2 w-full items-start"):
@@ -100,6 +104,9 @@ class _RobotPanel:
                     for build in (self._field, self._line):
                         for key in pair:
                             build(key)
+            words = "Place the chambers evenly"
+            place = button(words, "blur_circular", "robot.place", self._place, test="robot-place")
+            place.tooltip("Chamber circle in the middle of the wall, chambers evenly around")
             self.rules = {
                 rule: self._switch(_RULES[rule], f"robot.allow.{rule}", partial(self._allow, rule))
                 for rule in ALLOWABLE
@@ -157,6 +164,15 @@ class _RobotPanel:
 
     def _reset(self) -> None:
         self.session.change_all("robot", library_table(self._table, self._table["name"]))
+
+    def _place(self) -> None:
+        """Put the chambers where they have most room."""
+        try:
+            placed = placed_table(self._table)
+        except RobotError as error:
+            ui.notify(sentence(error.message), type="warning", multi_line=True)
+            return
+        self.session.change_all("robot", placed)
 
     def _allow(self, rule: str, wanted: bool) -> None:
         allowed = robot_state(self.session.document).allowed
@@ -229,6 +245,9 @@ class _RobotPanel:
                 wall = (robot.chamber_wall + robot.outer_wall) / MILLIMETRE
                 touch = f" · chambers touch from stretch {state.touching:.3g}" if 1.0 <= state.touching < inf else ""
                 caption = f"Wall {wall:.3g} mm{touch}"
+        ranges = range_words(state.robot, state.minimum_wall, state.allowed)
+        for key, field in self.fields.items():
+            field.props.set_optional("hint", ranges.get(key))
         self.picture.set_content(drawing)
         self.caption.set_text(caption)
 
@@ -238,13 +257,14 @@ class RobotState:
     """A robot as far as the document gives one.
 
     robot : where every dimension is a possible number, else None. said : by key of [robot], what is wrong with it.
-    broken : rules of manufacture that it breaks. allowed : rules that may be broken.
+    broken : rules of manufacture that it breaks. allowed : rules that may be broken. minimum_wall : delta_s [m].
     """
 
     robot: Robot | None
     said: Mapping[str, str]
     broken: tuple[Violation, ...]
     allowed: frozenset[str]
+    minimum_wall: float = MINIMUM_WALL
 
     @property
     def touching(self) -> float:
@@ -262,18 +282,17 @@ class RobotState:
         return red | frozenset(range(self.robot.chambers))
 
     def said_beside(self, latest: str | None = None) -> dict[str, str]:
-        """Return messages by key: of values, and of each rule that may not be broken at one of its keys.
+        """Return messages by key: of values, and one of the rules that are broken, at a key that they depend on.
 
-        latest : the key changed last, which has the message where the rule depends on it.
+        latest : the key changed last, which has the message where a rule depends on it.
         """
         messages = dict(self.said)
-        for violation in self.broken:
-            if violation.rule in self.allowed:
-                continue
-            fields = RULE_FIELDS[violation.rule]
+        broken = [violation for violation in self.broken if violation.rule not in self.allowed]
+        if broken and self.robot is not None:
+            fields = [key for violation in broken for key in RULE_FIELDS[violation.rule]]
             key = latest if latest in fields else fields[0]
-            known = [messages[key]] if key in messages else []
-            messages[key] = "\n".join([*known, sentence(violation.message)])
+            words = mending_words(self.robot, broken, self.minimum_wall, self.allowed)
+            messages[key] = "\n".join([messages[key], words] if key in messages else [words])
         return messages
 
 
@@ -294,10 +313,13 @@ def robot_state(document: Document) -> RobotState:
     sizes = {d.field: values[d.field] * (d.scale or 1) for d in DIMENSIONS}
     robot = Robot(name=name if isinstance(name, str) else OWN, **sizes)
     try:
-        return RobotState(robot, said, violations(robot, wall * MILLIMETRE), allowed)
+        return RobotState(robot, said, violations(robot, wall * MILLIMETRE), allowed, wall * MILLIMETRE)
     except RobotError as error:  # two dimensions that do not go together
         key = next((d.file_key for d in DIMENSIONS if d.field == error.key), "chamber_sets")
-        return RobotState(robot if error.key == "lumen_diameter" else None, {**said, key: error.message}, (), allowed)
+        hint = metres_hint(robot).removeprefix("; ")  # which then is what is wrong
+        words = f"Expected mm: {hint}" if hint else error.message
+        said = {**said, "outer_diameter_mm" if hint else key: words}
+        return RobotState(robot if error.key == "lumen_diameter" else None, said, (), allowed)
 
 
 def effective(table: Mapping[str, Any], dimension: Dimension) -> Any:
@@ -313,6 +335,20 @@ def library_value(table: Mapping[str, Any], dimension: Dimension) -> float | Non
         return None
     value = getattr(ROBOTS[name], dimension.field)
     return int(value) if dimension.scale is None else float(f"{value / dimension.scale:.12g}")
+
+
+def placed_table(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the table with its chambers in the middle of the wall, evenly around; raises `RobotError` without room."""
+    given = {d.field: effective(table, d) for d in DIMENSIONS}
+    if not all(map(is_number, given.values())):
+        raise RobotError("expected numbers for every dimension")
+    sizes = {d.field: given[d.field] * (d.scale or 1) for d in DIMENSIONS}
+    wall = table.get(_WALL, MINIMUM_WALL / MILLIMETRE) * MILLIMETRE
+    names = ("outer_diameter", "lumen_diameter", "chamber_diameter", "chamber_sets", "chambers_per_set")
+    more = {name: sizes[name] for name in ("chamber_wall", "length")}
+    made = robot_table(fit_robot(*(sizes[name] for name in names), **more, minimum_wall=wall).robot)
+    keys = ("chamber_circle_diameter_mm", "chamber_angle_deg")
+    return {**table, **{key: made[key] for key in keys}}
 
 
 def changed_keys(table: Mapping[str, Any]) -> list[str]:

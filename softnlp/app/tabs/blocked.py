@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from softnlp.app import controls
 from softnlp.app.asking import Progress, bars, run_steps, said, scenario_with
+from softnlp.app.examples import empty_state
 from softnlp.app.parts import Chart, NumberTable, line, study_row
 from softnlp.app.session import Session, Stage
 from softnlp.app.tabs.sequence import deviations
@@ -46,6 +47,7 @@ _OF_A_FORCE = ("offsets_mm", "offset_ramp", "target_force_N", "weight_sensitivit
 def blocked_tab(stage: Stage) -> None:
     """Build the tab in the current slot."""
     with ui.column().classes("w-full gap-3 pt-2"):
+        empty_state(stage.session, "blocked-force")
         _contact_fields(stage.session)
         ui.separator()
         _Curves(stage.session)

@@ -12,6 +12,7 @@ from nicegui import ui
 
 from softnlp.app import controls
 from softnlp.app.asking import Progress
+from softnlp.app.examples import empty_state
 from softnlp.app.parts import Chart, NumberTable, csv_drop, downloads, marks, study_row
 from softnlp.app.session import Session, Stage
 from softnlp.app.tabs.importing import import_part, use_tensile
@@ -86,6 +87,7 @@ def identify_tab(stage: Stage) -> None:
         use_tensile(session, name, content)
 
     with ui.column().classes("w-full gap-3 pt-2"):
+        empty_state(session, "identify")
         import_part(session, {"tips": use_tips, "tensile": use_test})
         kinds = controls.toggle({"measurements": "Robots", "tensile": "Tensile test"}, "identify.kind", kind())
         boxes: dict[str, ui.column] = {}

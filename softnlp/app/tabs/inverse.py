@@ -12,9 +12,11 @@ from nicegui import ui
 
 from softnlp.app import controls
 from softnlp.app.asking import Progress, bars, run_steps, said, scenario_with, sentence
+from softnlp.app.examples import empty_state
 from softnlp.app.parts import NumberTable, study_row
 from softnlp.app.session import Session, Stage
 from softnlp.base.columns import OUTPUTS
+from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.statics.step import Run, Step
 from softnlp.studies.fields import value
 
@@ -29,6 +31,7 @@ KINDS: Mapping[str, tuple[str, ...]] = {
 }
 _LEFT = {"distance": OUTPUTS["distance"], "angle": OUTPUTS["direction_error"]}
 _FIRST: Mapping[str, list[float]] = {POSITION: [-20.0, 0.0, 62.0], DIRECTION: [0.0, 0.0, 1.0]}
+_FIRST_PRESSURE, _TRIES = 0.5 * BAR, 6  # of what is looked for first [Pa]
 _FAR = 1e6  # [mm], farther targets are not marked
 MOST_EDITED = 25
 """Targets that have fields of their own; more come from a file."""
@@ -37,6 +40,7 @@ MOST_EDITED = 25
 def inverse_tab(stage: Stage) -> None:
     """Build the tab in the current slot."""
     with ui.column().classes("w-full gap-3 pt-2"):
+        empty_state(stage.session, "inverse")
         _Targets(stage)
         _bounds(stage.session)
         ui.separator()
@@ -64,6 +68,7 @@ class _Targets:
             self._session, "target", "length_per_radian_mm", "A radian counts as", default=self._length
         )
         self._problem = controls.problem_label("target.problem")
+        offer_target(self._session)
         self._session.follow(self._refresh)
         self._kind.on_value_change(lambda event: self._choose(event.value))
         stage.view.on_pick(self._picked)
@@ -186,14 +191,10 @@ class _Search:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._steps: Sequence[Step] = ()
-        self._chosen = 0
         self._row = study_row("inverse", "Find the pressures", self._asked, self._finish)
-        self._use = controls.use_button("Use these pressures", "inverse.use", self._take)
-        self._use.set_visibility(False)
         self._table = NumberTable("inverse.table", self._choose)
 
     def _asked(self) -> Callable[[Progress], Run]:
-        self._use.set_visibility(False)
         asked = scenario_with(self._session, STUDY)
         return lambda progress: run_steps(asked, progress)
 
@@ -204,22 +205,35 @@ class _Search:
         self._table.show_steps(run, target_columns(run), "targets.csv", "target")
         self._choose(0)
         if len(self._steps) > 1:
-            self._row.say(f"{said(run)} A click on a row chooses a target.")
+            self._row.say(f"{said(run)} The robot is at target 1; a click on a row moves it to another.")
 
     def _choose(self, row: int) -> None:
-        """Say what was found for a target, and offer its pressures."""
+        """Say what was found for a target, and move the robot there."""
         if row >= len(self._steps):
             return
-        self._chosen = row
         step = self._steps[row]
         words = words_of(step)
         self._row.say(words) if step.status.has_solution else self._row.warn(words)
-        fits = np.isfinite(step.pressure).all() and len(step.pressure) == len(self._session.pressure)
-        self._use.set_visibility(bool(fits))
-        self._use.set_text("Use these pressures" if len(self._steps) == 1 else f"Use the pressures of target {row + 1}")
+        if np.isfinite(step.pressure).all():
+            self._session.use_pressure(step.pressure)  # the robot goes there at once; undo takes it back
 
-    def _take(self) -> None:
-        self._session.use_pressure(self._steps[self._chosen].pressure)
+
+def offer_target(session: Session) -> None:
+    """Begin with a target that this robot reaches, where a person has given none: a place on its way, well inside."""
+    scenario = session.scenario
+    if "target" not in session.document.offered or scenario is None or session.is_stale:
+        return
+    shown = session.pressure if session.pressure.any() else np.eye(len(session.pressure))[0] * _FIRST_PRESSURE
+    pressure = 0.6 * shown + 0.1 * float(shown.max())
+    for _ in range(_TRIES):
+        step = session.live.pose(scenario, pressure)[0].steps[0]
+        if step.status.has_solution and step.pose is not None:
+            place = [round(float(x), 1) for x in step.pose.tip_position / MILLIMETRE]
+            session.document.replace("target", {POSITION: [place]})
+            session.document.offered.add("target")  # still nobody's
+            session.reread()
+            return
+        pressure = pressure / 2
 
 
 def kind_of(table: Mapping[str, Any]) -> str:

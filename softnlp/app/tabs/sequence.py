@@ -17,7 +17,9 @@ from softnlp.base.columns import MM, OUTPUTS, Output
 from softnlp.base.errors import InputError
 from softnlp.base.reading import shown
 from softnlp.base.units import BAR
+from softnlp.figures.run import run_figure
 from softnlp.figures.style import colour
+from softnlp.results import view_of_run
 from softnlp.statics.step import Run, Step
 from softnlp.studies import fields
 
@@ -38,7 +40,7 @@ def sequence_tab(stage: Stage) -> None:
         _Source(stage.session)
         _StepSlider(stage.session)
         ui.separator()
-        _Results(stage.session)
+        _Results(stage)
 
 
 class _Source:
@@ -49,7 +51,7 @@ class _Source:
         controls.heading("Pressure sequence")
         self._kind = controls.toggle({"list": "List", "ramp": "Ramp", "file": "CSV file"}, "pressure.source")
         with ui.column().classes("w-full gap-1") as self._list:
-            self._text = ui.textarea("A line a step: the pressure of each set [bar]").classes("w-full font-mono")
+            self._text = ui.textarea("One line per step: each set's pressure [bar]").classes("w-full font-mono")
             controls.named(self._text, "pressure.sequence_bar").props("dense outlined debounce=600 rows=5")
             controls.button("Add the pressures shown", "add", "pressure.add", self._add)
         with ui.column().classes("w-full gap-2") as self._ramp:
@@ -208,8 +210,8 @@ class _StepSlider:
 class _Results:
     """All steps solved: drawn, in a table, to take away."""
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    def __init__(self, stage: Stage) -> None:
+        self._stage, self._session = stage, stage.session
         self._steps: Sequence[Step] = []
         self._row = study_row("sequence", "Run all steps", self._asked, self._finish, lambda: self._draw())
         labels = {key: output.label.capitalize() for key, output in QUANTITIES.items()}
@@ -230,6 +232,8 @@ class _Results:
         self._steps = run.steps
         self._draw()
         self._row.say(said(run))
+        if len(run.steps) > 1:
+            self._stage.figures["Steps"] = {"": lambda: run_figure(view_of_run(run))}
         self._table.show_steps(run, series(run.steps), "steps.csv")
 
     def _asked(self) -> Callable[[Progress], Run]:

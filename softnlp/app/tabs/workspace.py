@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from softnlp.app.asking import Progress, Stopped, bars, few_enough, scenario_with
 from softnlp.app.controls import button, heading, named, number, number_field, select, toggle
+from softnlp.app.examples import empty_state
 from softnlp.app.parts import NumberTable, number_text, study_row
 from softnlp.app.session import Session, Stage
 from softnlp.base.columns import ONE, OUTPUTS
@@ -52,6 +53,7 @@ _FIRST = {"levels": 8, "samples": 1000}
 def workspace_tab(stage: Stage) -> None:
     """Build the tab in the current slot."""
     with ui.column().classes("w-full gap-3 pt-2"):
+        empty_state(stage.session, "workspace")
         _source(stage.session)
         _Sweep(stage)
 
@@ -68,7 +70,7 @@ def _source(session: Session) -> None:
         levels, samples, *_ = (
             number_field(session, "workspace", key, label, step=step)
             for key, label, step in (
-                ("levels", "Levels a set", 1),
+                ("levels", "Levels per set", 1),
                 ("samples", "Samples", 100),
                 ("from_bar", "From", 0.1),
                 ("to_bar", "To", 0.1),

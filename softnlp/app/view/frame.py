@@ -114,9 +114,9 @@ def frame_of(
     push = np.zeros(3) if wall is None else wall_force * np.asarray(wall.normal, dtype=float)
     return Frame(
         robot,
-        _tube(body),
+        tube_of(body),
         bar,
-        None if ghost is None else _tube(ghost),
+        None if ghost is None else tube_of(ghost),
         _arrows(robot, body, (tip_force, tip_moment, gravity), contact, push),
         None if wall is None else ((contact - wall.gap(contact) * wall.normal) / MILLIMETRE, wall.normal),
         tip_cap / MILLIMETRE,
@@ -124,7 +124,7 @@ def frame_of(
     )
 
 
-def _tube(body: Body) -> Tube:
+def tube_of(body: Body) -> Tube:
     """Return a body at the stations of the view."""
     at = resampled(body, STATIONS)
     r = at.radii
@@ -210,8 +210,8 @@ def frame_message(frame: Frame, number: int, full_bar: float) -> dict[str, Any]:
         "id": number,
         "length": frame.robot.length / MILLIMETRE,
         "width": frame.robot.outer_diameter / MILLIMETRE,
-        "body": _tube_message(frame.body),
-        "ghost": None if frame.ghost is None else _tube_message(frame.ghost),
+        "body": tube_message(frame.body),
+        "ghost": None if frame.ghost is None else tube_message(frame.ghost),
         "level": np.clip(frame.pressure_bar / full_bar, 0, 1).round(4).tolist(),
         "arrows": [
             {
@@ -260,7 +260,8 @@ def packed(values: NDArray[Any], kind: type[np.generic]) -> str:
     return b64encode(np.ascontiguousarray(array, dtype=np.dtype(kind).newbyteorder("<")).tobytes()).decode()
 
 
-def _tube_message(tube: Tube) -> dict[str, Any]:
+def tube_message(tube: Tube) -> dict[str, Any]:
+    """Return a body as it goes to the browser."""
     r = tube.radii
     return {
         "axis": packed(np.column_stack([tube.position, tube.quaternion]), np.float32),

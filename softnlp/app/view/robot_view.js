@@ -2,7 +2,8 @@
 import { Stage } from "softnlp-view";
 
 export default {
-  template: `<div class="softnlp-view" role="img" aria-label="3-D view of the robot" style="position:relative;overflow:hidden;min-height:12rem;touch-action:none"></div>`,
+  template: `<div class="softnlp-view" role="application" aria-roledescription="3-D view" tabindex="0"
+    aria-label="The robot. Arrow keys turn the view, plus and minus zoom, Home goes back to the first view." @keydown="key" style="position:relative;overflow:hidden;min-height:12rem;touch-action:none"></div>`,
 
   mounted() {
     try {
@@ -26,6 +27,10 @@ export default {
   },
 
   methods: {
+    key(event) {
+      if (event.ctrlKey || event.metaKey || event.altKey || !this.stage?.key(event.key)) return;
+      event.preventDefault();
+    },
     robot(message) {
       this.stage?.setRobot(message);
     },
@@ -37,6 +42,9 @@ export default {
     },
     targets(message) {
       this.stage?.marks.setTargets(message);
+    },
+    pins(message) {
+      this.stage?.setPins(message?.pins ?? []);
     },
     reset() {
       this.stage?.reset();

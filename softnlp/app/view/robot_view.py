@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from base64 import b64decode
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import nicegui.elements.scene  # noqa: F401  registers the three.js that the browser side imports
@@ -71,6 +71,10 @@ class RobotView(Element, component="robot_view.js", esm={"softnlp-view": "js"}):
     def targets(self, xyz_mm: NDArray[Any] | None) -> None:
         """Show (n, 3) targets [mm], or none; raises as `points` does."""
         self._mark("targets", cloud_message(xyz_mm, None))
+
+    def pins(self, messages: Sequence[dict[str, Any]]) -> None:
+        """Show other bodies as ghosts with a letter at the tip, each a message of its robot, tube, colour and label."""
+        self._mark("pins", {"pins": list(messages)})
 
     def on_pick(self, handler: Callable[[Point], Any]) -> None:
         """Call a handler with (x, y, z) [mm] when the view is clicked, not dragged.

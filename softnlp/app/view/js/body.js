@@ -132,13 +132,14 @@ export class Body {
   }
 }
 
-// Another shape of the same robot: its outer surface alone, faint.
+// Another shape: the outer surface of a robot alone, faint. colour: its own, or that of the theme.
 export class Ghost {
-  constructor(robot, theme) {
+  constructor(robot, theme, colour = null) {
     this.robot = robot;
+    this.colour = colour;
     this.position = new THREE.BufferAttribute(new Float32Array(3 * robot.mesh.station.length), 3);
     this.normal = new THREE.BufferAttribute(new Float32Array(3 * robot.mesh.station.length), 3);
-    this.material = silicone(0.1, 0.6, THREE.FrontSide);
+    this.material = colour === null ? silicone(0.1, 0.6, THREE.FrontSide) : silicone(0.28, 0.85, THREE.FrontSide);
     this.group = new THREE.Group();
     for (const part of robot.parts.filter((p) => p.kind === "outer" || p.kind === "end")) {
       const geometry = new THREE.BufferGeometry();
@@ -163,8 +164,8 @@ export class Ghost {
   }
 
   paint(theme) {
-    this.material.uniforms.face.value.set(theme.ghost);
-    this.material.uniforms.rim.value.set(theme.ghost);
+    this.material.uniforms.face.value.set(this.colour ?? theme.ghost);
+    this.material.uniforms.rim.value.set(this.colour ?? theme.ghost);
   }
 
   dispose() {

@@ -3,7 +3,7 @@ import { OrbitControls, THREE } from "nicegui-scene";
 import { Arrows, TipFrame } from "./arrows.js";
 import { Body, Ghost, readRobot } from "./body.js";
 import { stationFrames } from "./expand.js";
-import { spread } from "./label.js";
+import { Label, spread } from "./label.js";
 import { Marks } from "./marks.js";
 import { Surroundings } from "./surroundings.js";
 import { followTheme } from "./theme.js";
@@ -86,6 +86,29 @@ export class Stage {
     this.scene.add(this.body.group, this.ghost.group);
   }
 
+  // Bodies that stay, each a ghost of its own robot with a letter at its tip.
+  setPins(messages) {
+    for (const { ghost, label } of this.pins ?? []) {
+      ghost.dispose();
+      this.labels.delete(label);
+      label.dispose();
+    }
+    this.pins = messages.map((message) => {
+      const tube = readTube(message.tube);
+      const ghost = new Ghost(readRobot(message.robot), this.theme, message.colour);
+      ghost.update(tube);
+      const label = new Label({ size: 15, weight: 700, inFront: true, rank: 1 });
+      label.write(message.label, this.theme.ink, this.theme.halo);
+      label.sprite.position.set(...tube.axis.subarray(-7, -4));
+      this.labels.add(label);
+      ghost.group.add(label.sprite);
+      this.scene.add(ghost.group);
+      return { ghost, label, text: message.label };
+    });
+    this.rescale();
+    this.request();
+  }
+
   // Only kept here: of several that come before the next animation frame the last is drawn, and the tip of each.
   show(frame) {
     this.next = { ...frame, body: readTube(frame.body), ghost: readTube(frame.ghost) };
@@ -135,7 +158,7 @@ export class Stage {
     this.controls.enableDamping = true;
     const size = this.frame.length;
     const [a, e] = [radians(AZIMUTH), radians(ELEVATION)];
-    const away = 4.8 * size * narrowness(this.camera.aspect);
+    const away = 4.1 * size * narrowness(this.camera.aspect);
     this.controls.target.set(0, 0, 0.45 * size);
     this.camera.position.set(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e) * this.camera.up.z);
     this.camera.position.multiplyScalar(away).add(this.controls.target);
@@ -144,11 +167,34 @@ export class Stage {
     this.request();
   }
 
+  // Turn or zoom by a key of the keyboard; false for another one.
+  key(name) {
+    const turns = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+    const away = this.camera.position.clone().sub(this.controls.target);
+    if (name === "Home") this.reset();
+    else if (name === "+" || name === "=" || name === "-") away.multiplyScalar(name === "-" ? 1 / 0.9 : 0.9);
+    else if (turns[name] !== undefined) {
+      const [a, e] = turns[name];
+      const axis = new THREE.Vector3().crossVectors(this.camera.up, away).normalize();
+      const angle = away.angleTo(this.camera.up) + 0.12 * e;
+      away.applyAxisAngle(this.camera.up, 0.12 * a);
+      if (angle > 0.05 && angle < Math.PI - 0.05) away.applyAxisAngle(axis, 0.12 * e);
+    } else return false;
+    if (name !== "Home") this.camera.position.copy(this.controls.target).add(away);
+    this.controls.update();
+    this.request();
+    return true;
+  }
+
   paint(theme) {
     this.theme = theme;
     this.scene.background = new THREE.Color(theme.background);
     this.body?.paint(theme);
     this.ghost?.paint(theme);
+    for (const { ghost, label, text } of this.pins ?? []) {
+      ghost.paint(theme);
+      label.write(text, theme.ink, theme.halo);
+    }
     this.marks.paint(theme);
     if (this.frame !== undefined) this.next ??= this.frame;
     this.request();
@@ -249,6 +295,7 @@ export class Stage {
     this.surroundings.clear();
     this.body?.dispose();
     this.ghost?.dispose();
+    this.setPins([]);
     for (const label of this.labels) label.dispose();
     this.renderer.dispose();
     this.renderer.forceContextLoss(); // a browser has few of them

@@ -14,10 +14,16 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from softnlp.model.materials import Material
-from softnlp.rings.outline import Array
 
+Array = NDArray[np.float64]
+
+ENERGIES = ("neo-hookean", "mooney-rivlin", "yeoh", "ogden")
+"""Laws whose first column of Table II is an energy of principal stretches; any other is known in uniaxial tension."""
+
+_GAUSS = [((1 + x) / 2, weight / 2) for x, weight in zip(*np.polynomial.legendre.leggauss(12), strict=True)]
 _BESIDE = 1e-6  # laws of principal stretches are taken so far from equal ones, where their derivatives are 0/0
 
 
@@ -77,37 +83,39 @@ def ogden(*terms: tuple[Any, Any]) -> PlaneEnergy:
             beside = T * stretch / 2 - 1 - _BESIDE
             below = ca.fmin(beside, 0)  # a guess may hold the volume badly; the function goes on by its series
             plane = ca.cosh(n * ca.acosh(1 + _BESIDE + ca.fmax(beside, 0))) + n**2 * below
-            plane += n**2 * (n**2 - 1) / 6 * below**2 + n**2 * _BESIDE
+            plane += n**2 * (n**2 - 1) / 6 * below**2
             total += mu / b * (2 * stretch**-n * plane + stretch**b - 3)
         return total
 
     return PlaneEnergy(density)
 
 
-def from_uniaxial(stress: Callable[[Any], Any], modulus: float) -> PlaneEnergy:
+def uniaxial_energy(stress: Callable[[Any], Any], stretch: Any) -> Any:
+    """Return the energy of a law known in uniaxial tension: its stress integrated from stretch 1, by Gauss's rule.
+
+    stress : stress(stretch) -> engineering stress [Pa].
+    """
+    return (stretch - 1) * sum(weight * stress(1 + at * (stretch - 1)) for at, weight in _GAUSS)
+
+
+def from_uniaxial(stress: Callable[[Any], Any], modulus: Any) -> PlaneEnergy:
     """Return the energy of a law known in uniaxial tension only: that of the uniaxial stretch with the same I1.
 
-    stress : stress(stretch) -> engineering stress [Pa]; integrated from 1 by Gauss's rule of 12 points.
-    modulus : its slope at stretch 1 [Pa].
+    stress : stress(stretch) -> engineering stress [Pa]. modulus : its slope at stretch 1 [Pa].
     """
-    places, weights = np.polynomial.legendre.leggauss(12)
-
-    def energy(stretch: Any) -> Any:
-        inner = [(weight / 2, 1 + (1 + x) / 2 * (stretch - 1)) for weight, x in zip(weights, places, strict=True)]
-        return (stretch - 1) * sum(weight * stress(at) for weight, at in inner)
 
     def density(T: Any, stretch: Any) -> Any:
         I1 = T + stretch**2
         above = ca.fmax(I1, 3 + _BESIDE)
         # The root of s^2 + 2 / s = I1 above 1.
         equivalent = 2 * ca.sqrt(above / 3) * ca.cos(ca.acos(-((3 / above) ** 1.5)) / 3)
-        return energy(equivalent) + modulus / 6 * ca.fmin(I1 - 3 - _BESIDE, 0)
+        return uniaxial_energy(stress, equivalent) + modulus / 6 * ca.fmin(I1 - 3 - _BESIDE, 0)
 
     return PlaneEnergy(density)
 
 
 def energy_of(material: Material) -> PlaneEnergy:
-    """Return the energy of a silicone whose constants are numbers.
+    """Return the energy of a silicone, whose constants may be symbols.
 
     That of Table II for neo-Hookean, Mooney-Rivlin, Yeoh and Ogden, `from_uniaxial` for every other law.
     """
@@ -120,4 +128,33 @@ def energy_of(material: Material) -> PlaneEnergy:
         return mooney_rivlin(c["mu0"] / 2, 0.0)
     if law == "ogden":
         return ogden((c["mu1"], c["b1"]), (c["mu2"], c["b2"]))
-    return from_uniaxial(material.engineering_stress, float(material.tangent_modulus(1.0)))
+    return from_uniaxial(material.engineering_stress, material.tangent_modulus(1.0))
+
+
+def fibre_energy(material: Material) -> Callable[[Any, Any], Any]:
+    """Return energy(T, stretch) of a fibre of the body [Pa]; not for stretch 1 itself, where it may be 0/0.
+
+    For the laws of Table II that are energies, theirs. A law known in uniaxial tension only is integrated along that
+    path, tension or compression, and multiplied by what rings add to the energy of a neo-Hookean body.
+    """
+    if material.law.name in ENERGIES:
+        return energy_of(material).density
+
+    def energy(T: Any, stretch: Any) -> Any:
+        own = uniaxial_energy(material.engineering_stress, stretch)
+        return own * (T + stretch**2 - 3) / (2 / stretch + stretch**2 - 3)
+
+    return energy
+
+
+def shear_modulus(material: Material, stretch: Any) -> Any:
+    """Return 2 (W1 + W2 / lambda) of a uniaxial stretch, which is sigma_e / (lambda - lambda^-2) of each law [Pa].
+
+    Written with the mean slope of the stress between 1 and the stretch, so that there is no 0/0 at 1.
+    """
+    at, constants = ca.SX.sym("at"), [ca.SX.sym("c") for _ in material.constants]
+    slope = ca.jacobian(material.law.functions.engineering_stress(at, *constants), at)
+    of = ca.Function("slope", [at, *constants], [slope])
+    given = list(material.constants.values())
+    mean = sum(weight * of(1 + place * (stretch - 1), *given) for place, weight in _GAUSS)
+    return mean * stretch**2 / (stretch**2 + stretch + 1)
