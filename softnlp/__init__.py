@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from softnlp.base.units import DEGREE as DEGREE
     from softnlp.base.units import MILLIMETRE as MILLIMETRE
     from softnlp.base.units import NEWTON_MILLIMETRE as NEWTON_MILLIMETRE
+    from softnlp.dynamics.simulation import Dynamics as Dynamics
     from softnlp.model.body import Body as Body
     from softnlp.model.body import Segment as Segment
     from softnlp.model.contact_settings import Closure as Closure
@@ -87,6 +88,7 @@ if TYPE_CHECKING:
     from softnlp.studies.design_task import Range as Range
     from softnlp.studies.design_task import at_least as at_least
     from softnlp.studies.design_task import at_most as at_most
+    from softnlp.studies.dynamic import dynamic as dynamic
     from softnlp.studies.ellipsoids import compliance_ellipsoid as compliance_ellipsoid
     from softnlp.studies.ellipsoids import manipulability as manipulability
     from softnlp.studies.ellipsoids import stiffness_ellipsoid as stiffness_ellipsoid
@@ -95,6 +97,7 @@ if TYPE_CHECKING:
     from softnlp.studies.identify import identify as identify
     from softnlp.studies.inverse import inverse as inverse
     from softnlp.studies.measurements import Measurements as Measurements
+    from softnlp.studies.modes import modes as modes
     from softnlp.studies.registration import Registration as Registration
     from softnlp.studies.report import sensitivity_report as sensitivity_report
     from softnlp.studies.sensitivity import sensitivities as sensitivities
@@ -111,6 +114,7 @@ _HOMES = {
     "base.quantity": ("Quantity", "quantity"),
     "base.status": ("Status",),
     "base.units": ("BAR", "DEGREE", "MILLIMETRE", "NEWTON_MILLIMETRE"),
+    "dynamics.simulation": ("Dynamics",),
     "model.body": ("Body", "Segment"),
     "model.contact_settings": ("Closure", "ClosureWeights", "ContactSettings"),
     "model.conventions": ("AS_PRINTED", "COEFFICIENT_SETS", "REPRODUCTION", "Coefficients", "Conventions"),
@@ -139,12 +143,14 @@ _HOMES = {
     "studies.compare": ("compare",),
     "studies.design": ("Design", "design"),
     "studies.design_task": ("DesignTask", "PressureSteps", "Range", "at_least", "at_most"),
+    "studies.dynamic": ("dynamic",),
     "studies.ellipsoids": ("compliance_ellipsoid", "manipulability", "stiffness_ellipsoid"),
     "studies.force_inversion": ("pressure_for_force",),
     "studies.forward": ("forward",),
     "studies.identify": ("identify",),
     "studies.inverse": ("inverse",),
     "studies.measurements": ("Measurements",),
+    "studies.modes": ("modes",),
     "studies.registration": ("Registration",),
     "studies.report": ("sensitivity_report",),
     "studies.sensitivity": ("sensitivities", "tip_compliance", "tip_jacobian"),

@@ -16,8 +16,8 @@ import softnlp
 PACKAGE = Path(softnlp.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
 # A package imports only what stands before it, and itself.
-PACKAGES = ("base", "model", "rings", "nlp", "native", "statics", "batch", "studies", "laboratory", "sweep", "scenario")
-PACKAGES += ("results", "figures", "mould", "app", "cli")
+PACKAGES = ("base", "model", "rings", "nlp", "native", "statics", "dynamics", "batch", "studies", "laboratory")
+PACKAGES += ("sweep", "scenario", "results", "figures", "mould", "app", "cli")
 LONGEST_FILE = 400
 HEAVY = ("casadi", "numpy", "scipy", "matplotlib", "pydantic", "cyclopts", "rich", "xarray", "h5netcdf", "h5py")
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from softnlp.base.units import BAR, DEGREE, MILLIMETRE, NEWTON_MILLIMETRE
+from softnlp.base.words import WORDS as WORDS
 
 
 @dataclass(frozen=True)
@@ -45,9 +46,11 @@ NMM = Unit("Nmm", "N m", NEWTON_MILLIMETRE, "N mm", "N mm", "N mm")
 PER_M = Unit("per_m", "1/m", 1.0, "1/m", "1/m", "1/m")
 BAR_ = Unit("bar", "Pa", BAR, "bar", "bar", "bar")
 S = Unit("s", "s", 1.0, "s", "s", "s")
+MM_PER_S = Unit("mm_per_s", "m/s", MILLIMETRE, "mm/s", "mm/s", "mm/s")
+J = Unit("J", "J", 1.0, "J", "J", "J")
 
 _PLACES = {"pose": "pose.", "section": "pose.radii.", "shape": "pose.shape.", "wall": "contact."}
-_PLACES |= {"free": "contact.free.shape.", "target": "aimed."}
+_PLACES |= {"free": "contact.free.shape.", "target": "aimed.", "motion": "moving."}
 _AXES = ("axis", "row", "col")
 
 
@@ -189,6 +192,20 @@ _EVERY = (
     Output("tilt", DEG, "angle between the tip axis and +z", group="pose", words="tip tilt", others=("tip_tilt",)),
     Output("backbone_length", MM, "length of the deformed axis: integral of |v| over s", group="pose"),
     Output("chamber_length", MM, "length of each deformed chamber axis", _N, "pose", title="Chamber {}"),
+    # --- of a run in time
+    Output("tip_velocity", MM_PER_S, "velocity of the tip in the world frame", _X, "motion"),
+    Output("regulator", BAR_, "gauge pressure at the regulator of each set; `pressure` is that in the chambers",
+           ("set",), "motion", pattern="regulator_p{}"),
+    Output("time_steps", ONE, "steps of time since the step before", group="motion", short=("steps",), form=".0f"),
+    *(Output(f"energy_{name}", J, meaning, group="motion", of=f"moving.energy.{name}", form=".3g", page=".4g")
+      for name, meaning in (
+          ("kinetic", "kinetic energy"),
+          ("elastic", "energy of wall and held pressures, from the unloaded pose at the pressures of the moment"),
+          ("gravity", "energy of the weight, from t = 0"), ("pressure_work", "work of changes of pressure until then"),
+          ("load_work", "work of the loads at the tip until then"), ("dissipated", "lost to damping until then"),
+          ("numerical", "lost to the rule in time until then"),
+          ("imbalance", "what the balance of all of these is off by"),
+          ("exchanged", "the largest of them until then"))),
     # --- of each segment, where there are several or one varies
     Output("segment_tip_position", MM, "end of each segment in the world frame, without the connector behind it",
            ("segment", *_X), "segments", lambda step: np.array([part.tip_position for part in step.pose.parts])),
@@ -293,6 +310,7 @@ TABLES: dict[str, tuple[str, ...]] = {
     ),
     "blocked-force": ("blocked_force", "gap", "bending_angle", "tip_position", "residual"),
     "inverse": (*("distance", "direction_error", "bending_angle", "nearest", "stable", "residual", "solve_time"),),
+    "dynamic": ("tip_position", "bending_angle", "stretch", "time_steps", "residual"),
     "page": ("tip_position", "bending_angle", "tilt", "backbone_length", "elongation", "stretch"),
     "page, loads": ("tip_displacement",),
     "page, wall": ("blocked_force", "gap", "free_bending_angle", "length_error"),
@@ -318,41 +336,11 @@ SYMBOLS: dict[str, str] = {
 }
 """The paper's letter of an output, by name."""
 
-WORDS: dict[str, tuple[str, str]] = {
-    "step": ("", "number of the step, from 1"),
-    "status": ("", "how the step ended; solved is a solution"),
-    "candidate": ("", "the choices of a candidate"),
-    "variant": ("", "law, coefficients, conventions and closure that were compared"),
-    "count": ("", "rows that were compared"),
-    "rmse": ("of the number", "root mean square of the errors"),
-    "mape_%": ("%", "mean size of the errors, of the number measured; of a tip, of the robot's length"),
-    "mean": ("of the number", "mean size of the errors"),
-    "median": ("of the number", "median size of the errors"),
-    "max": ("of the number", "largest size of the errors"),
-    "bias": ("of the number", "mean of the errors with their sign"),
-    "law": ("", "stress-stretch law that was fitted"),
-    "R^2": ("", "share of the stress's variance that the law explains"),
-    "rmse_kPa": ("kPa", "root mean square of law less data"),
-    "mape_percent": ("%", "mean size of law less data, of the data"),
-    "constants": ("of the key", "constants +- one standard error"),
-    "constant": ("of the key", "what was identified"),
-    "value": ("of the key", "its value"),
-    "standard_error": ("of the key", "its standard error; more than the value is not determined"),
-    "start": ("of the key", "where the search began"),
-    "note": ("", "at its bound, or not determined"),
-    "observable": ("", "what was measured"),
-    "unit": ("", "of the next columns"),
-    "numbers": ("", "how many were measured"),
-    "rmse_before": ("of the number", "root mean square of the errors at the start"),
-    "rmse_after": ("of the number", "and with the constants found"),
-    "mape_before_percent": ("%", "mean size of the errors at the start, of the number measured"),
-    "mape_after_percent": ("%", "and with the constants found"),
-    "sigma": ("of the number", "standard deviation that errors were divided by"),
-}
-"""Columns of tables that are no number of a step: unit and meaning."""
-
 LEGENDS: dict[str, tuple[str, ...]] = {
-    **{study: ("step", "t", "pressure", "status", *TABLES[study]) for study in ("forward", "blocked-force", "inverse")},
+    **{
+        study: ("step", "t", "pressure", "status", *TABLES[study])
+        for study in ("forward", "blocked-force", "inverse", "dynamic")
+    },
     "workspace": (
         *("pressure", "t", "tip_position", "tip_rotation", "bending_angle", "tilt", "stretch", "backbone_length"),
         *("chamber_length", "status", "stable", "self_intersecting", "residual", "discretisation_error", "intervals"),

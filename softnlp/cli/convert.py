@@ -22,7 +22,7 @@ def convert(
     scenario
         TOML file of any study; it stays as it is.
     study
-        forward, blocked-force, workspace, inverse, identify or design.
+        forward, blocked-force, workspace, inverse, identify, design or dynamic.
     out
         The new scenario; by default NAME_STUDY.toml beside the old one.
     force

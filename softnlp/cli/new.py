@@ -19,7 +19,7 @@ def new(study: str, /, *, robot: str = "D25L60", out: Path | None = None, force:
     Parameters
     ----------
     study
-        forward, blocked-force, workspace, inverse, identify or design.
+        forward, blocked-force, workspace, inverse, identify, design or dynamic.
     robot
         A robot of the library, see `softnlp robots`.
     out

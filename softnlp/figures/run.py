@@ -28,6 +28,7 @@ from softnlp.figures.body import (
     tip_radius,
     tube,
 )
+from softnlp.figures.dynamic import dynamic_figure
 from softnlp.figures.obstacles import draw_obstacles
 from softnlp.figures.series import STEP, Abscissa, abscissa, finish_panels, new_panels, series
 from softnlp.figures.space import draw_faces, draw_lines
@@ -78,6 +79,8 @@ def run_figure(view: RunView, measured: Sequence[tuple[float, float]] = ()) -> F
         return blocked_figure(view, view.contact, measured)
     if view.targets is not None:
         return inverse_figure(view, view.targets)
+    if view.moving is not None:
+        return dynamic_figure(view, view.moving)
     figure = _begun(view, f"{len(view.solved)} of {len(view.status)} steps solved")
     axes = body_panel(figure, _CENTRE, view)
     if view.obstacles:

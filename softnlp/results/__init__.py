@@ -9,6 +9,7 @@ from softnlp.results.document import json_text
 from softnlp.results.folder import (
     Body,
     ContactView,
+    MovingView,
     RunView,
     TargetView,
     load_run,
@@ -22,6 +23,7 @@ from softnlp.results.table import table_lines, table_text, write_table
 __all__ = [
     "Body",
     "ContactView",
+    "MovingView",
     "RunView",
     "TargetView",
     "json_text",

@@ -22,6 +22,7 @@ from softnlp.nlp.solver import EquationResidual, Ipopt
 from softnlp.statics.step import Run, Step
 from softnlp.studies.fields import (
     BLOCKED_FORCE,
+    DYNAMIC,
     closure_of,
     deviation_outputs,
     document_outputs,
@@ -42,6 +43,7 @@ def run_document(run: Run) -> dict[str, Any]:
         **({"uncertainty": dict(run.uncertainty)} if run.uncertainty else {}),
         **({"obstacles": obstacle_tables(run.obstacles)} if run.obstacles else {}),
         "warnings": list(run.warnings),
+        **({"energy": plain(run.energy) or None} if run.study == DYNAMIC else {}),
         "steps": [_step(run, step) for step in run.steps],
     }
 

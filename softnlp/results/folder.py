@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.arrays import Array
-from softnlp.base.columns import OUTPUTS
+from softnlp.base.columns import OUTPUTS, outputs
 from softnlp.base.errors import InputError
 from softnlp.base.files import make_folder, write_whole
 from softnlp.base.status import Status
@@ -27,7 +27,16 @@ from softnlp.results.dataset import netcdf_bytes
 from softnlp.results.document import json_text, require_run
 from softnlp.results.table import table_text
 from softnlp.statics.step import ObstacleContact, Run, SectionRadii
-from softnlp.studies.fields import BLOCKED_FORCE, INVERSE, closure_of, deviation_outputs, series, si_value, solved_pose
+from softnlp.studies.fields import (
+    BLOCKED_FORCE,
+    DYNAMIC,
+    INVERSE,
+    closure_of,
+    deviation_outputs,
+    series,
+    si_value,
+    solved_pose,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -108,13 +117,26 @@ class TargetView:
 
 
 @dataclass(frozen=True, eq=False)
+class MovingView:
+    """What a run in time has beside its poses; NaN where a step has no solution.
+
+    tip : (S, 3) [m]. regulator : (S, sets) [Pa]. energy : (S,) by the names of `softnlp.dynamics.energy.Energy` [J].
+    """
+
+    tip: Array
+    regulator: Array
+    energy: Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
 class RunView:
     """A run as figures see it; S steps, NaN and None where a step has no solution.
 
     material : its name and law. pressure : (S, sets) [Pa]. time : (S,) [s] or None.
     stable : (S,) of `STABLE_FLAGS`, undefined where unsolved. stretch : (S,). bending_angle : (S,) [rad].
     backbone_length : (S,) [m]. bodies : S entries. contact : of a blocked force, else None. targets : of inverse
-    kinematics, else None. std : standard deviations (S,) of outputs by name [SI], none where nothing scatters.
+    kinematics, else None. moving : of a run in time, else None. std : standard deviations (S,) of outputs by name
+    [SI], none where nothing scatters.
     obstacles : what the body may touch. contact_force : (S, obstacles) size of what each pushes with [N], or None.
     """
 
@@ -134,6 +156,7 @@ class RunView:
     bodies: tuple[Body | None, ...]
     contact: ContactView | None = None
     targets: TargetView | None = None
+    moving: MovingView | None = None
     std: Mapping[str, Array] = field(default_factory=dict)
     obstacles: tuple[Obstacle, ...] = ()
     contact_force: Array | None = None
@@ -146,7 +169,7 @@ class RunView:
 
 def view_of_run(run: Run) -> RunView:
     """Return the view of a run."""
-    sizes = {"axis": 3}
+    sizes = {"axis": 3, "set": run.robot.chamber_sets}
     times = [float("nan") if step.time is None else step.time for step in run.steps]
 
     def body(k: int, prefix: str) -> Body | None:
@@ -232,7 +255,14 @@ def _view(number: Callable[[str], Any], body: Callable[[int, str], Body | None],
     fields, `std` as the names of what has standard deviations.
     """
     solved = [status.has_solution for status in head["status"]]
-    contact = targets = None
+    contact = targets = moving = None
+    if head["study"] == DYNAMIC:
+        energies = {
+            output.name.removeprefix("energy_"): number(output.name)
+            for output in outputs("motion")
+            if output.name.startswith("energy_")
+        }
+        moving = MovingView(number("tip_position"), number("regulator"), energies)
     if head["study"] == INVERSE:
         targets = TargetView(*map(number, ("target", "target_direction", "distance", "direction_error", "nearest")))
     if head["study"] == BLOCKED_FORCE and (known := np.flatnonzero(np.isfinite(number("blocked_force")))).size:
@@ -252,6 +282,7 @@ def _view(number: Callable[[str], Any], body: Callable[[int, str], Body | None],
         bodies=tuple(body(k, "") if solution else None for k, solution in enumerate(solved)),
         contact=contact,
         targets=targets,
+        moving=moving,
     )
 
 

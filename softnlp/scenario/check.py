@@ -12,6 +12,7 @@ from softnlp.base.errors import InputError, first_of
 from softnlp.base.ranges import numbers_outside
 from softnlp.base.reading import choices, did_you_mean, one_line, shown
 from softnlp.scenario.design import DesignFile
+from softnlp.scenario.dynamic import DynamicFile
 from softnlp.scenario.identify import IdentifyFile
 from softnlp.scenario.inverse import InverseFile
 from softnlp.scenario.near_keys import meant
@@ -27,13 +28,17 @@ SCHEMAS: Mapping[str, type[ScenarioFile]] = {
     "workspace": WorkspaceFile,
     "identify": IdentifyFile,
     "design": DesignFile,
+    "dynamic": DynamicFile,
 }
 """The studies that this version runs, and the file of each."""
 
 HOW = ": --all-errors"
 """How to see all mistakes of a file."""
 
-_TABLES = {"segment", *(name for schema in SCHEMAS.values() for name in schema.model_fields)} - {"title", "study"}
+_TABLES = {"segment", "obstacle", *(name for schema in SCHEMAS.values() for name in schema.model_fields)} - {
+    "title",
+    "study",
+}
 
 
 def parse(data: Mapping[str, Any]) -> ScenarioFile:

@@ -77,6 +77,10 @@ def converted(source: Path, study: str, target: Path, data: str) -> Converted:
             dropped.append(f"[{table}] {key}")
         elif table in values and table not in document and table not in missing:
             missing = [name for name in values if name in (*missing, *needed(), table)]
+        elif table in values and table in document and table not in missing:  # it says something else there
+            document.remove(table)
+            dropped.append(f"[{table}]")
+            missing = [name for name in values if name in (*missing, *needed(), table)]
         else:
             raise error
     _move_files(document, source.parent, target.parent)

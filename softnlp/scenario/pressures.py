@@ -1,4 +1,4 @@
-"""Pressures of a scenario, step by step: a list, a ramp or a CSV file."""
+"""Pressures of a scenario, step by step: a list, a ramp or a CSV file; over time, with a force at the tip beside."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from softnlp.base.csv_columns import TIME_COLUMN, csv_rows
 from softnlp.base.errors import InputError, located
-from softnlp.base.ranges import READING, TIME, noise_note, unit_note, without_noise
+from softnlp.base.ranges import FORCE, READING, TIME, noise_note, unit_note, without_noise
 from softnlp.base.reading import LONGEST_NAME, did_you_mean, one_line, read_text, shown
 from softnlp.base.units import BAR
 from softnlp.scenario.laboratory import import_notes, or_imported
@@ -21,16 +21,24 @@ from softnlp.scenario.schema import PRESSURE_SOURCES, PressureTable, RampTable
 
 Array = NDArray[np.float64]
 
+FORCES = ("fx_N", "fy_N", "fz_N")
+"""Columns of a force at the tip over time, world frame."""
+_A_LOG, _REGULAR = 20, 0.9  # rows of a log at least, and the part of them that are one interval apart
+
 
 class PressurePath(NamedTuple):
-    """pressures : (steps, sets) [Pa]. times : (steps,) [s], or None when the source has none. notes : on readings."""
+    """pressures : (steps, sets) [Pa]. times : (steps,) [s], or None when the source has none. notes : on readings.
+
+    forces : (steps, 3) at the tip [N], or None.
+    """
 
     pressures: Array
     times: Array | None
     notes: tuple[str, ...] = ()
+    forces: Array | None = None
 
 
-def pressure_path(table: PressureTable, sets: int, folder: Path) -> PressurePath:
+def pressure_path(table: PressureTable, sets: int, folder: Path, *, over_time: bool = False) -> PressurePath:
     """Return the pressures of every step.
 
     Parameters
@@ -38,16 +46,18 @@ def pressure_path(table: PressureTable, sets: int, folder: Path) -> PressurePath
     table : [pressure] of the scenario.
     sets : chamber sets of the robot, one column each.
     folder : where a relative `file` is looked for.
+    over_time : whether rows are instants of a series, with a force at the tip perhaps.
 
     Raises
     ------
     InputError
         With the key (no table, no source), when not exactly one source is given or it does not fit the robot.
     """
-    given = table.written(PRESSURE_SOURCES)
+    sources = [name for name in PRESSURE_SOURCES if name in type(table).model_fields]
+    given = table.written(sources)
     if len(given) != 1:
         raise InputError(
-            f"expected exactly one of {', '.join(PRESSURE_SOURCES)}, got {' and '.join(given) or 'none'}",
+            f"expected exactly one of {', '.join(sources)}, got {' and '.join(given) or 'none'}",
             key=given[1] if given else None,
         )
     if table.sequence_bar is not None:
@@ -59,7 +69,7 @@ def pressure_path(table: PressureTable, sets: int, folder: Path) -> PressurePath
 
     def own() -> PressurePath:
         with located(source=one_line(file, LONGEST_NAME)):
-            return _csv(read_text(folder / file), sets)
+            return _csv(read_text(folder / file), sets, over_time=over_time)
 
     settings = getattr(table, "import")
     found = or_imported(own, folder, file, "pressure", [f"p{k}_bar" for k in range(1, sets + 1)], settings)
@@ -67,7 +77,7 @@ def pressure_path(table: PressureTable, sets: int, folder: Path) -> PressurePath
         return found
     columns, imported = found
     with located(source=columns.file):
-        path = _csv(imported.csv(), sets)
+        path = _csv(imported.csv(), sets, over_time=over_time)
     return path._replace(notes=(*import_notes(imported), *path.notes))
 
 
@@ -104,13 +114,16 @@ def _ramp(ramp: RampTable, sets: int) -> Array:
     return pressures * BAR
 
 
-def _csv(text: str, sets: int) -> PressurePath:
-    """Read a header of t_s (optional) and one column a set, in any order, and one row a step."""
+def _csv(text: str, sets: int, *, over_time: bool = False) -> PressurePath:
+    """Read a header of t_s (optional) and one column a set, in any order, and one row a step.
+
+    over_time : t_s is needed then, and fx_N, fy_N, fz_N may be there.
+    """
     rows = csv_rows(text)
     line, header = next(rows, (1, []))
     if not header:
         raise InputError(f"expected a header {_names(sets)} and rows of numbers, got an empty file")
-    found, notes = _columns(header, sets, line)
+    found, notes = _columns(header, sets, line, FORCES if over_time else ())
     used = sorted(found.values())
     columns = {name: used.index(place) for name, place in found.items()}
     names = [header[place] for place in used]
@@ -132,12 +145,31 @@ def _csv(text: str, sets: int) -> PressurePath:
             if any("_" in row[place] for place in used):
                 raise _not_a_number(line, names, [row[place] for place in used])
     _require_possible(table, lines, columns)
-    pressures = table[:, [columns[name] for name in columns if name != TIME_COLUMN]]
+    pressures = table[:, [columns[name] for name in columns if name != TIME_COLUMN and name not in FORCES]]
     path = _path(pressures, table[:, columns[TIME_COLUMN]].copy() if TIME_COLUMN in columns else None)
+    if over_time and path.times is not None:
+        _require_no_gap(path.times, lines)
+    if forces := [name for name in FORCES if name in columns]:
+        acting = np.zeros((len(table), 3))
+        acting[:, [FORCES.index(name) for name in forces]] = table[:, [columns[name] for name in forces]]
+        path = path._replace(forces=acting)
     return path._replace(notes=(*path.notes, *notes, *unit_note(pressures)))
 
 
-def _columns(header: list[str], sets: int, line: int) -> tuple[dict[str, int], tuple[str, ...]]:
+def _require_no_gap(times: Array, lines: array[int]) -> None:
+    """Refuse a log with a gap: rows as regular as a clock, and then none for three of their intervals or more."""
+    apart = np.diff(times)
+    usual = float(np.median(apart)) if apart.size >= _A_LOG else 0.0
+    if usual <= 0 or np.mean(np.abs(apart - usual) <= 0.1 * usual) < _REGULAR:
+        return
+    for row in np.flatnonzero(apart >= 3 * usual)[:1] + 1:
+        raise InputError(
+            f"line {lines[row]}: {TIME_COLUMN}: expected a row every {usual:g} s as in the others, got a gap of "
+            f"{apart[row - 1]:g} s; fill it with rows, or take fewer rows of your own"
+        )
+
+
+def _columns(header: list[str], sets: int, line: int, more: Sequence[str]) -> tuple[dict[str, int], tuple[str, ...]]:
     """Return the position of each column, pressures in the order of the sets, and a word on what looks like one."""
     names = [name.strip() for name in header]
     expected = [TIME_COLUMN, *(f"p{k}_bar" for k in range(1, sets + 1))]
@@ -153,9 +185,9 @@ def _columns(header: list[str], sets: int, line: int) -> tuple[dict[str, int], t
         if name not in names:
             raise InputError(f"line {line}: missing column {name!r}; expected a header {_names(sets)}")
     stems = {known.rpartition("_")[0].lower(): known for known in expected}
-    like = [(name, stems.get(name.rpartition("_")[0].lower())) for name in names if name not in expected]
+    like = [(name, stems.get(name.rpartition("_")[0].lower())) for name in names if name not in (*expected, *more)]
     notes = tuple(f"column {shown(name)} is not used, but {known!r}" for name, known in like if known in names)
-    return {name: names.index(name) for name in expected if name in names}, notes
+    return {name: names.index(name) for name in (*expected, *more) if name in names}, notes
 
 
 def _is_set(name: str) -> bool:
@@ -165,7 +197,8 @@ def _is_set(name: str) -> bool:
 
 def _require_possible(table: Array, lines: array[int], columns: dict[str, int]) -> None:
     """Raise InputError for the first value that is not finite, outside its range, or back in time."""
-    limits = {p: TIME if name == TIME_COLUMN else READING for name, p in columns.items()}
+    known = {TIME_COLUMN: TIME, **dict.fromkeys(FORCES, FORCE)}
+    limits = {p: known.get(name, READING) for name, p in columns.items()}
     wrong = np.column_stack([~limits[p].holds(table[:, p]) for p in range(table.shape[1])])
     for row, position in np.argwhere(wrong)[:1]:
         value = float(table[row, position])

@@ -31,6 +31,7 @@ from softnlp.scenario.check import HOW, parse, parse_parts
 from softnlp.scenario.data import Read, Task
 from softnlp.scenario.data import Scenario as Scenario
 from softnlp.scenario.design import design_task
+from softnlp.scenario.dynamic import dynamic_task
 from softnlp.scenario.energy import misplaced
 from softnlp.scenario.identify import identify_task
 from softnlp.scenario.inverse import inverse_task
@@ -230,7 +231,9 @@ def _numerics(file: ScenarioFile) -> Numerics:
 def _steps(file: ScenarioFile, sets: int, folder: Path) -> PressurePath:
     """Return the pressures of a study that has them, else none."""
     table = getattr(file, "pressure", None)
-    return PressurePath(np.zeros((0, sets)), None) if table is None else pressure_path(table, sets, folder)
+    if table is None:
+        return PressurePath(np.zeros((0, sets)), None)
+    return pressure_path(table, sets, folder, over_time=file.study == "dynamic")
 
 
 def _attempt(errors: list[InputError], table: str, build: Callable[[], T]) -> T | None:
@@ -281,5 +284,6 @@ TASKS: Mapping[str, tuple[str, Callable[[Read], Task]]] = {
     "inverse": ("target", inverse_task),
     "identify": ("measurements", identify_task),
     "design": ("choices", design_task),
+    "dynamic": ("dynamic", dynamic_task),
 }
 """For each study with tables of its own: the table that its errors are about, and what reads them."""

@@ -12,6 +12,7 @@ from softnlp.base.processes import require_workers
 from softnlp.scenario.blocked_force import run_blocked
 from softnlp.scenario.data import Scenario, run_of, scenario_of
 from softnlp.scenario.design import run_design
+from softnlp.scenario.dynamic import run_dynamic
 from softnlp.scenario.identify import run_identify
 from softnlp.scenario.inverse import run_inverse
 from softnlp.scenario.workspace import run_workspace
@@ -54,7 +55,7 @@ def run_scenario(
     Returns
     -------
     Run, Identified, TensileFit, Design or Workspace
-        A run for forward, blocked-force and inverse, whose steps carry a solution or a named status.
+        A run for forward, blocked-force, inverse and dynamic, whose steps carry a solution or a named status.
 
     Raises
     ------
@@ -109,4 +110,5 @@ STUDIES: Mapping[str, Callable[[Scenario, Progress | None, int], Run]] = {
     "forward": _forward,
     "blocked-force": run_blocked,
     "inverse": run_inverse,
+    "dynamic": run_dynamic,
 }

@@ -141,6 +141,14 @@ def _design(made: Robot, data: str, silicone: Material) -> dict[str, Any]:
     }
 
 
+def _dynamic(made: Robot, data: str, silicone: Material) -> dict[str, Any]:
+    rows = [[0.0] * made.chamber_sets, [0.3, *[0.0] * (made.chamber_sets - 1)]]
+    return {
+        "pressure": {"sequence_bar": rows, "t_s": [0.0, 0.1]},
+        "dynamic": {"duration_s": 0.5, "damping_s": 0.005, "output_step_s": 0.02},
+    }
+
+
 _BEGUN: Mapping[str, Callable[[Robot, str, Material], dict[str, Any]]] = {
     "forward": _forward,
     "blocked-force": _blocked,
@@ -148,5 +156,6 @@ _BEGUN: Mapping[str, Callable[[Robot, str, Material], dict[str, Any]]] = {
     "inverse": _inverse,
     "identify": _identify,
     "design": _design,
+    "dynamic": _dynamic,
 }
 """What a scenario of each study begins with beside robot and silicone."""

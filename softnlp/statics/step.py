@@ -20,6 +20,7 @@ from softnlp.model.rod import Loads
 from softnlp.model.section import SectionRadii as SectionRadii
 from softnlp.nlp.solver import EquationResidual, Ipopt
 from softnlp.statics.body import Fit, fit_of
+from softnlp.statics.moving import Moving as Moving
 from softnlp.statics.obstacle_contact import ObstacleContact as ObstacleContact
 
 Array = NDArray[np.float64]
@@ -313,6 +314,8 @@ class Step:
         What IPOPT said, None where it took no part.
     deviation
         Where uncertainties were given, else None.
+    moving
+        Of a run in time, else None.
     contacts
         Of obstacles, one each.
     complementarity
@@ -336,6 +339,7 @@ class Step:
     engine: str | None = None
     ipopt: Ipopt | None = None
     deviation: Deviation | None = None
+    moving: Moving | None = None
     contacts: tuple[ObstacleContact, ...] = ()
     complementarity: float | None = None
 
@@ -381,3 +385,9 @@ class Run:
     def failed(self) -> tuple[Step, ...]:
         """The steps that carry no solution."""
         return tuple(s for s in self.steps if not s.status.has_solution)
+
+    @property
+    def energy(self) -> dict[str, float]:
+        """(entries,) the balance of energy of a run in time at its last solved step, empty for any other [J]."""
+        moving = [step.moving for step in self.steps if step.moving is not None]
+        return dict(moving[-1].energy) if moving else {}

@@ -13,7 +13,7 @@ from softnlp.model.segments import SegmentedRobot
 from softnlp.nlp.solver import EquationResidual
 from softnlp.statics.step import SELF_INTERSECTING_FLAGS, STABLE_FLAGS, Pose, Run, Step, stable_flag
 
-BLOCKED_FORCE, INVERSE = "blocked-force", "inverse"
+BLOCKED_FORCE, INVERSE, DYNAMIC = "blocked-force", "inverse", "dynamic"
 
 FLAGS: Mapping[str, Mapping[str, int]] = {"stable": STABLE_FLAGS, "self_intersecting": SELF_INTERSECTING_FLAGS}
 """What files of numbers hold of the outputs that are true, false or neither."""
@@ -60,6 +60,7 @@ def document_outputs(run: Run) -> tuple[Output, ...]:
     return (
         *(outputs("target") if run.study == INVERSE else ()),
         *outputs("pose"),
+        *(outputs("motion") if run.study == DYNAMIC else ()),
         *(outputs("wall") if run.study == BLOCKED_FORCE else ()),
         *(outputs("weights") if weights else ()),
         *deviation_outputs(run),
@@ -81,7 +82,8 @@ def table_outputs(run: Run) -> tuple[Output, ...]:
 def sizes_of(run: Run) -> dict[str, int]:
     """Return the sizes of the dimensions of outputs that depend on the robot."""
     robot = run.robot
-    return {"chamber": robot.chambers, "segment": len(robot.segments) if isinstance(robot, SegmentedRobot) else 1}
+    sets = {"set": robot.chamber_sets, "chamber": robot.chambers}
+    return {**sets, "segment": len(robot.segments) if isinstance(robot, SegmentedRobot) else 1}
 
 
 def dataset_outputs(run: Run) -> tuple[Output, ...]:
