@@ -214,13 +214,12 @@ def drawn(mould: SegmentMould, core: Core) -> Iterator[tuple[str, float]]:
     x = (float(hole.circle.min()) - reach, float(hole.circle.max()) + reach)
     near = box(x, (-reach, reach), (-sizes.stand - 1.0, L + 1.0))
     bases = [turned(mould.plates[name].solid, -core.turns[0]) ^ near for name in ("base-1", "base-2")]
-    silicone = union([turned(mould.first, -core.turns[0]) ^ near, core.thread, bases[0]])
+    standing = [turned(mould.first, -core.turns[0]) ^ near, core.thread, bases[0]]
     left, step = list(core.parts), sizes.settings.thread_pitch_mm / _SAME_FACETS
     for part in core.parts:
         left.remove(part)
-        obstacles = union([silicone, *(other.solid for other in left)])
+        obstacles = [*standing, *(other.solid for other in left)]  # not as one: faces that touch would leave hairs
         shift = moved_in(sizes, part)
-        obstacle = silicone if any(shift) else obstacles
         worst = 0.0
         for off in (0.0, *(L * share for share in _OFFSETS)) if any(shift) else [L * share for share in _OFFSETS]:
             solid = part.solid.translate(shift)
@@ -230,11 +229,11 @@ def drawn(mould: SegmentMould, core: Core) -> Iterator[tuple[str, float]]:
                 off = step * max(round(off / step), 1)
                 solid = turned(solid, screw_angle(sizes, off)).translate(middle)
             moved = solid.translate(tuple(float(off * c) for c in axis))
-            worst = max(worst, float((moved ^ obstacle).volume()))
+            worst = max(worst, sum(float((moved ^ obstacle).volume()) for obstacle in obstacles))
         yield part.name, worst
-    body = union([turned(mould.cast, -core.turns[0]) ^ near, bases[1]])
+    around = [turned(mould.cast, -core.turns[0]) ^ near, bases[1]]
     moves = [core.rod.solid.translate(tuple(float(L * share * c) for c in axis)) for share in _OFFSETS]
-    yield core.rod.name, max(float((solid ^ body).volume()) for solid in moves)
+    yield core.rod.name, max(sum(float((solid ^ one).volume()) for one in around) for solid in moves)
 
 
 def parted(mould: SegmentMould) -> Iterator[tuple[str, float]]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from softnlp.base.errors import InputError
 from softnlp.mould.shape import Hole, Shape, distance, waist
-from softnlp.mould.solids import TURN
+from softnlp.mould.solids import MIDDLE, TURN
 from softnlp.scenario.mould import MouldTable as Settings
 
 SEAT, GAP, LIP = 4.0, 0.3, 4.0  # how far plates reach into the shell, stand off its end, and overlap its step [mm]
@@ -21,7 +21,7 @@ LAND, CHANNEL = 2.0, 2.0  # where second rods fit without play; depth of the cha
 LUER, USUAL_GATE, USUAL_TUBE = 4.3, 4.0, 2.0  # the mouth takes a syringe's tip [mm]
 THREE_PART_FROM = 15.0  # outer diameter of the smallest robot of the paper with three-part cores [mm]
 KEY_DRAFT, SEAL = 0.003, 0.01  # of a key's narrow sides; of shoulders beyond their sockets' play, at least [mm]
-_PLAY = 0.004  # of a side of a core that has moved in [mm]
+_PLAY = 0.01  # of a side of a core that has moved in [mm]
 _ROUND_OFF = 1e-6
 
 
@@ -192,7 +192,8 @@ class Sizes:
         """
         least = self.settings.minimum_wall_mm
         thick = max(float(hole.core.max()) for hole in self.shape.holes) + self.inset
-        ground = self.depth + self.smooth + KEY_DRAFT + max(waist(hole) for hole in self.shape.holes)
+        facets = thick * (1 - cos(pi / MIDDLE))  # of what the key left
+        ground = self.depth + self.smooth + KEY_DRAFT + facets + max(waist(hole) for hole in self.shape.holes)
         off = 2 * sqrt(max(2 * thick * ground - ground**2, 0.0)) + _PLAY
         thin = min(
             min(self.spigot(hole, 0), self.spigot(hole, -1), float(hole.core.min()) + self.inset - self.depth)
