@@ -53,6 +53,12 @@ def refused(folder: Path, study: str, *tables: str) -> str:
             NOT_USED,
         ),
         (
+            "design",
+            "[choices.robot]\nlength_mm = { from = 50.0, to = 60.0 }\n[actuation]\nsets = [1]\npressure_bar = 1.0\n"
+            '[objective]\nmaximise = "bending_angle_deg"',
+            "[choices] robot.length_mm: expected a list: ranges are not searched with conventions energy so far",
+        ),
+        (
             "workspace",
             "[workspace]\nlevels = 2\nto_bar = 0.1\nvary.robot.chamber_diameter_mm = { values = [4.0, 4.5] }",
             "rings are solved for one section",
@@ -60,7 +66,7 @@ def refused(folder: Path, study: str, *tables: str) -> str:
     ],
 )
 def test_keys_without_a_meaning_are_refused_by_name(tmp_path, study, tables, said):
-    pressure = "" if study == "workspace" else PRESSURE
+    pressure = PRESSURE if study in ("forward", "blocked-force") else ""
     assert said in refused(tmp_path, study, ENERGETIC, tables, pressure)
 
 
@@ -116,3 +122,12 @@ def test_a_wall_needs_no_closure_and_the_document_says_so(tmp_path):
     free = to_json(run_scenario(load_scenario(written(tmp_path, "forward", ENERGETIC, PRESSURE))))["steps"][-1]
     assert free["bending_angle_deg"] == pytest.approx(107.67, abs=6)  # measured
     assert np.allclose(step["free_tip_position_mm"], free["tip_position_mm"], atol=1e-4)
+
+
+def test_dimensions_that_rings_would_have_to_follow_have_no_deviation(tmp_path):
+    scatter = "[uncertainty]\nchamber_diameter_mm = 0.05"
+    said = refused(tmp_path, "forward", ENERGETIC, scatter, PRESSURE)
+    assert "[uncertainty] chamber_diameter_mm: unknown name" in said
+    taken = load_scenario(written(tmp_path, "forward", ENERGETIC, "[uncertainty]\nmodulus_factor = 0.05", PRESSURE))
+    assert taken.uncertainty is not None
+    assert [source.moves for source in taken.uncertainty.sources] == [{"corrections.modulus_factor": 0.05}]

@@ -17,7 +17,7 @@ PACKAGE = Path(softnlp.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
 # A package imports only what stands before it, and itself.
 PACKAGES = ("base", "model", "rings", "nlp", "native", "statics", "dynamics", "batch", "studies", "laboratory")
-PACKAGES += ("sweep", "scenario", "results", "figures", "app", "cli")
+PACKAGES += ("sweep", "scenario", "results", "figures", "mould", "app", "cli")
 LONGEST_FILE = 400
 HEAVY = ("casadi", "numpy", "scipy", "matplotlib", "pydantic", "cyclopts", "rich", "xarray", "h5netcdf", "h5py")
 

@@ -71,7 +71,8 @@ def _app() -> App:
         suppress_keyboard_interrupt=False,
         default_parameter=Parameter(negative=()),
     )
-    add(app, "run check workspace sweep inverse sensitivity modes identify compare design gui mesh example new convert")
+    commands = "run check workspace sweep inverse sensitivity modes identify compare design gui mesh mould example new"
+    add(app, f"{commands} convert")
     add(app, "robots materials", "library")
     app.command(import_module("softnlp.cli.importing").import_, name="import")
     plot = App(name="plot", help="Draw the figures of a results folder again; or a cross-section, silicones, one run.")

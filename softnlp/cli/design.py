@@ -95,15 +95,22 @@ def run_study(
 def _write(done: Design, folder: Path, asked: Scenario) -> None:
     """Write the numbers, made before the first file is written so that an error leaves no half, and the figure."""
     from softnlp.figures.design import design_figure
-    from softnlp.results.design import best_scenario, design_csv, design_json
+    from softnlp.results.design import design_csv, design_json
 
-    given = tomllib.loads(asked.text)
-    if "file" in given["material"]:  # its path counted from the folder of the scenario
-        given["material"]["file"] = str((asked.path.parent / given["material"]["file"]).resolve())
     texts = {"design.json": design_json(done), "table.csv": design_csv(done)}
-    best = best_scenario(done, given)
+    best = best_text(done, asked)
     if best is not None:
         texts["best.toml"] = best
     else:  # one of an earlier run would not belong to these results
         (folder / "best.toml").unlink(missing_ok=True)
     write_results(folder, asked, texts, {"figure": lambda: design_figure(done)})
+
+
+def best_text(done: Design, asked: Scenario) -> str | None:
+    """Return the best candidate as the text of a scenario, None where nothing is feasible."""
+    from softnlp.results.design import best_scenario
+
+    given = tomllib.loads(asked.text)
+    if "file" in given["material"]:  # its path counted from the folder of the scenario
+        given["material"]["file"] = str((asked.path.parent / given["material"]["file"]).resolve())
+    return best_scenario(done, given)

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 _FILE = {d.field: (f"robot.{d.file_key}", d.scale) for d in DIMENSIONS}
 
+_KEPT = ("stiffening", "corrections", "gravity", "tip_load", "solver", "mould")  # tables of the best candidate
+
 
 def design_document(done: Design) -> dict[str, Any]:
     """Return a design as plain dicts, lists, strings, numbers and None; no NaN or infinity."""
@@ -245,7 +247,7 @@ def best_scenario(done: Design, asked: Mapping[str, Any]) -> str | None:
         "study": "blocked-force" if force else "forward",
         "robot": robot,
         "material": material,
-        **{key: asked[key] for key in ("stiffening", "corrections", "gravity", "tip_load", "solver") if key in asked},
+        **{key: asked[key] for key in _KEPT if key in asked},
         **({"contact": asked["contact"]} if force and "contact" in asked else {}),
         "pressure": {"ramp": {"sets": [k + 1 for k in done.task.sets], "to_bar": highest, "steps": 11}},
     }

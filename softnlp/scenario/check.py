@@ -143,7 +143,8 @@ def _message(schema: type[ScenarioFile], detail: ErrorDetails) -> str:
         return f"missing; expected {expected}" if expected else "missing"
     if kind == "literal_error":
         known = get_args(_field(schema, detail["loc"]).annotation)
-        hint = did_you_mean(value, known) if isinstance(value, str) else ""
+        words = [word for word in known if isinstance(word, str)]
+        hint = did_you_mean(value, words) if isinstance(value, str) else ""
         return f"expected {choices(known)}, got {shown(value)}{hint}"
     if kind == "string_too_long":
         return f"expected at most {limits['max_length']} characters, got {len(value)}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -20,6 +20,7 @@ from softnlp.model.obstacles import Obstacle
 from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
+from softnlp.scenario.mould import MouldTable
 from softnlp.scenario.pressures import PressurePath
 from softnlp.scenario.schema import RegistrationTable
 from softnlp.statics.step import Run, Step
@@ -67,6 +68,8 @@ class Scenario:
         Of measured tips that the scenario is compared with, where it says so.
     uncertainty
         What scatters, where it says so.
+    mould
+        What a maker chooses of the moulds, for `softnlp mould`.
     obstacles
         What the body may touch.
     """
@@ -88,6 +91,7 @@ class Scenario:
     warnings: tuple[str, ...]
     registration: RegistrationTable | None = None
     uncertainty: Uncertainty | None = None
+    mould: MouldTable = field(default_factory=MouldTable)
     obstacles: tuple[Obstacle, ...] = ()
 
     @property

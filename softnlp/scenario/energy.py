@@ -60,6 +60,12 @@ def misplaced(data: Mapping[str, Any]) -> Iterator[InputError]:
         elif key.startswith("robot.") and key != "robot.length_mm":
             text = "not with conventions energy so far, whose rings are solved for one section"
             yield InputError(text, table="workspace", key=f"vary.{key}")
+    ranges = [("choices", f"robot.{key}", given) for key, given in _table(_table(data, "choices"), "robot").items()]
+    ranges += [("actuation", key, given) for key, given in _table(data, "actuation").items()]
+    for table, key, given in ranges:
+        if isinstance(given, dict) and "from" in given:
+            text = "expected a list: ranges are not searched with conventions energy so far"
+            yield InputError(text, table=table, key=key)
     for key in sorted({*_table(data, "uncertainty")} & {"chamber_reaction"}):
         yield InputError(NOT_USED, table="uncertainty", key=key)
     if "segment" in data:

@@ -176,6 +176,7 @@ def _scenario(text: str, path: Path) -> Scenario:
         warnings=(*warnings, *unlikely, *file_unit_note(data), *steps.notes),
         registration=getattr(file, "registration", None) if "registration" in data else None,
         uncertainty=scatter,
+        mould=file.mould,
         obstacles=obstacles,
     )
 

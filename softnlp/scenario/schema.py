@@ -22,6 +22,7 @@ from softnlp.model.gravity import DIRECTIONS
 from softnlp.model.ipopt_options import IPOPT_OPTIONS
 from softnlp.model.numerics import EngineName, Numerics, Transcribing
 from softnlp.model.robot import DIMENSIONS, MINIMUM_WALL, ROBOTS, Robot, check
+from softnlp.scenario.mould import MouldTable
 from softnlp.scenario.values import MOST_STEPS as MOST_STEPS
 from softnlp.scenario.values import Count as Count
 from softnlp.scenario.values import Direction, deviation, intervals_of, number_or_fit, vector_or_fit
@@ -332,6 +333,7 @@ class ScenarioFile(Table):
     gravity: GravityTable = GravityTable()
     tip_load: TipLoadTable = TipLoadTable()
     solver: SolverTable = SolverTable()
+    mould: MouldTable = MouldTable()
 
 
 class RegistrationTable(Table):

@@ -1,0 +1,332 @@
+"""Moulds: what they enclose is the body, every part is a closed solid that can be printed, drawn and taken apart."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from functools import cache, partial
+from io import BytesIO
+from math import hypot, pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from softnlp.base.errors import InputError
+from softnlp.base.units import MILLIMETRE
+from softnlp.cli import main
+from softnlp.model.body import LinesName, Segment
+from softnlp.model.materials import material
+from softnlp.model.robot import ROBOTS, Robot, robot
+from softnlp.model.segments import segmented_robot
+from softnlp.mould import Moulds, MouldTable, bill, checks_of, moulds
+from softnlp.mould.checks import failed, overlap, surface_distance, thinnest
+from softnlp.mould.picture import Drawn, camera, picture
+from softnlp.mould.plates import vent_angles
+from softnlp.mould.shape import shapes_of
+from softnlp.mould.sizes import settled
+from softnlp.mould.solids import bounds, box, cylinder
+from softnlp.mould.write import glb, stl, three_mf
+
+trimesh = pytest.importorskip("trimesh")
+
+COARSE = 4.0  # a pitch with few turns: what holds of them holds of more
+QUICK = ("D25L40", "D10L40")
+
+
+def chosen(name: str, **settings: object) -> Moulds:
+    return moulds(robot(name), MouldTable(**{"thread_pitch_mm": COARSE, **settings}))
+
+
+made = cache(chosen)
+
+
+def taper() -> Robot:
+    """Narrower towards the tip, with chambers that lean and have a waist."""
+    along = {
+        "robot.outer_diameter": (25e-3, 22e-3),
+        "robot.lumen_diameter": (8e-3, 5e-3),
+        "robot.chamber_circle_diameter": (17e-3, 14e-3),
+        "robot.chamber_wall": {"s": (0, 0.5, 1), "value": (0.5e-3, 0.45e-3, 0.5e-3)},
+    }
+    return segmented_robot([Segment(robot("D25L60"), material("Ecoflex 00-50"), along=along)])
+
+
+def two_segments(first: str = "D25L40", second: str = "D20L40", lines: LinesName = "slack") -> Robot:
+    rubber = material("Ecoflex 00-50")
+    below = Segment(robot(first), rubber, connector=3e-3, lines=lines)
+    return segmented_robot([below, Segment(robot(second), rubber, turn=pi / 3)])
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", QUICK)
+def test_everything_that_is_measured_holds(name: str) -> None:
+    checks = checks_of(made(name))
+    assert not failed(checks)
+    assert {check.name for check in checks} >= {
+        *("closed solid", "thinnest wall", "largest side", "overlap in step 1", "overlap in step 2"),
+        *("volume of the void", "distance of the void", "volume of the first void", "overlap when drawn"),
+        "volume of the cap",
+    }
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_the_void_is_the_body_of_the_model(name: str) -> None:
+    """A_0 L_0 of the model, written out here."""
+    r = ROBOTS[name]
+    area = pi / 4 * (r.outer_diameter**2 - r.lumen_diameter**2 - r.chambers * r.chamber_diameter**2)
+    assert made(name).segments[0].cast.volume() == pytest.approx(area * r.length / MILLIMETRE**3, rel=1e-3)
+
+
+def test_the_paper_s_two_kinds_of_cores() -> None:
+    kinds = {name: settled(shapes_of(r)[0], MouldTable()).method for name, r in ROBOTS.items()}
+    assert kinds == {name: "three-part" if r.outer_diameter > 14.9e-3 else "pin" for name, r in ROBOTS.items()}
+    assert settled(shapes_of(ROBOTS["D25L60"])[0], MouldTable(core="pin")).method == "pin"
+
+
+def test_the_thread_is_where_the_model_has_it() -> None:
+    """Its middle is at r_co, and its length is that of a helix."""
+    mould = made("D25L40").segments[0]
+    core, r = mould.cores[0], ROBOTS["D25L40"]
+    vertices = np.asarray(core.thread.to_mesh().vert_properties)[:, :3]
+    rho = np.hypot(vertices[:, 0] - r.chamber_circle_radius / MILLIMETRE, vertices[:, 1])
+    assert (rho.min() + rho.max()) / 2 == pytest.approx(r.chamber_radius / MILLIMETRE, abs=1e-5)
+    low, high = mould.sizes.thread_ends
+    turn = hypot(2 * pi * r.chamber_radius / MILLIMETRE, COARSE)
+    assert mould.sizes.thread_length() == pytest.approx(6 * (high - low) / COARSE * turn, rel=1e-6)
+
+
+def test_a_wall_an_overlap_and_a_wrong_void_are_found() -> None:
+    plate = box((0, 10), (0, 10), (0, 5)) - box((1, 9), (1, 9), (0.6, 6))
+    assert thinnest(plate) == pytest.approx(0.6, abs=1e-3)
+    mould = made("D10L40").segments[0]
+    shape = mould.sizes.shape
+    moved = replace(mould, lumen=replace(mould.lumen, solid=mould.lumen.solid.translate((0.3, 0, 0))))
+    assert overlap(moved, 2)[0] > 0.01
+    assert surface_distance(mould.cast, shape) < 0.01
+    assert surface_distance(mould.cast.translate((0.06, 0, 0)), shape) > 0.05
+    assert surface_distance(mould.cast - cylinder(0.4, 1, 39, 4.4), shape) > 0.05
+
+
+def test_a_mould_that_leaks_has_no_void() -> None:
+    mould = made("D10L40").segments[0]
+    base = mould.plates["base-2"]
+    open_ = replace(base, solid=base.solid - cylinder(0.5, -20, 1, 4.4))
+    assert replace(mould, plates={**mould.plates, "base-2": open_}).cast.is_empty()
+
+
+def test_a_core_that_is_caught_is_found() -> None:
+    """A grooved pin that is drawn straight takes the thread with it."""
+    mould = made("D10L40").segments[0]
+    core = mould.cores[0]
+    straight = core.parts[0].solid.translate((0, 0, 1.1))
+    assert (straight ^ core.thread).volume() > 0.01
+
+
+@pytest.mark.parametrize("suffix", ["stl", "3mf"])
+def test_files_are_read_back_in_millimetres(suffix: str) -> None:
+    pytest.importorskip("lxml" if suffix == "3mf" else "trimesh")
+    for part in made("D25L40").parts:
+        content = stl(part) if suffix == "stl" else three_mf(part)
+        read = trimesh.load(BytesIO(content), file_type=suffix, force="mesh")
+        low, high = bounds(part.printed)
+        assert np.allclose(read.extents, high - low, atol=1e-3), part.name
+        assert read.is_volume
+        assert read.volume == pytest.approx(part.solid.volume(), rel=1e-4)
+        assert read.bounds[0, 2] == pytest.approx(0, abs=1e-6)
+
+
+def test_the_assembly_is_one_coloured_glb() -> None:
+    scene = trimesh.load(BytesIO(glb(made("D10L40"))), file_type="glb")
+    names = set(scene.graph.nodes_geometry)
+    assert {"step 1 shell-1", "step 1 core-pin 6", "thread 1 6", "step 2 liner-rod 1", "cap base", "cap tip"} <= names
+    colours = {tuple(g.visual.material.baseColorFactor) for g in scene.geometry.values()}
+    assert len(colours) >= 5
+    assert scene.extents.max() < 1.0  # metres
+
+
+REFUSED = [
+    ("D25L40", {"groove_depth_mm": 3.0}, "groove_depth_mm", "deeper than the core"),
+    ("D25L40", {"groove_depth_mm": 0.3}, "groove_depth_mm", "deeper than the thread"),
+    ("D25L40", {"gate_mm": 9.0}, "gate_mm", "wider than the wall of silicone, 8 mm"),
+    ("D10L40", {"tube_mm": 0.6}, "tube_mm", "less than minimum_wall_mm"),
+    ("D10L40", {"shoulder_mm": 0.9}, "shoulder_mm", "less than minimum_wall_mm"),
+    ("D10L40", {"core": "three-part"}, "core", "core = 'pin'"),
+    ("D25L40", {"thread_pitch_mm": 0.5}, "thread_pitch_mm", "at least 1 mm"),
+    ("D25L40", {"bed_mm": [50.0, 50.0, 50.0]}, "bed_mm", "do not fit"),
+    ("D25L40", {"wall_mm": 0.5}, "wall_mm", "less than minimum_wall_mm"),
+    ("D25L40", {"flange_mm": 4.0}, "flange_mm", "no room for screws"),
+]
+
+
+@pytest.mark.parametrize(("name", "settings", "key", "words"), REFUSED)
+def test_what_cannot_be_moulded_is_refused(name: str, settings: dict[str, object], key: str, words: str) -> None:
+    with pytest.raises(InputError, match=re.escape(words)) as caught:
+        settled(shapes_of(robot(name))[0], MouldTable(**settings))
+    assert (caught.value.table, caught.value.key) == ("mould", key)
+
+
+def test_thin_rods_are_refused() -> None:
+    thin = robot("D10L40", chamber_diameter=0.7e-3, chamber_wall=0.9e-3)
+    with pytest.raises(InputError, match=r"second rod of chamber 1 would be 0\.7 mm thick"):
+        settled(shapes_of(thin)[0], MouldTable())
+
+
+def test_cores_that_could_not_be_drawn_are_refused() -> None:
+    rubber = material("Ecoflex 00-50")
+    bent = {"robot.chamber_circle_diameter": {"s": [0, 0.5, 1], "value": [17e-3, 16e-3, 17e-3]}}
+    with pytest.raises(InputError, match=r"bends at s = 0\.5"):
+        shapes_of(segmented_robot([Segment(robot("D25L40"), rubber, along=bent)]))
+    waist = {"robot.lumen_diameter": (9e-3, 8e-3), "robot.chamber_diameter": (4e-3, 4.5e-3)}
+    with pytest.raises(InputError, match="could not be drawn"):
+        shapes_of(segmented_robot([Segment(robot("D25L40"), rubber, along=waist)]))
+
+
+def test_a_body_that_narrows_is_cast_tip_down() -> None:
+    shape = shapes_of(taper())[0]
+    assert shape.flipped
+    assert np.all(np.diff(shape.lumen) > 0)
+    cones = [pi / 3 * 60e-3 * (a * a + a * b + b * b) / 4 for a, b in ((25e-3, 22e-3), (8e-3, 5e-3))]
+    bores = 6 * pi * 2.25e-3**2 * 60e-3
+    assert shape.volume() * MILLIMETRE**3 == pytest.approx(cones[0] - cones[1] - bores, rel=1e-9)
+    assert settled(shape, MouldTable()).method == "three-part"  # their sides move in past the waist
+    with pytest.raises(InputError, match="pin of chamber 1 could not be drawn"):
+        settled(shape, MouldTable(core="pin"))
+
+
+def test_segments_have_a_mould_each_and_a_connector() -> None:
+    found = moulds(two_segments("laparoscope-3", "laparoscope-3", "bonded"), MouldTable(thread_pitch_mm=COARSE))
+    names = {part.name for part in found.parts}
+    assert {"segment-1-shell-1", "segment-2-shell-1", "connector-1", "segment-1-cap-base", "segment-2-cap-tip"} <= names
+    assert "segment-1-cap-tip" not in names  # the connector closes it
+    assert [len(segment.sizes.shape.holes) for segment in found.segments] == [6, 3]  # bonded lines are chambers
+    (joint,) = found.connectors
+    assert bounds(joint.solid)[1, 2] == pytest.approx(3.0)
+    tube = found.segments[1].sizes.tube_hole
+    assert joint.solid.volume() == pytest.approx(3 * pi * ((11.4**2 - 4.7**2) / 4 - 3 * tube**2), rel=2e-3)
+    slack = moulds(two_segments("D25L40", "D20L40"), MouldTable(thread_pitch_mm=COARSE)).connectors[0].solid
+    assert slack.volume() < 3 * pi * ((25**2 + 25 * 20 + 20**2) / 12 - 3.6**2 - 6)  # slots lead to the lumen
+
+
+def test_the_bill_adds_up() -> None:
+    found = made("D10L40")
+    rows = bill(found)
+    silicone = {row["item"]: row for row in rows if row["kind"] == "silicone"}
+    mould = found.segments[0]
+    thread = sum(one.volume() for one in mould.threads)
+    sprues = sum(s.volume() for s in (*mould.sprues[0], mould.sprues[1][1]))
+    poured = silicone["first pour, body"]["amount"] + silicone["second pour, liners"]["amount"]
+    assert 1000 * poured == pytest.approx(mould.cast.volume() - thread + sprues, rel=1e-3)
+    assert silicone["first pour, body"]["with_waste"] == pytest.approx(
+        1.2 * silicone["first pour, body"]["amount"], rel=1e-3
+    )
+    screws = {row["item"]: row["count"] for row in rows if row["kind"] == "screw"}
+    assert screws["nut"] == screws["clamping screw"] + 2 * screws["tie rod or screw"]
+    assert {row["count"] for row in rows if row["item"] == "core-pin"} == {6}
+
+
+def test_shrinkage_makes_moulds_larger() -> None:
+    larger = shapes_of(robot("D25L40"), 1.0)[0]
+    assert larger.length == pytest.approx(40 / 0.99)
+    assert larger.volume() == pytest.approx(shapes_of(robot("D25L40"))[0].volume() / 0.99**3)
+
+
+def test_what_is_nearer_hides_what_is_behind() -> None:
+    """Of two plates seen from above the upper one is seen, beside it the lower one, and around them nothing."""
+    low = Drawn.of(box((-10, 10), (-10, 10), (0, 1)), (1.0, 0.0, 0.0))
+    high = Drawn.of(box((-5, 5), (-5, 5), (4, 5)), (0.0, 0.0, 1.0))
+    for things in ([low, high], [high, low]):
+        image = picture(things, 100, 100, camera(0.0, 90.0)).astype(int)
+        middle, edge, corner = image[50, 50], image[50, 10], image[1, 1]
+        assert middle[2] > 100
+        assert middle[0] == 0
+        assert edge[0] > 100
+        assert edge[2] == 0
+        assert np.all(corner == 255)
+
+
+def test_vents_are_between_chambers() -> None:
+    shape = shapes_of(robot("D25L40"))[0]
+    for angle in vent_angles(shape):
+        assert min(abs(np.angle(np.exp(1j * (angle - hole.angle)))) for hole in shape.holes) > np.radians(20)
+
+
+SCENARIO = """study = "forward"
+[robot]
+name = "D10L40"
+[material]
+name = "Ecoflex 00-50"
+model = "mooney-rivlin"
+[pressure]
+sequence_bar = [[0.0, 0.0, 0.0]]
+[mould]
+thread_pitch_mm = 8.0
+"""
+
+
+def scenario_file(folder: Path, text: str = SCENARIO) -> Path:
+    path = folder / "small.toml"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("gate_mm = 5.0", "[mould] gate_mm: a gate of 5 mm is wider"),
+        ("gate = 5.0", "[mould] gate: unknown key; did you mean 'gate_mm'?"),
+        ('shell_parts = "2"', "[mould] shell_parts: expected"),
+        ("clearance_mm = -1.0", "[mould] clearance_mm: expected"),
+    ],
+)
+def test_bad_moulds_are_one_line_and_write_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], line: str, words: str
+) -> None:
+    path = scenario_file(tmp_path, f"{SCENARIO}{line}\n")
+    assert main(["mould", str(path), "--out", str(tmp_path / "out")]) == 2
+    out, err = capsys.readouterr()
+    assert not out
+    assert len(err.splitlines()) == 1
+    assert words in err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.thorough
+def test_the_command_writes_every_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, out = scenario_file(tmp_path), tmp_path / "out"
+    assert main(["mould", str(path), "--out", str(out)]) == 0
+    names = {file.name for file in out.iterdir()}
+    assert {"small-shell-1.stl", "small-shell-1.3mf", "small-assembly.glb", "small-steps.html"} <= names
+    kept = json.loads((out / "small-bill.json").read_text())
+    assert kept["settings"]["thread_pitch_mm"] == 8.0
+    assert {check["verdict"] for check in kept["checks"]} == {"holds"}
+    page = (out / "small-steps.html").read_text()
+    assert page.count("data:image/png") >= 9
+    assert "http" not in page
+    assert "core-pin" in (out / "small-bill.csv").read_text()
+    assert "moulds in" in capsys.readouterr().out
+
+
+def test_a_finished_design_is_made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "design.json").write_text("{}")
+    assert main(["mould", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
+    assert "no feasible candidate" in capsys.readouterr().err
+    (tmp_path / "best.toml").write_text(SCENARIO + "gate_mm = 5.0\n")
+    assert main(["mould", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
+    assert "best.toml: [mould] gate_mm" in capsys.readouterr().err
+
+
+EVERY = {**{name: partial(robot, name) for name in ROBOTS}, "taper": taper, "two segments": two_segments}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EVERY)
+def test_every_robot_s_moulds_hold(name: str) -> None:
+    assert not failed(checks_of(moulds(EVERY[name]())))
+
+
+@pytest.mark.slow
+def test_three_part_shells_and_smooth_cores_hold() -> None:
+    assert not failed(checks_of(chosen("D25L40", shell_parts=3, groove_depth_mm=0.0)))
+    assert not failed(checks_of(chosen("D10L40", shell_parts=3, groove_depth_mm=0.0, shrinkage_percent=0.5)))
