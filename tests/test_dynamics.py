@@ -329,3 +329,23 @@ def test_random_runs_reach_their_end_and_none_does_so_falsely() -> None:
     assert found["false"] == 0
     assert found["reached_the_end"] >= 0.96 * found["runs"]
     assert all(one["message"] for one in found["others"])
+
+
+@pytest.mark.thorough
+def test_the_energy_section_moves_too() -> None:
+    """It begins at its pose of statics, keeps the energy of a release, and swings as its potential says."""
+    from softnlp import ENERGY, Coefficients
+
+    kind: dict[str, Any] = {"conventions": ENERGY, "coefficients": Coefficients(modulus_factor=1.5)}
+    P, loads = [0.6 * BAR, 0.2 * BAR, 0.0], Loads((0.03, 0.01, 0.0), gravity="hanging")
+    pose = forward(D25, RUBBER, [P], loads=loads, numerics=EXACT, **kind).steps[0].pose
+    run = dynamic(D25, RUBBER, P, Dynamics(0.03, 1e-3, output_step=0.03, release=True), loads=loads, **kind)
+    assert pose is not None
+    assert run.steps[0].pose is not None
+    assert np.allclose(run.steps[0].pose.tip_position, pose.tip_position, rtol=0, atol=1e-7 * D25.length)
+    assert np.allclose(run.steps[0].pose.shape.moment, pose.shape.moment, atol=1e-4 * np.abs(pose.shape.moment).max())
+    assert abs(run.energy["imbalance"]) < 1e-5 * run.energy["exchanged"]
+    found = modes(D25, RUBBER, P, loads=loads, **kind).found
+    assert found is not None
+    assert found.stable
+    assert found.modes[0].kind == "bending"
