@@ -233,11 +233,7 @@ def test_shrinkage_makes_moulds_larger() -> None:
 
 
 def test_what_is_nearer_hides_what_is_behind() -> None:
-<<<<<<< HEAD
     """Of two plates seen from above the upper one is seen, beside it the lower one, and around them nothing."""
-=======
-    """Of two plates seen from above the upper one is seen; beside it the lower one; around them nothing."""
->>>>>>> mould
     low = Drawn.of(box((-10, 10), (-10, 10), (0, 1)), (1.0, 0.0, 0.0))
     high = Drawn.of(box((-5, 5), (-5, 5), (4, 5)), (0.0, 0.0, 1.0))
     for things in ([low, high], [high, low]):
