@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 
 from softnlp import Material, Robot
 
-BASIS, STEPS = 10, 24
+BASIS, STEPS = 12, 48
 
 
 def density(material: Material) -> Any:
