@@ -9,7 +9,7 @@ from benchmarks.judge import VARIANTS, Judgement, Variant, judge, report
 from benchmarks.measured import ANGLES, CURVE, ELONGATIONS, FORCES, PRESSURE
 from softnlp import Coefficients
 
-REPRODUCTION, CALIBRATED = VARIANTS
+REPRODUCTION, CALIBRATED, ENERGY = VARIANTS
 
 
 def perfect() -> Judgement:
@@ -56,3 +56,11 @@ def test_the_papers_sets_have_the_errors_that_are_stated() -> None:
         assert [found.elongations[name] for name in ANGLES] == pytest.approx(lengths, abs=0.05)
         names = ("angles [deg]", "force at 1.5 bar [%]", "force along 0.3 to 1.5 bar [%]")
         assert [found.table[name] for name in names] == pytest.approx(stated, abs=0.06)
+
+
+@pytest.mark.slow
+def test_one_constant_has_the_errors_that_are_stated() -> None:
+    found = judge(ENERGY).table
+    assert found["angles [deg]"] == pytest.approx(24.3, abs=0.06)
+    assert found["force at 1.5 bar [%]"] == pytest.approx(9.6, abs=0.06)
+    assert found["force along 0.3 to 1.5 bar [%]"] == pytest.approx(10.4, abs=0.06)

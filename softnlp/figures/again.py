@@ -181,7 +181,8 @@ def _identified_figure(folder: Path, told: Any) -> Figure:
         evaluations=0,
         warnings=(),
     )
-    return identified_figure(identified, told["title"])
+    keys = {name: (one["name"], scale) for one, (name, scale) in zip(told["constants"], named, strict=True)}
+    return identified_figure(identified, told["title"], keys)
 
 
 def _observed(numbers: Mapping[str, Any]) -> Iterator[tuple[slice, Any]]:

@@ -14,6 +14,8 @@ from softnlp.studies.measurements import OBSERVABLES, column_slice
 from softnlp.studies.registration import NAMES as REGISTRATION_NAMES
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from matplotlib.figure import Figure
 
     from softnlp.studies.identified import Identified
@@ -70,12 +72,17 @@ def tensile_figure(fit: TensileFit, name: str, before: Any = None) -> Figure:
 
 
 @in_own_style
-def identified_figure(found: Identified, title: str) -> Figure:
-    """Draw the model before and after against what was measured, a panel an observable and a marker a robot."""
+def identified_figure(found: Identified, title: str, keys: Mapping[str, tuple[str, float]] | None = None) -> Figure:
+    """Draw the model before and after against what was measured, a panel an observable and a marker a robot.
+
+    keys : that files have for the constants, with their units in SI; None are those of the material.
+    """
     shown = [key for key in OBSERVABLES if key in found.errors()]
     width = 0.9 + 4.1 * len(shown)
     pairs = [(n, v) for n, v in zip(found.free.names, found.constants, strict=True) if n not in REGISTRATION_NAMES]
-    told = [constants_text([file_name(n, found.material)], np.array([v])) for n, v in pairs]
+    told = [
+        constants_text([file_name(n, found.material) if keys is None else keys[n]], np.array([v])) for n, v in pairs
+    ]
     notes = (found.notes[n] for n, _ in pairs)
     constants = ", ".join(words + (note and f" ({note})") for words, note in zip(told, notes, strict=True))
     figure = new_figure(max(width, 6.5), 5.0, title, constants)

@@ -41,6 +41,7 @@ LETTERS: Mapping[str, str] = {
     "k_i": "k_i, correction of the inertia",
     "phi": "phi, part of the liner that pressure acts on",
     "k_c": "k_c, chamber reaction at a wall",
+    "c_m": "c_m, factor on the silicone's stress of the energy section",
 }
 _SIGMAS = {
     key: f"{OUTPUTS[name].label.capitalize()} [{unit}]"

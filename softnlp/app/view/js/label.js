@@ -6,7 +6,10 @@ export const LAST = 3; // rank of labels that are left out where there is no roo
 const FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif";
 
 const MARGIN = 4; // about the letters, for their halo [px]
-const ASIDE = [[0, 0], [0, -1], [0, 1], [0, -2], [0, 2], [1, 0], [-1, 0], [1, -1], [-1, -1], [1, 1], [-1, 1]];
+const ASIDE = [
+  ...[[0, 0], [0, -1], [0, 1], [0, -2], [0, 2], [1, 0], [-1, 0], [1, -1], [-1, -1], [1, 1], [-1, 1]],
+  ...[[1, -2], [-1, -2], [1, 2], [-1, 2], [0, -3], [0, 3], [2, 0], [-2, 0]],
+];
 
 // Move labels of low rank aside where they would stand over those before them, and leave out those of the last rank.
 export function spread(labels, camera, width, height) {
