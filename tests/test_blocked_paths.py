@@ -268,6 +268,14 @@ def test_a_coarse_solution_far_from_its_limit_is_refined_by_grids_between(monkey
     assert by_steps.solution.x == pytest.approx(straight.solution.x, abs=1e-9)
     assert stepwise(found, fine, lambda size: shared().grid(size, plane), lambda *_: None) is None
 
+    def refuse_jumps(at: Blocked, grid: BlockedGrid) -> Blocked | None:
+        return None if grid.intervals > 1.3 * at.grid.intervals else shared()._refined(at, grid)
+
+    monkeypatch.setattr(blocked_refine, "_FINE", 0.0)  # never fine enough to jump: the last grid comes by itself
+    to_the_end = stepwise(found, fine, lambda size: shared().grid(size, plane), refuse_jumps)
+    assert to_the_end is not None
+    assert to_the_end.solution.x == pytest.approx(straight.solution.x, abs=1e-9)
+
 
 def test_a_step_that_went_another_way_is_followed_instead(monkeypatch: pytest.MonkeyPatch) -> None:
     near = found_at(0.5)

@@ -75,7 +75,7 @@ def stepwise(
         between = refine(found, finer(size)) if size > found.grid.intervals else None
         if between is not None:
             found = between
-            if found.refinement_error <= _FINE:
+            if found.refinement_error <= _FINE or size * ratio >= grid.intervals:
                 return refine(found, grid)
         elif ratio < _SLOWLY:
             return None
