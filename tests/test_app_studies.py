@@ -315,11 +315,16 @@ def test_nothing_is_cut_off_and_texts_can_be_read(tab: Watched, dark: bool, pict
     for name in ("kinematics", "blocked", "workspace", "inverse", "identify", "scenario"):
         tab.press(f"tab-{name}")
         tab.settled()
+        tab.page.wait_for_function(SHOWN)
         tab.page.screenshot(path=pictures / f"app_{name}_{'dark' if dark else 'light'}.png")
         assert tab.evaluate(TOO_WIDE) == [], name
         assert tab.evaluate(FAINT) == [], name
 
 
+# What is on the screen is of the controls, and has its colours: what is stale is grey until it is solved again.
+SHOWN = """
+!document.querySelector('.softnlp-stale') && !document.getAnimations().some(a => a instanceof CSSTransition)
+"""
 # Elements that are wider than the column they stand in.
 TOO_WIDE = """
 () => [...document.querySelectorAll('.softnlp-column')].filter(c => c.scrollWidth > c.clientWidth + 1).map(c => {
