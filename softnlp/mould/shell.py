@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from manifold3d import Manifold
 
 PIN_RADIUS, PIN_HEIGHT, PIN_DEPTH = 2.0, 2.5, 2.8  # of register pins, and of their holes [mm]
-_LEAD = 8.0  # draft of register pins at least, so that they find their holes [deg]
+_LEAD = {2: 8.0, 3: 32.0}  # draft of register pins at least: one part of three leaves at 30 degrees to them [deg]
 _APART = 30.0
 
 
@@ -82,7 +82,7 @@ def rows(sizes: Sizes) -> tuple[list[float], list[float]]:
 
 def _pin(sizes: Sizes, z: float, play: float) -> Manifold:
     """Return a register pin, or with play its hole, that stands out of a parting plane at angle 0."""
-    draft = max(sizes.settings.draft_deg, _LEAD)
+    draft = max(sizes.settings.draft_deg, _LEAD[sizes.settings.shell_parts])
     height = PIN_HEIGHT if play == 0 else PIN_DEPTH
     at = [-0.5 if play == 0 else -0.1, 0.0, height]
     r = [PIN_RADIUS + play, PIN_RADIUS + play, PIN_RADIUS + play - height * tan(radians(draft))]
