@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -73,10 +71,11 @@ class ObstacleGrid:
         """Return the largest change of a scaled position or of a direction cosine between two x."""
         return float(np.max(np.abs(self.nodes(change)[:12])))
 
-    @cached_property
-    def pushed(self) -> ca.Function:
-        """What obstacles do to a node, for every node."""
-        return self.case.touching.pushed.map(self.intervals + 1)
+    def taken(self, x: Array, p: Array) -> tuple[Array, Array, Array]:
+        """Return what the field takes beside states, and the radius and numbers that obstacles take."""
+        nc, count = self.case.functions.field.size1_in(1), len(self.case.obstacles)
+        constants, radius, numbers = np.split(np.asarray(self.problem.case_constants(x, p)).ravel(), [nc, nc + count])
+        return constants, radius, numbers
 
 
 def compiled_obstacles(
@@ -130,17 +129,10 @@ class Touched:
 
 def touched(grid: ObstacleGrid, solution: Solution, values: dict[str, Any]) -> Touched:
     """Return a solution with what its nodes and obstacles say."""
-    case, K, count = grid.case, grid.intervals, len(grid.case.obstacles)
     x, p = solution.x, solution.p
-    every = np.asarray(grid.problem.case_constants(x, p)).ravel()
-    nc = case.functions.field.size1_in(1)
-    sizes = [len(o.units) for o in case.obstacles]
-    constants, radius, numbers, _ = np.split(every, np.cumsum([nc, count, sum(sizes)]))
+    constants, radius, numbers = grid.taken(x, p)
     before, pushes = grid.nodes(x), grid.pushes(x)
-    behind, gaps = (
-        np.asarray(part) for part in grid.pushed(before, pushes, np.tile(radius[:, None], K + 1),
-                                                 np.tile(numbers[:, None], K + 1))
-    )  # fmt: skip
+    behind, gaps = grid.case.touching.at(before, pushes, radius, numbers)
     behind[:, 0] = before[:, 0]  # the base is held
     steps = np.ravel(values[STEPS])
     s = np.concatenate([[0.0], np.cumsum(steps)])

@@ -29,10 +29,8 @@ def gaps_between(shape: Mapped, found: Touched) -> tuple[Array, Array]:
     inner = np.arange(1, _SAMPLES + 1) / _SAMPLES
     s = (found.s[:-1, None] + np.diff(found.s)[:, None] * inner).ravel()
     states = between(shape, found, s)[:STATE_SIZE]
-    pushed = found.grid.case.touching.pushed.map(s.size)
-    count = len(found.grid.case.obstacles)
-    wide = [np.tile(part[:, None], s.size) for part in (found.radius, found.numbers)]
-    gaps = np.asarray(pushed(states, np.zeros((count, s.size)), *wide)[1])
+    none = np.zeros((len(found.grid.case.obstacles), s.size))
+    _, gaps = found.grid.case.touching.at(states, none, found.radius, found.numbers)
     for j, obstacle in enumerate(found.grid.case.obstacles):
         if obstacle.part != "body":
             gaps[j, :-1] = np.inf

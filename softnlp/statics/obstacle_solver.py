@@ -101,21 +101,12 @@ class ObstacleSolver:
         straight = np.asarray(self.poses.functions.arc(column, 1.0, s[None, :]))[:, 1:]
         nodes = np.zeros((STATE_SIZE, _FIRST + 1))
         p = grid.problem.pack(self.values(np.zeros(self.poses.model.sets), Loads(), np.linspace(0, 1, _FIRST + 1)))
-        _, radius, numbers = self._taken(grid, grid.packed(1.0, nodes, np.zeros((len(self.obstacles), _FIRST + 1))), p)
         count = len(self.obstacles)
-        wide = [np.tile(part[:, None], _REST) for part in (radius, numbers)]
-        pushed = grid.case.touching.pushed.map(_REST)
-        gaps = np.asarray(pushed(straight, np.zeros((count, _REST)), *wide)[1])
+        _, radius, numbers = grid.taken(grid.packed(1.0, nodes, np.zeros((count, _FIRST + 1))), p)
+        _, gaps = grid.case.touching.at(straight, np.zeros((count, _REST)), radius, numbers)
         L_0 = float(np.asarray(grid.problem.units(np.ones(grid.problem.nlp["x"].numel()), p)).ravel()[0])
         least = [np.min(own) if o.part == "body" else own[-1] for o, own in zip(self.obstacles, gaps, strict=True)]
         return [max(0.0, -float(gap)) * L_0 if gap < -_TOUCHING else 0.0 for gap in least]
-
-    def _taken(self, grid: ObstacleGrid, x: Array, p: Array) -> tuple[Array, Array, Array]:
-        """Return what the field takes beside states, and the radius and numbers that obstacles take."""
-        every = np.asarray(grid.problem.case_constants(x, p)).ravel()
-        nc, count = grid.case.functions.field.size1_in(1), len(self.obstacles)
-        last = every.size - STATE_SIZE * (grid.intervals + 1)
-        return every[:nc], every[nc : nc + count], every[nc + count : last]
 
     def solve(self, pressure: Array, loads: Loads, near: Touched | None = None) -> tuple[Step, Touched | None]:
         """Solve one pose, followed from a neighbouring one or from the unpressurised shape.
@@ -256,11 +247,10 @@ class ObstacleSolver:
     def _through(self, grid: ObstacleGrid, before: Array, solution: Solution) -> bool:
         """Whether half-way between two points of a path the robot is inside an obstacle: it went through it."""
         K, count = grid.intervals, len(self.obstacles)
-        _, radius, numbers = self._taken(grid, solution.x, solution.p)
-        wide = [np.tile(part[:, None], K + 1) for part in (radius, numbers)]
+        _, radius, numbers = grid.taken(solution.x, solution.p)
         a, b = grid.nodes(before), grid.nodes(solution.x)
         for t in (0.25, 0.5, 0.75):
-            gaps = np.asarray(grid.pushed(a + t * (b - a), np.zeros((count, K + 1)), *wide)[1])
+            _, gaps = grid.case.touching.at(a + t * (b - a), np.zeros((count, K + 1)), radius, numbers)
             for j, obstacle in enumerate(self.obstacles):
                 own = gaps[j, 1:] if obstacle.part == "body" else gaps[j, -1:]
                 if np.min(own) < -_THROUGH:

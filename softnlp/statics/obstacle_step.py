@@ -93,13 +93,11 @@ def contacts_of(obstacles: Sequence[Obstacle], found: Touched, poses: PoseSolver
     """Return what each obstacle does: its force on the robot, where along it, and the least gap."""
     L_0, F_0 = found.units
     _, gaps = gaps_between(poses.shape, found)
-    K, every = found.s.size - 1, []
-    pushed = found.grid.case.touching.pushed.map(K + 1)
-    wide = [np.tile(part[:, None], K + 1) for part in (found.radius, found.numbers)]
+    every, at = [], found.grid.case.touching.at
     for j, name in enumerate(names_of(obstacles)):
         alone = np.zeros_like(found.pushes)
         alone[j] = found.pushes[j]
-        behind = np.asarray(pushed(found.before, alone, *wide)[0])
+        behind, _ = at(found.before, alone, found.radius, found.numbers)
         forces = (found.before[12:15] - behind[12:15]).T * F_0
         forces[0] = 0.0
         where = found.s[found.active[j]]
@@ -121,8 +119,8 @@ def is_minimum(poses: PoseSolver, found: Touched) -> bool:
     """Whether the energy is least among all shapes that keep in touch where they are."""
     K, count = found.s.size - 1, len(found.grid.case.obstacles)
     stiffness = found.grid.case.touching.stiffness.map(K + 1)
-    wide = [np.tile(part[:, None], K + 1) for part in (found.radius, found.numbers)]
-    curved, slopes = (np.asarray(part) for part in stiffness(found.before, found.pushes, *wide))
+    given = found.before, found.pushes, found.radius, found.numbers
+    curved, slopes = (np.asarray(part) for part in stiffness(*given))
     curved = curved.reshape(6, K + 1, 6).transpose(1, 0, 2)
     slopes = slopes.reshape(6, K + 1, count).transpose(1, 2, 0)
     springs = np.where(np.any(found.active, axis=0)[:, None, None], curved, 0.0)

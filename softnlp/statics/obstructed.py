@@ -26,7 +26,7 @@ from softnlp.model.quantities import Model, quantities, section_function
 from softnlp.model.section import unit_scale
 from softnlp.nlp.case import Equation
 from softnlp.nlp.transcription import RK4, rk_step
-from softnlp.statics.loadcase import RodFunctions, unpack_section
+from softnlp.statics.loadcase import RodFunctions
 from softnlp.statics.wrenches import tip_equations
 
 Array = NDArray[np.float64]
@@ -58,6 +58,11 @@ class Touching:
 
     pushed: ca.Function
     stiffness: ca.Function
+
+    def at(self, states: Array, pushes: Array, radius: Array, numbers: Array) -> tuple[Array, Array]:
+        """Return the states behind what pushes there (18, n) and the gaps (obstacles, n), of as many states."""
+        behind, gaps = self.pushed.map(states.shape[1])(states, pushes, radius, numbers)
+        return np.asarray(behind), np.asarray(gaps)
 
 
 def _gap(x: Any, obstacle: Obstacle, numbers: Any, radius: Any) -> Any:
@@ -103,7 +108,8 @@ class ObstructedCase:
     """A robot in one state of loading among obstacles, as `softnlp.nlp.case.Case`.
 
     symbols : stretch, the states at the nodes 0..K before what pushes there, the pushes F of the nodes 1..K by
-    obstacles, which those of a tip's obstacle have at K alone. inside : (x, p-free expressions) see `parts`.
+    obstacles, which those of a tip's obstacle have at K alone. fields : what field, radii and obstacles take.
+    every : the pushes (obstacles, K). ends : the rows before and behind the intervals. gaps : at the pushes.
     """
 
     name: str
@@ -162,16 +168,6 @@ class ObstructedCase:
         """Whether strains are found by iterations, whose derivative is the last one's."""
         return self.functions.model.section.coupled
 
-    @property
-    def whole_length(self) -> ca.MX:
-        """L_0 [m]."""
-        return self.length_unit
-
-    @property
-    def labels(self) -> list[str]:
-        """What the unknowns are called."""
-        return [symbol.name() for symbol in self.symbols]
-
 
 def pushed_nodes(obstacles: Sequence[Obstacle], intervals: int) -> tuple[tuple[int, int], ...]:
     """Return (node, obstacle) of every push, nodes from 1, in the order of the unknowns."""
@@ -204,30 +200,30 @@ def obstructed_case(
     of_body, of_rim = _radii(functions.model)(column[: functions.section.size1_in(0)], stretch)
     wide = {"body": of_body, "tip axis": ca.MX(0), "tip rim": of_rim}
     radius = ca.vertcat(*(wide[o.part] for o in obstacles))
+    fields = ca.vertcat(constants, radius, numbers)
 
     states, places = ca.MX.sym("states", nx * (K + 1)), pushed_nodes(obstacles, K)
     F = ca.MX.sym("pushes", len(places))
     nodes = ca.reshape(states, nx, K + 1)
-    spread = ca.DM(count, K)
-    every, rows = ca.MX(spread), [(k - 1) * count + j for k, j in places]
+    rows = [(k - 1) * count + j for k, j in places]
     to_all = ca.DM(ca.Sparsity.triplet(count * K, len(places), rows, list(range(len(places)))), 1)
     every = ca.reshape(to_all @ F, count, K)
     touch = touching(obstacles)
-    behind, gaps = touch.pushed.map(K)(nodes[:, 1:], every, ca.repmat(radius, 1, K), ca.repmat(numbers, 1, K))
+    behind, gaps = touch.pushed.map(K)(nodes[:, 1:], every, radius, numbers)
     out = ca.horzcat(nodes[:, 0], behind)
     G = ca.vec(gaps)[rows]
 
     h = given[STEPS].symbol.T
     step = rk_step(functions.field, RK4).map(K)
-    steps = step(out[:, :K], ca.repmat(constants, 1, K), h) - nodes[:, 1:]
-    fine = step(step(out[:, :K], ca.repmat(constants, 1, K), h / 2), ca.repmat(constants, 1, K), h / 2) - nodes[:, 1:]
+    steps = step(out[:, :K], constants, h) - nodes[:, 1:]
+    fine = step(step(out[:, :K], constants, h / 2), constants, h / 2) - nodes[:, 1:]
     base = ca.vertcat(balance, rod.base_balance(nodes[:, 0]))
     tip = functions.tip(out[:, K], constants, ca.MX(0, 1), functions.tip_column(given), units)
     tau = given[SMOOTHING].symbol
     either = G + F - ca.sqrt(G**2 + F**2 + 2 * tau**2)
 
     model = functions.model
-    integrals = ca.sum2(_integrals(functions).map(K)(out[:, :K], ca.repmat(constants, 1, K), h))
+    integrals = ca.sum2(_integrals(functions).map(K)(out[:, :K], constants, h))
     N = model.chambers
     outputs = {
         "stretch": stretch,
@@ -247,7 +243,7 @@ def obstructed_case(
         given=given,
         symbols=(stretch, states, F),
         column=column,
-        constants=ca.vertcat(constants, radius, numbers, ca.vec(out)),
+        constants=fields,
         residuals=ca.vertcat(base, ca.vec(steps), tip, either),
         fine_residuals=ca.vertcat(base, ca.vec(fine), tip, either),
         equations=_equations(K, functions, L_0, F_0, len(places)),
@@ -257,7 +253,7 @@ def obstructed_case(
         touching=touch,
         pushes=places,
         ends=(base, tip),
-        fields=ca.vertcat(constants, radius, numbers),
+        fields=fields,
         every=every,
         gaps=G,
     )
@@ -319,8 +315,3 @@ def _equations(K: int, functions: RodFunctions, L_0: ca.MX, F_0: ca.MX, pushes: 
     named += tip_equations(start, functions.loads, L_0, F_0)
     named.append(Equation("contact gap or force", start + 6 + np.arange(pushes), "m", L_0))
     return tuple(named)
-
-
-def length_of(constants: Any) -> Any:
-    """Return the length of the stretched rod over L_0."""
-    return unpack_section(constants).length
