@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from softnlp.batch.grids import grid_level, whole_groups
 from softnlp.batch.predictor import predicted
 from softnlp.native.interpreted import Interpreted
-from softnlp.native.ir import LIBRARY, llvm_text
+from softnlp.native.ir import llvm_text
+from softnlp.native.ir_functions import LIBRARY
 from softnlp.native.jit import can_compile, compiled
 from softnlp.native.kernels import WIDTH, Kernels, Step
 from softnlp.native.shooting import Compiled, shooting

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import inf, pi
 from numbers import Integral, Real
 from types import MappingProxyType
@@ -308,6 +309,7 @@ def size_notes(robot: Robot) -> tuple[str, ...]:
     )
 
 
+@lru_cache(maxsize=64)
 def touching_stretch(robot: Robot) -> float:
     """Return the stretch above which neighbouring reinforced chambers touch; infinite for a single chamber.
 

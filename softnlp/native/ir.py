@@ -1,90 +1,19 @@
-"""CasADi functions of scalars as LLVM's intermediate language, four poses to an instruction.
-
-The instructions are those of the function, in its order and without contraction, so that compiled numbers are the
-interpreted ones to the last bit.
-"""
+"""What is done to many poses as a module of LLVM's intermediate language: loops over poses, intervals and passes."""
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterable
 
 import casadi as ca
 
-from softnlp.native.kernels import B_ENDS, B_MIDDLE, WIDTH, Kernels, Step
-
-LANES = 4
-"""Poses to an instruction."""
-_V = f"<{LANES} x double>"
-_CALLED = "called_"
-REFINES, ENOUGH = "refine", 1e-6
-"""A function that brings its last entries nearer to a solution, and their last change below which it is left out."""
-_LIBRARY = {
-    ca.OP_EXP: "exp",
-    ca.OP_EXPM1: "expm1",
-    ca.OP_LOG: "log",
-    ca.OP_LOG1P: "log1p",
-    ca.OP_SIN: "sin",
-    ca.OP_COS: "cos",
-    ca.OP_TAN: "tan",
-    ca.OP_ASIN: "asin",
-    ca.OP_ACOS: "acos",
-    ca.OP_ATAN: "atan",
-    ca.OP_SINH: "sinh",
-    ca.OP_COSH: "cosh",
-    ca.OP_TANH: "tanh",
-    ca.OP_ASINH: "asinh",
-    ca.OP_ACOSH: "acosh",
-    ca.OP_ATANH: "atanh",
-    ca.OP_ERF: "erf",
-    ca.OP_POW: "pow",
-    ca.OP_CONSTPOW: "pow",
-}
-LIBRARY = tuple(sorted(set(_LIBRARY.values())))
-"""Functions of the mathematical library that the text may call, one pose at a time."""
-
-
-def splat(value: float) -> str:
-    """Return a vector constant."""
-    bits = struct.unpack("<Q", struct.pack("<d", value))[0]
-    return f"<{', '.join([f'double 0x{bits:016X}'] * LANES)}>"
-
-
-_ZERO, _ONE = splat(0.0), splat(1.0)
-_OPERATIONS = {
-    ca.OP_ADD: "fadd {V} {0}, {1}",
-    ca.OP_SUB: "fsub {V} {0}, {1}",
-    ca.OP_MUL: "fmul {V} {0}, {1}",
-    ca.OP_DIV: "fdiv {V} {0}, {1}",
-    ca.OP_NEG: "fneg {V} {0}",
-    ca.OP_SQ: "fmul {V} {0}, {0}",
-    ca.OP_TWICE: "fadd {V} {0}, {0}",
-    ca.OP_INV: f"fdiv {{V}} {_ONE}, {{0}}",
-    ca.OP_SQRT: "call {V} @llvm.sqrt.v4f64({V} {0})",
-    ca.OP_FABS: "call {V} @llvm.fabs.v4f64({V} {0})",
-    ca.OP_FLOOR: "call {V} @llvm.floor.v4f64({V} {0})",
-    **{
-        operation: f"call {{V}} @all_{name}({{V}} {{0}}{', {V} {1}' if name == 'pow' else ''})"
-        for operation, name in _LIBRARY.items()
-    },
-}
-# A comparison, and what is chosen where it holds and where not.
-_CHOICES = {
-    ca.OP_LT: ("olt", "{0}, {1}", _ONE, _ZERO),
-    ca.OP_LE: ("ole", "{0}, {1}", _ONE, _ZERO),
-    ca.OP_EQ: ("oeq", "{0}, {1}", _ONE, _ZERO),
-    ca.OP_NE: ("une", "{0}, {1}", _ONE, _ZERO),
-    ca.OP_NOT: ("oeq", f"{{0}}, {_ZERO}", _ONE, _ZERO),
-    ca.OP_IF_ELSE_ZERO: ("une", f"{{0}}, {_ZERO}", "{1}", _ZERO),
-    ca.OP_FMIN: ("olt", "{0}, {1}", "{0}", "{1}"),
-    ca.OP_FMAX: ("ogt", "{0}, {1}", "{0}", "{1}"),
-}
+from softnlp.native.ir_functions import CALLED, LANES, LIBRARY, VECTOR, lane_by_lane, number, splat, vector_function
+from softnlp.native.kernels import B_ENDS, B_MIDDLE, WIDTH, Kernels, Newton, Step
 
 # Rows of vectors: combined, and moved between the arrays of all poses (rows, poses) and those of a few side by side.
 _HEAD = f"""
-declare {_V} @llvm.sqrt.v4f64({_V})
-declare {_V} @llvm.fabs.v4f64({_V})
-declare {_V} @llvm.floor.v4f64({_V})
+declare {VECTOR} @llvm.sqrt.v4f64({VECTOR})
+declare {VECTOR} @llvm.fabs.v4f64({VECTOR})
+declare {VECTOR} @llvm.floor.v4f64({VECTOR})
 """
 
 
@@ -107,15 +36,15 @@ done:
 
 
 def _at(word: str, array: str) -> str:
-    return f"  %{word}_at = getelementptr {_V}, ptr %{array}, i64 %i\n"
+    return f"  %{word}_at = getelementptr {VECTOR}, ptr %{array}, i64 %i\n"
 
 
 def _read(*arrays: str) -> str:
-    return "".join(_at(a, a) + f"  %{a}_i = load {_V}, ptr %{a}_at\n" for a in arrays)
+    return "".join(_at(a, a) + f"  %{a}_i = load {VECTOR}, ptr %{a}_at\n" for a in arrays)
 
 
 def _write(value: str, array: str) -> str:
-    return _at(array, array) + f"  store {_V} %{value}, ptr %{array}_at\n"
+    return _at(array, array) + f"  store {VECTOR} %{value}, ptr %{array}_at\n"
 
 
 _PLACE = """  %down = mul i64 %i, %poses
@@ -127,28 +56,37 @@ _MOVES = "".join(
         _rows("copy", "ptr %a, ptr %to", _read("a") + _write("a_i", "to")),
         _rows(
             "moved",
-            f"ptr %x, {_V} %step, ptr %k, ptr %to",
-            _read("x", "k") + f"  %far = fmul {_V} %step, %k_i\n  %sum = fadd {_V} %x_i, %far\n" + _write("sum", "to"),
+            f"ptr %x, {VECTOR} %step, ptr %k, ptr %to",
+            _read("x", "k")
+            + f"  %far = fmul {VECTOR} %step, %k_i\n  %sum = fadd {VECTOR} %x_i, %far\n"
+            + _write("sum", "to"),
         ),
         _rows(
             "weighed",
-            f"ptr %x, {_V} %h, ptr %a, ptr %b, ptr %c, ptr %d, ptr %to",
+            f"ptr %x, {VECTOR} %h, ptr %a, ptr %b, ptr %c, ptr %d, ptr %to",
             _read("x", "a", "b", "c", "d")
-            + f"  %wa = fmul {_V} {splat(B_ENDS)}, %a_i\n  %wb = fmul {_V} {splat(B_MIDDLE)}, %b_i\n"
-            + f"  %wc = fmul {_V} {splat(B_MIDDLE)}, %c_i\n  %wd = fmul {_V} {splat(B_ENDS)}, %d_i\n"
-            + f"  %ab = fadd {_V} %wa, %wb\n  %abc = fadd {_V} %ab, %wc\n  %all = fadd {_V} %abc, %wd\n"
-            + f"  %far = fmul {_V} %h, %all\n  %sum = fadd {_V} %x_i, %far\n"
+            + f"  %wa = fmul {VECTOR} {splat(B_ENDS)}, %a_i\n  %wb = fmul {VECTOR} {splat(B_MIDDLE)}, %b_i\n"
+            + f"  %wc = fmul {VECTOR} {splat(B_MIDDLE)}, %c_i\n  %wd = fmul {VECTOR} {splat(B_ENDS)}, %d_i\n"
+            + f"  %ab = fadd {VECTOR} %wa, %wb\n  %abc = fadd {VECTOR} %ab, %wc\n  %all = fadd {VECTOR} %abc, %wd\n"
+            + f"  %far = fmul {VECTOR} %h, %all\n  %sum = fadd {VECTOR} %x_i, %far\n"
             + _write("sum", "to"),
         ),
         _rows(
             "taken",
             "i64 %poses, i64 %first, ptr %all, ptr %to",
-            _PLACE + f"  %v = load {_V}, ptr %there, align 8\n" + _write("v", "to"),
+            _PLACE + f"  %v = load {VECTOR}, ptr %there, align 8\n" + _write("v", "to"),
+        ),
+        _rows(
+            "one",
+            "ptr %a, ptr %all",
+            _read("a")
+            + f"  %v = extractelement {VECTOR} %a_i, i32 0\n  %there = getelementptr double, ptr %all, i64 %i\n"
+            + "  store double %v, ptr %there",
         ),
         _rows(
             "given",
             "i64 %poses, i64 %first, ptr %a, ptr %all",
-            _PLACE + _read("a") + f"  store {_V} %a_i, ptr %there, align 8",
+            _PLACE + _read("a") + f"  store {VECTOR} %a_i, ptr %there, align 8",
         ),
     ]
 )
@@ -158,127 +96,32 @@ def llvm_text(kernels: Kernels) -> str | None:
     """Return a module with shoot_NAME(poses, intervals, data, state) for steps and apply_NAME(poses, given, found).
 
     poses is a multiple of `WIDTH`, intervals has an entry for each group of them, arrays are (rows, poses) of doubles.
-    A step that is traced has trace_NAME(poses, intervals, data, state, path) too, path (intervals, rows, poses).
+    A step that is solved has solve_NAME(poses, intervals, data, base, end, state, path, passes) too, for one pose in
+    all `LANES`: path (intervals, rows kept) are the states behind each interval, passes is 0 where none is found.
     None where a function holds an operation that has no translation.
     """
-    parts: list[str | None] = [_HEAD, _MOVES, *(_lane_by_lane(name) for name in LIBRARY)]
+    parts: list[str | None] = [_HEAD, _MOVES, *(lane_by_lane(name) for name in LIBRARY)]
     every = [f for step in kernels.steps.values() for f in step.functions.values()] + list(kernels.maps.values())
     called = {f.name(): f for function in every for f in function.find_functions()}
     called |= {f.name(): f for function in list(called.values()) for f in function.find_functions()}
-    parts += [_function(_CALLED + name, function, alone=True) for name, function in called.items()]
+    parts += [vector_function(CALLED + name, function, alone=True) for name, function in called.items()]
     for name, step in kernels.steps.items():
         for part, function in step.functions.items():
-            parts.append(_function(f"{name}_{part}", function))
+            parts.append(vector_function(f"{name}_{part}", function))
         parts.append(_shoot(name, step))
-        if name in kernels.traced:
-            parts.append(_shoot(name, step, traced=True))
+        if name in kernels.solved:
+            parts.append(_shoot(name, step, kept=kernels.solved[name].kept))
     for name, function in kernels.maps.items():
-        parts += [_function(name, function), _apply(name, function)]
+        parts += [vector_function(name, function), _apply(name, function)]
+    for name, newton in kernels.solved.items():
+        parts.append(_solve(name, kernels.steps[name], newton, kernels.maps[newton.update]))
     made = [part for part in parts if part is not None]
     return "".join(made) if len(made) == len(parts) else None
 
 
-def _lane_by_lane(name: str) -> str:
-    """Return a function of the mathematical library for a vector."""
-    takes = ("a", "b") if name == "pow" else ("a",)
-    lines = [f"declare double @{name}({', '.join('double' for _ in takes)})"]
-    lines.append(f"define internal {_V} @all_{name}({', '.join(f'{_V} %{t}' for t in takes)}) {{")
-    before = "poison"
-    for k in range(LANES):
-        lines += [f"  %{t}{k} = extractelement {_V} %{t}, i32 {k}" for t in takes]
-        lines.append(f"  %r{k} = call double @{name}({', '.join(f'double %{t}{k}' for t in takes)})")
-        lines.append(f"  %v{k} = insertelement {_V} {before}, double %r{k}, i32 {k}")
-        before = f"%v{k}"
-    return "\n".join([*lines, f"  ret {_V} {before}", "}", ""])
-
-
-def _function(name: str, function: ca.Function, *, alone: bool = False) -> str | None:
-    """Return a function of scalars as one of vectors, (inputs, output) being arrays of them; None where it cannot.
-
-    alone : whether it is called where it is needed and not made a part of what calls it.
-    """
-    operations = [function.instruction_id(k) for k in range(function.n_instructions())]
-    arrays = "".join(f"ptr %x{k}, " for k in range(function.n_in()))
-    lines = [f"define internal void @{name}({arrays}ptr %y) {'noinline ' if alone else ''}{{"]
-    nodes = function.instructions_sx() if function.find_functions() else None
-    calls = [] if nodes is None else [k for k in range(len(operations)) if operations[k] == ca.OP_CALL]
-    for k in calls:
-        rooms = (("in", function.instruction_input(k)), ("out", function.instruction_output(k)))
-        lines += [f"  %{way}{k} = alloca [{len(rows)} x {_V}], align 32" for way, rows in rooms]
-    registers: dict[int, str] = {}
-    for k, operation in enumerate(operations):
-        takes, gives = function.instruction_input(k), function.instruction_output(k)
-        words = [registers.get(i, "") for i in takes]
-        if operation == ca.OP_INPUT:
-            lines.append(f"  %p{k} = getelementptr {_V}, ptr %x{takes[0]}, i64 {takes[1]}")
-            lines.append(f"  %v{k} = load {_V}, ptr %p{k}")
-        elif operation == ca.OP_OUTPUT:
-            lines.append(f"  %p{k} = getelementptr {_V}, ptr %y, i64 {gives[1]}")
-            lines.append(f"  store {_V} {words[0]}, ptr %p{k}")
-            continue
-        elif operation == ca.OP_CONST:
-            registers[gives[0]] = splat(float(function.instruction_constant(k)))
-            continue
-        elif operation == ca.OP_ASSIGN:
-            registers[gives[0]] = words[0]
-            continue
-        elif operation == ca.OP_CALL and nodes is not None:
-            if nodes[k].which_function().n_in() != 1:  # a derivative, which nothing here has
-                return None
-            lines += _call(k, nodes[k].which_function(), words, gives, registers)
-            continue
-        elif operation in _CHOICES:
-            how, compared, yes, no = (part.format(*words) for part in _CHOICES[operation])
-            lines.append(f"  %c{k} = fcmp {how} {_V} {compared}")
-            lines.append(f"  %v{k} = select <{LANES} x i1> %c{k}, {_V} {yes}, {_V} {no}")
-        elif operation in _OPERATIONS:
-            text = _OPERATIONS[operation].format(*words, V=_V)
-            if alone and text[0] == "f":  # only a start is found by it: it need not be the same to the last bit
-                text = text.replace(" ", " contract ", 1)
-            lines.append(f"  %v{k} = {text}")
-        else:
-            return None
-        registers[gives[0]] = f"%v{k}"
-    return "\n".join([*lines, "  ret void", "}", ""])
-
-
-def _call(k: int, callee: ca.Function, words: list[str], gives: list[int], registers: dict[int, str]) -> list[str]:
-    """Return the call of a function of one column at instruction k; its results are registers from then on.
-
-    A function that refines is left out where the last entry of its column is below `ENOUGH` for all poses: its results
-    are then those entries that stand at the end of the column.
-    """
-    lines = []
-    for i, word in enumerate(words):
-        lines.append(f"  %i{k}_{i} = getelementptr {_V}, ptr %in{k}, i64 {i}")
-        lines.append(f"  store {_V} {word}, ptr %i{k}_{i}")
-    call = f"  call void @{_CALLED}{callee.name()}(ptr %in{k}, ptr %out{k})"
-    places = [f"  %o{k}_{i} = getelementptr {_V}, ptr %out{k}, i64 {i}" for i in range(len(gives))]
-    if callee.name() == REFINES:
-        kept = words[-len(gives) :]
-        lines += places
-        lines += [f"  store {_V} {word}, ptr %o{k}_{i}" for i, word in enumerate(kept)]
-        lines += [
-            f"  %near{k} = fcmp olt {_V} {kept[-1]}, {splat(ENOUGH)}",
-            f"  %bits{k} = bitcast <{LANES} x i1> %near{k} to i{LANES}",
-            f"  %all{k} = icmp eq i{LANES} %bits{k}, -1",
-            f"  br i1 %all{k}, label %past{k}, label %more{k}",
-            f"more{k}:",
-            call,
-            f"  br label %past{k}",
-            f"past{k}:",
-        ]
-    else:
-        lines += [call, *places]
-    for i, register in enumerate(gives):
-        lines.append(f"  %v{k}_{i} = load {_V}, ptr %o{k}_{i}")
-        registers[register] = f"%v{k}_{i}"
-    return lines
-
-
 def _room(sizes: dict[str, int]) -> str:
     """Return arrays of vectors on the stack."""
-    return "\n".join(f"  %{name} = alloca [{size} x {_V}], align 32" for name, size in sizes.items())
+    return "\n".join(f"  %{name} = alloca [{size} x {VECTOR}], align 32" for name, size in sizes.items())
 
 
 def _loop(body: Iterable[str]) -> str:
@@ -321,13 +164,67 @@ def _apply(name: str, function: ca.Function) -> str:
 def _all(word: str, value: str) -> list[str]:
     """Return a vector of one number."""
     return [
-        f"  %{word}_0 = insertelement {_V} poison, double %{value}, i32 0",
-        f"  %{word} = shufflevector {_V} %{word}_0, {_V} poison, <{LANES} x i32> zeroinitializer",
+        f"  %{word}_0 = insertelement {VECTOR} poison, double %{value}, i32 0",
+        f"  %{word} = shufflevector {VECTOR} %{word}_0, {VECTOR} poison, <{LANES} x i32> zeroinitializer",
     ]
 
 
-def _shoot(name: str, step: Step, *, traced: bool = False) -> str:
-    """Return the loop over poses and intervals of a step. traced : the state behind each interval is kept."""
+def _solve(name: str, step: Step, newton: Newton, update: ca.Function) -> str:
+    """Return the passes of Newton's method for entries of the state at the base."""
+    m, ends, count = step.state, update.size1_in(0) - step.state, update.size1_out(0) - 1
+    changes = []
+    for j in range(count):
+        changes += [
+            f"  %to{j} = getelementptr {VECTOR}, ptr %at_base, i64 {newton.first + j}",
+            f"  %by{j} = getelementptr {VECTOR}, ptr %found, i64 {1 + j}",
+            f"  %old{j} = load {VECTOR}, ptr %to{j}",
+            f"  %change{j} = load {VECTOR}, ptr %by{j}",
+            f"  %new{j} = fadd {VECTOR} %old{j}, %change{j}",
+            f"  store {VECTOR} %new{j}, ptr %to{j}",
+        ]
+    given = "ptr %in, ptr %base, ptr %end, ptr %state, ptr %path, ptr %passes"
+    lines = [
+        f"define void @solve_{name}(i64 %poses, ptr %intervals, {given}) {{",
+        "entry:",
+        _room({"at_base": m, "seen": m + ends, "found": 1 + count}),
+        f"  %after = getelementptr {VECTOR}, ptr %seen, i64 {m}",
+        f"  call void @taken(i64 {m}, i64 {LANES}, i64 0, ptr %base, ptr %at_base)",
+        f"  call void @taken(i64 {ends}, i64 {LANES}, i64 0, ptr %end, ptr %after)",
+        "  br label %pass",
+        "pass:",
+        "  %k = phi i64 [1, %entry], [%k_next, %onward]",
+        f"  call void @given(i64 {m}, i64 {LANES}, i64 0, ptr %at_base, ptr %state)",
+        f"  call void @trace_{name}(i64 {LANES}, ptr %intervals, ptr %in, ptr %state, ptr %path)",
+        f"  call void @taken(i64 {m}, i64 {LANES}, i64 0, ptr %state, ptr %seen)",
+        f"  call void @{newton.update}(ptr %seen, ptr %found)",
+        "  %size = load double, ptr %found",
+        f"  %near = fcmp ole double %size, {number(newton.converged)}",
+        "  br i1 %near, label %done, label %far",
+        "far:",
+        f"  %wild = fcmp uge double %size, {number(newton.hopeless)}",
+        f"  %last = icmp eq i64 %k, {newton.most}",
+        "  %stop = or i1 %wild, %last",
+        "  br i1 %stop, label %done, label %onward",
+        "onward:",
+        *changes,
+        "  %k_next = add i64 %k, 1",
+        "  br label %pass",
+        "done:",
+        "  %spent = phi i64 [%k, %pass], [0, %far]",
+        "  store i64 %spent, ptr %passes",
+        f"  call void @given(i64 {m}, i64 {LANES}, i64 0, ptr %at_base, ptr %base)",
+        "  ret void",
+        "}",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _shoot(name: str, step: Step, *, kept: int = 0) -> str:
+    """Return the loop over poses and intervals of a step.
+
+    kept : so many entries of the first pose's state are kept behind each interval.
+    """
     n, m = step.integrated, step.state
     same = f"  call void @copy(i64 {m}, ptr %here, ptr %x)"
     begin = same if step.begin is None else f"  call void @{name}_begin(ptr %here, ptr %data, ptr %at, ptr %x)"
@@ -340,16 +237,15 @@ def _shoot(name: str, step: Step, *, traced: bool = False) -> str:
         return f"  call void @{name}_rates(ptr %{x}, ptr %data, ptr %{at}, ptr %{k})"
 
     def moved(by: str, k: str) -> str:
-        return f"  call void @moved(i64 {n}, ptr %x, {_V} %{by}, ptr %{k}, ptr %stage)"
+        return f"  call void @moved(i64 {n}, ptr %x, {VECTOR} %{by}, ptr %{k}, ptr %stage)"
 
     head = f"define void @shoot_{name}(i64 %poses, ptr %intervals, ptr %in, ptr %state) {{\nentry:\n"
-    if traced:
+    if kept:
         head = f"define void @trace_{name}(i64 %poses, ptr %intervals, ptr %in, ptr %state, ptr %path) {{\nentry:\n"
         ends += [
-            f"  %size = mul i64 %poses, {m}",
-            "  %block = mul i64 %k, %size",
+            f"  %block = mul i64 %k, {kept}",
             "  %kept = getelementptr double, ptr %path, i64 %block",
-            f"  call void @given(i64 {m}, i64 %poses, i64 %first, ptr %here, ptr %kept)",
+            f"  call void @one(i64 {kept}, ptr %here, ptr %kept)",
         ]
     rooms = {"data": step.data, "here": m, "after": m, "at": 1, "middle": 1, "far": 1, "long": 1}
     rooms |= dict.fromkeys(("x", "stage", "reached", "k1", "k2", "k3", "k4"), n)
@@ -365,8 +261,8 @@ def _shoot(name: str, step: Step, *, traced: bool = False) -> str:
                 "  %K_real = sitofp i64 %K to double",
                 "  %one = fdiv double 1.0, %K_real",
                 *_all("h", "one"),
-                f"  %half = fmul {_V} {splat(0.5)}, %h",
-                f"  store {_V} %h, ptr %long",
+                f"  %half = fmul {VECTOR} {splat(0.5)}, %h",
+                f"  store {VECTOR} %h, ptr %long",
                 f"  call void @taken(i64 {step.data}, i64 %poses, i64 %first, ptr %in, ptr %data)",
                 f"  call void @taken(i64 {m}, i64 %poses, i64 %first, ptr %state, ptr %here)",
                 "  br label %interval",
@@ -375,11 +271,11 @@ def _shoot(name: str, step: Step, *, traced: bool = False) -> str:
                 "  %k_real = sitofp i64 %k to double",
                 "  %s_one = fmul double %k_real, %one",
                 *_all("s", "s_one"),
-                f"  %s_half = fadd {_V} %s, %half",
-                f"  %s_far = fadd {_V} %s, %h",
-                f"  store {_V} %s, ptr %at",
-                f"  store {_V} %s_half, ptr %middle",
-                f"  store {_V} %s_far, ptr %far",
+                f"  %s_half = fadd {VECTOR} %s, %half",
+                f"  %s_far = fadd {VECTOR} %s, %h",
+                f"  store {VECTOR} %s, ptr %at",
+                f"  store {VECTOR} %s_half, ptr %middle",
+                f"  store {VECTOR} %s_far, ptr %far",
                 begin,
                 rates("x", "at", "k1"),
                 moved("half", "k1"),
@@ -388,7 +284,7 @@ def _shoot(name: str, step: Step, *, traced: bool = False) -> str:
                 rates("stage", "middle", "k3"),
                 moved("h", "k3"),
                 rates("stage", "far", "k4"),
-                f"  call void @weighed(i64 {n}, ptr %x, {_V} %h, ptr %k1, ptr %k2, ptr %k3, ptr %k4, ptr %reached)",
+                f"  call void @weighed(i64 {n}, ptr %x, {VECTOR} %h, ptr %k1, ptr %k2, ptr %k3, ptr %k4, ptr %reached)",
                 *ends,
                 "  %k_next = add i64 %k, 1",
                 "  %under_way = icmp slt i64 %k_next, %K",

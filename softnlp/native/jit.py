@@ -26,7 +26,15 @@ class Machine:
             types = [ctypes.c_int64, *(ctypes.c_void_p for _ in arrays)]
             function = ctypes.CFUNCTYPE(None, *types)(self._engine.get_function_address(name))
             self._functions[name] = function
-        function(poses, *(array.ctypes.data for array in arrays))
+        function(poses, *map(_address, arrays))
+
+
+def _address(array: Any) -> int:
+    """Return where the numbers of an array are; asking NumPy takes four times as long."""
+    try:
+        return ctypes.addressof(ctypes.c_char.from_buffer(array))
+    except (TypeError, ValueError):  # of an array that is read only, or empty
+        return int(array.ctypes.data)
 
 
 def can_compile() -> bool:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import casadi as ca
 
@@ -50,14 +50,31 @@ class Step:
         return {name: function for name, function in parts.items() if function is not None}
 
 
+@dataclass(frozen=True)
+class Newton:
+    """How some entries of the state at the base are found from the state at the tip.
+
+    update : the map of [state at the tip, data of the pose's end] -> [size of what is off, changes of the entries].
+    first : the entries' first place in the state. kept : how many entries of states on the way are. converged,
+    hopeless : sizes at which it ends. most : passes.
+    """
+
+    update: str
+    first: int
+    kept: int
+    converged: float
+    hopeless: float
+    most: int
+
+
 @dataclass(frozen=True, eq=False)
 class Kernels:
     """What is done to many poses.
 
-    steps : by name. maps : by name, functions of one column to another. traced : names of steps whose states on the
-    way can be asked for.
+    steps : by name. maps : by name, functions of one column to another. solved : steps at whose base some entries are
+    found by Newton's method.
     """
 
     steps: Mapping[str, Step]
     maps: Mapping[str, ca.Function]
-    traced: Sequence[str] = ()
+    solved: Mapping[str, Newton] = field(default_factory=dict)

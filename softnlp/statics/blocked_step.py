@@ -15,7 +15,7 @@ from softnlp.model.rod import STATE_SIZE
 from softnlp.nlp.solver import EquationResidual, certificate, outputs
 from softnlp.statics.blocked_grid import Blocked
 from softnlp.statics.loadcase import RodFunctions
-from softnlp.statics.pose import SHAPE_POINTS, bending_angle, between_nodes, pose_of, pose_warnings, shape_of, stability
+from softnlp.statics.pose import pose_of, pose_warnings, shape_and_bend, shape_of, stability
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Contact, Pose, Step
 from softnlp.statics.wall import Wall
@@ -94,14 +94,13 @@ def solved_step(
             f"{Status.DIVERGED.advice}; on the branch followed the wall would have to pull with {-y[0] * F_0:.3g} N"
         )
         return Step(situation.pressure, Status.DIVERGED, message, iterations=iterations)
-    s = np.linspace(0, 1, SHAPE_POINTS)
     nodes = np.ascontiguousarray(grid.nodes(solution.x)[:STATE_SIZE])
-    shape = shape_of(between_nodes(poses.shape, nodes, found.constants, s), s, L_0, F_0)
+    s, values, bending = shape_and_bend(poses.shape, nodes, found.constants)
+    shape = shape_of(values, s, L_0, F_0)
     result = outputs(problem, solution)
     column = solution.p[: functions.section.size1_in(0)]
     unloaded = np.asarray(functions.arc(column, float(result["stretch"][0]), 1.0)).ravel()[:3] * L_0
     # The branch keeps the sign of its determinant, so it is as stable in the plane as the free shape it begins at.
-    bending = bending_angle(poses.shape, nodes, found.constants)
     pose = pose_of(model, result, shape, bending, unloaded, stability(situation.loads, free.stable))
     warnings = list(pose_warnings(model, pose))
     if found.slips is not None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, Protocol
 
 import casadi as ca
@@ -22,10 +24,12 @@ SHAPE_POINTS = 61
 LEAST_STRAIN, MOST_STRAIN = 0.5, 2.0
 """Strains v_z by loads outside these are told of: the stiffness is that at the stretch from pressure alone."""
 
+_SHAPE = np.linspace(0, 1, SHAPE_POINTS)
 _SUBSTEPS = 4  # to a point between nodes; 1 where the strains are dear
 # Of the bending angle's quadrature.
 _SAMPLES, _ZOOMS, _MOST_PARTS = 6, 12, 225
 _ENDS = (1 - np.cos(np.pi * np.arange(_SAMPLES) / (_SAMPLES - 1))) / 2  # Chebyshev points, 0 and 1 among them
+_MEAN = np.full(_SAMPLES, 1 / _SAMPLES)
 _TO_POWERS = np.linalg.inv(np.vander(_ENDS, increasing=True))
 _GRADES = np.append(0.0, 0.5 ** np.arange(16, -1, -1))  # from the least outwards
 _GRADED_GAUSS = np.polynomial.legendre.leggauss(4)
@@ -64,6 +68,18 @@ def between_nodes(function: Mapped, nodes: Array, constants: Array, s: Array) ->
     return np.asarray(function.map(s.size)(nodes[:, left], constants, (s - left / K)[None, :]))
 
 
+def shape_and_bend(function: Mapped, nodes: Array, constants: Array) -> tuple[Array, Array, float]:
+    """Return s of the shape's points (M,), what `between_nodes` gives there, and `bending_angle`, of a uniform rod.
+
+    Half as many parts as intervals do for the angle where the section has no kinks.
+    """
+    K = -(-_parts(nodes) // 2)
+    bend = _places(K)
+    every = between_nodes(function, nodes, constants, np.concatenate([_SHAPE, bend]))
+    length = float(unpack_section(constants).length)
+    return _SHAPE, every[:, :SHAPE_POINTS], _turned(every[21:23, SHAPE_POINTS:], K) * length
+
+
 def bending_angle(function: Mapped, nodes: Array, constants: Array, length: float | None = None) -> float:
     """Return the integral of sqrt(u_x^2 + u_y^2) over s [rad], to 1e-7 also where the curvature vanishes on the way.
 
@@ -73,18 +89,42 @@ def bending_angle(function: Mapped, nodes: Array, constants: Array, length: floa
     Where it changes little its norm is smooth too; elsewhere the quadrature of the norm is graded towards the point
     where that is smallest.
     """
-    K = min(nodes.shape[1] - 1, _MOST_PARTS)
+    K = _parts(nodes)
     length = float(unpack_section(constants).length) if length is None else length  # in L_0
-    s = ((np.arange(K)[:, None] + _ENDS[:-1]) / K).ravel()
-    u = between_nodes(function, nodes, constants, np.append(s, 1.0))[21:23]
-    last = u[:, _SAMPLES - 1 :: _SAMPLES - 1]  # the right end of each interval is the left one of the next
-    values = np.concatenate([u[:, :-1].reshape(2, K, -1), last[:, :, None]], axis=2)
-    middle = values.mean(axis=2, keepdims=True)
-    away = np.abs(values - middle).sum(axis=0).max(axis=1)
-    smooth = away < _LITTLE * np.hypot(*middle[:, :, 0])
-    total = np.hypot(*(values[:, smooth] @ _TO_GAUSS)) @ _GAUSS[1]
-    angle: float = (np.sum(total) + np.sum(_graded(values[:, ~smooth]))).item() * length / K
-    return angle
+    return _turned(between_nodes(function, nodes, constants, _places(K))[21:23], K) * length
+
+
+def _parts(nodes: Array) -> int:
+    """Return into how many parts the quadrature of the bending angle cuts the rod."""
+    return min(int(nodes.shape[1]) - 1, _MOST_PARTS)
+
+
+@lru_cache(maxsize=16)
+def _places(K: int) -> Array:
+    """Return s of the samples in K parts and at the tip."""
+    s = np.append(((np.arange(K)[:, None] + _ENDS[:-1]) / K).ravel(), 1.0)
+    s.flags.writeable = False
+    return s
+
+
+@lru_cache(maxsize=16)
+def _parts_of(K: int) -> NDArray[np.intp]:
+    """Return where the samples of each part are (K, samples): the right end of one is the left end of the next."""
+    return np.arange(K)[:, None] * (_SAMPLES - 1) + np.arange(_SAMPLES)
+
+
+def _turned(u: Array, K: int) -> float:
+    """Return the integral over s of the norm of a curvature (2, samples) at `_places`."""
+    values = u[:, _parts_of(K)]
+    middle = values @ _MEAN
+    away = np.abs(values - middle[:, :, None])
+    smooth = (away[0] + away[1]).max(axis=1) < _LITTLE * np.hypot(middle[0], middle[1])
+    rest = 0.0
+    if not smooth.all():
+        rest = float(_graded(values[:, ~smooth]).sum())
+        values = values[:, smooth]
+    x, y = values @ _TO_GAUSS
+    return (float((np.hypot(x, y) @ _GAUSS[1]).sum()) + rest) / K
 
 
 def _graded(values: Array) -> Array:
@@ -147,15 +187,15 @@ def pose_of(
     stretch = float(outputs["stretch"][0])
     R = np.asarray(outputs["tip_rotation"])
     tip = np.asarray(outputs["tip_position"])
-    axis = R[:, 2]
+    x, y, z = R[:, 2].tolist()
     return Pose(
         stretch=stretch,
-        stable=None if np.min(shape.shear_extension[:, 2]) <= 0 else stable,
+        stable=None if shape.shear_extension[:, 2].min() <= 0 else stable,
         tip_position=tip,
         tip_displacement=tip - unloaded_tip,
         tip_rotation=R,
         bending_angle=bending,
-        tilt=float(np.arctan2(np.hypot(axis[0], axis[1]), axis[2])),
+        tilt=math.atan2(math.hypot(x, y), z),
         backbone_length=float(outputs["backbone_length"][0]),
         chamber_length=np.atleast_1d(outputs["chamber_lengths"]),
         radii=model.section.outline(model.numbers, stretch),
@@ -179,7 +219,8 @@ def shape_warnings(pose: Pose) -> tuple[str, ...]:
         found.append(
             "stability is undefined: a dead tip moment in space has no potential, so there is no energy to be least"
         )
-    low, high = (float(v) for v in (pose.shape.shear_extension[:, 2].min(), pose.shape.shear_extension[:, 2].max()))
+    along = pose.shape.shear_extension[:, 2]
+    low, high = float(along.min()), float(along.max())
     if 0 < low < LEAST_STRAIN or high > MOST_STRAIN:
         found.append(
             f"the load strains the rod to {low if low < LEAST_STRAIN else high:.3g} of its length somewhere (v_z): the "

@@ -13,7 +13,7 @@ from softnlp.model.quantities import Model
 from softnlp.model.rod import Loads
 from softnlp.nlp.solver import certificate, outputs
 from softnlp.statics.compiled import RodEquations
-from softnlp.statics.pose import SHAPE_POINTS, bending_angle, between_nodes, pose_of, pose_warnings, shape_of, stability
+from softnlp.statics.pose import pose_of, pose_warnings, shape_and_bend, shape_of, stability
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.proposed import certificate as certificate_of
 from softnlp.statics.proposed import outputs_of
@@ -43,9 +43,8 @@ def solved_step(
         result, lines = outputs(problem, solution), certificate(problem, solution)
         L_0, F_0 = (float(v) for v in np.asarray(problem.units(solution.x, solution.p)).ravel())
         arc_tip = np.asarray(equations.functions.arc(solution.p, float(result["stretch"][0]), 1.0)).ravel()[:3]
-    s = np.linspace(0, 1, SHAPE_POINTS)
-    shape = shape_of(between_nodes(equations.shape, solved.nodes, solved.constants, s), s, L_0, F_0)
-    bending = bending_angle(equations.shape, solved.nodes, solved.constants)
+    s, values, bending = shape_and_bend(equations.shape, solved.nodes, solved.constants)
+    shape = shape_of(values, s, L_0, F_0)
     pose = pose_of(model, result, shape, bending, arc_tip * L_0, stability(loads, solved.stable))
     warnings = list(pose_warnings(model, pose))
     if solved.error > numerics.accuracy:

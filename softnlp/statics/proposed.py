@@ -65,18 +65,17 @@ def outputs_of(at: AtStretch, shot: Shot) -> dict[str, Array]:
 
 def residual(at: AtStretch, shot: Shot) -> float:
     """Return the largest scaled error of any equation."""
-    return float(max(abs(at.imbalance), shot.gaps.max(), np.abs(shot.tip).max()))
+    return float(np.abs(np.concatenate([shot.gaps, shot.tip.ravel(), [at.imbalance]])).max())
 
 
 def certificate(at: AtStretch, shot: Shot) -> tuple[EquationResidual, ...]:
     """Return the largest residual of every equation of a load case, in its unit and scaled."""
     L_0, F_0 = at.length_unit, at.force_unit
     units = {"position": ("m", L_0), "rotation": ("1", 1.0), "force": ("N", F_0), "moment": ("N m", F_0 * L_0)}
+    gaps = shot.gaps.tolist()
     off = [("stretch balance", abs(at.imbalance), *units["force"])]
     off += [("base position", 0.0, *units["position"]), ("base orientation", 0.0, *units["rotation"])]
-    off += [(f"continuity of {name}", shot.gaps[rows].max(), *units[name]) for name, rows in _BLOCKS.items()]
-    off += [
-        (f"tip {name}", np.abs(rows).max(), *units[name])
-        for name, rows in zip(("force", "moment"), shot.tip, strict=True)
-    ]
-    return tuple(EquationResidual(name, float(v) * scale, unit, float(v)) for name, v, unit, scale in off)
+    off += [(f"continuity of {name}", max(gaps[rows]), *units[name]) for name, rows in _BLOCKS.items()]
+    tips = zip(("force", "moment"), shot.tip.tolist(), strict=True)
+    off += [(f"tip {name}", max(map(abs, rows)), *units[name]) for name, rows in tips]
+    return tuple(EquationResidual(name, v * scale, unit, v) for name, v, unit, scale in off)

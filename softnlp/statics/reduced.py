@@ -109,11 +109,7 @@ def _directions(state: Any, rates: Any, given: list[Any]) -> Step:
     V, worst = ca.SX.sym("V", STATE, 3), ca.SX.sym("certainty")
     x = ca.vertcat(state, ca.vec(V))
     R = ca.reshape(state[ROTATION], 3, 3)
-    turns = []
-    for j in range(3):
-        W = ca.reshape(V[ROTATION, j], 3, 3) @ R.T
-        turns.append(ca.vertcat(W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]))
-    U = ca.horzcat(*turns)
+    U = turned(R, V)
     before = ca.vertcat(ca.SX.sym("before", 4 * STATE), worst)
     return Step(
         rates=function("rates", [x, data, s], ca.vertcat(rates, ca.vec(ca.jtimes(rates, state, V)))),
@@ -146,6 +142,15 @@ def checked(functions: RodFunctions, full: Any, state: Any, rates: Any, given: l
             ca.vertcat(state, ca.fmax(gap, ca.norm_inf(y - there)), integrals, sharper),
         ),
     )
+
+
+def turned(R: Any, V: Any) -> Any:
+    """Return twice the turns (3, 3) of R that derivatives of a state (15, 3) are, world frame, one per column."""
+    turns = []
+    for j in range(3):
+        W = ca.reshape(V[ROTATION, j], 3, 3) @ R.T
+        turns.append(ca.vertcat(W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]))
+    return ca.horzcat(*turns)
 
 
 def smallest_minor(S: Any) -> Any:

@@ -8,8 +8,9 @@ certain, nothing is returned and the general solver has its turn.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -17,10 +18,20 @@ from numpy.typing import NDArray
 
 from softnlp.model.quantities import LOADS
 from softnlp.model.rod import STATE_SIZE
-from softnlp.native.kernels import Kernels, Step
+from softnlp.native.kernels import Kernels, Newton, Step
 from softnlp.native.shooting import Compiled, shooting
 from softnlp.statics.loadcase import RodFunctions, whole_weight
-from softnlp.statics.reduced import MOMENT, POSITION, ROTATION, STATE, base_state, function, reduced_rod
+from softnlp.statics.reduced import (
+    MOMENT,
+    POSITION,
+    ROTATION,
+    STATE,
+    base_state,
+    function,
+    reduced_rod,
+    smallest_minor,
+    turned,
+)
 from softnlp.statics.stretches import Stretches, stretch_maps
 
 Array = NDArray[np.float64]
@@ -30,6 +41,7 @@ _CONVERGED = 1e-11  # scaled residual of the tip
 _DIVERGED = 1e3
 _RICHARDSON = 16 / 15  # a fourth-order method's error over its change from halving every step
 _SUBSTEPS = 4  # between nodes
+_NEWTON_STEPS, _SETTLED = 3, 1e-12  # of the stretch, from between two samples 0.005 apart
 _MOST_CURVES = 4
 
 _BASE = base_state(np.zeros((3, 1)))[:, 0]
@@ -75,6 +87,7 @@ class SingleShooting:
         self._functions = functions
         self._code = code
         self._curves: OrderedDict[bytes, Stretches] = OrderedDict()
+        self._integrals = functions.lengths.size1_out(0)
         start, self._where = 0, dict[str, slice]()
         for name, q in functions.declared().items():
             self._where[name] = slice(start, start + q.size)
@@ -99,48 +112,45 @@ class SingleShooting:
         self._curves[key] = curve
         if len(self._curves) > _MOST_CURVES:
             self._curves.popitem(last=False)
-        stretch, known = curve.find(column[:, None])
-        if not known[0]:
-            return None
-        found = self._code.apply("section", np.append(column, stretch)[:, None])[:, 0]
-        imbalance, length_unit, force_unit = (float(v) for v in found[-6:-3])
-        return AtStretch(float(stretch[0]), found[:-6], imbalance, length_unit, force_unit, found[-3:])
+        if self._functions.model.section.coupled:
+            stretches, known = curve.find(column[:, None])
+            if not known[0]:
+                return None
+            stretch, found = float(stretches[0]), self._code.apply_one("section", np.append(column, stretches))
+        else:
+            settled = self._code.apply_one("settled", np.append(column, curve.starts(column[:, None])))
+            (stretch, change), found = settled[:2].tolist(), settled[2:]
+            if not abs(change) <= _SETTLED:
+                return None
+        imbalance, length_unit, force_unit = found[-6:-3].tolist()
+        return AtStretch(stretch, found[:-6], imbalance, length_unit, force_unit, found[-3:])
 
     def shoot(self, at: AtStretch, force: Array, moment: Array, intervals: int, start: Array) -> Shot | None:
         """Return the pose on a grid that Newton's method reaches from a base moment (3,); scaled loads (3,)."""
         data = np.concatenate([at.constants, force, moment])
         state = _BASE.copy()
         state[MOMENT] = start
-        passes = 0
-        while True:
-            path = self._code.trace_one("directions", intervals, data, state)
-            reached = path[-1]
-            off = reached[MOMENT] - moment
-            size = float(np.abs(off).max())
-            passes += 1
-            if not size < _DIVERGED or (size > _CONVERGED and passes == _PASSES):
-                return None
-            tangents = reached[STATE : 4 * STATE].reshape(3, STATE)
-            J = tangents[:, MOMENT].T
-            if size <= _CONVERGED:
-                break
-            state[MOMENT] -= np.linalg.solve(J, off)
-        if not (reached[4 * STATE] > 0 and _pushes_back(reached[ROTATION], tangents[:, ROTATION], J)):
+        passes, base, reached, path = self._code.solve_one("directions", intervals, data, state, moment)
+        if not passes:
+            return None
+        fine = self._code.run_one("value", 2 * intervals, data, base[:STATE])
+        judged = self._code.apply_one("judged", np.concatenate([reached, moment, fine]))
+        least, error, rotation_error = judged.tolist()
+        if not least > 0:
             return None
         s = np.arange(intervals + 1) / intervals
         nodes = np.empty((STATE_SIZE, intervals + 1))
-        nodes[:12], nodes[15:] = path[:, :12].T, path[:, MOMENT].T
+        nodes[:12, 0], nodes[15:, 0] = base[:12], base[MOMENT]
+        nodes[:12, 1:], nodes[15:, 1:] = path[:, :12].T, path[:, MOMENT].T
         nodes[12:15] = force[:, None] + whole_weight(at.constants)[:, None] * (1 - s)
         ends = self._stepped(nodes[:, :-1], at.constants, 1 / intervals)
-        fine = self._code.run_one("value", 2 * intervals, data, state[:STATE])
-        change = fine - reached[:STATE] + np.linalg.solve(J, moment - fine[MOMENT]) @ tangents
         return Shot(
             nodes=nodes,
             gaps=np.abs(ends[:STATE_SIZE] - nodes[:, 1:]).max(axis=1),
-            tip=np.stack([nodes[12:15, -1] - force, off]),
+            tip=np.stack([nodes[12:15, -1] - force, reached[MOMENT] - moment]),
             integrals=ends[STATE_SIZE:].sum(axis=1),
-            error=_RICHARDSON * float(np.linalg.norm(change[POSITION])),
-            rotation_error=_RICHARDSON * float(np.linalg.norm(change[ROTATION]) / np.sqrt(2)),
+            error=error,
+            rotation_error=rotation_error,
             passes=passes,
         )
 
@@ -149,25 +159,71 @@ class SingleShooting:
         return self._between
 
     def _between(self, nodes: Array, constants: Array, h: Array) -> Array:
-        column = np.asarray(constants).reshape(-1, 1)
-        data = np.vstack([np.repeat(column, h.size, axis=1), np.reshape(h, (1, -1))])
+        data = _with_step(constants, h)
         ends = self._code.run_each("between", _SUBSTEPS, data, nodes)
-        return np.vstack([ends, self._code.apply("strains", np.vstack([ends, data[:-1]]))])
+        return np.concatenate([ends, self._code.apply("strains", np.concatenate([ends, data[:-1]]))])
 
     def _stepped(self, nodes: Array, constants: Array, h: float) -> Array:
         """Return states a step of RK4 further than nodes, and the integrals over it: (18 + N + 2, n)."""
-        n = nodes.shape[1]
-        data = np.repeat(np.append(constants, h)[:, None], n, axis=1)
-        integrals = np.zeros((self._functions.lengths.size1_out(0), n))
-        return self._code.run_each("interval", 1, data, np.vstack([nodes, integrals]))
+        integrals = np.zeros((self._integrals, nodes.shape[1]))
+        data = _with_step(constants, np.full((1, nodes.shape[1]), h))
+        return self._code.run_each("interval", 1, data, np.concatenate([nodes, integrals]))
 
 
-def _pushes_back(R: Array, turned: Array, J: Array) -> bool:
-    """Whether a turn of the tip, held by its moment alone, meets a moment against it: the form is positive definite."""
-    W = turned.reshape(3, 3, 3).transpose(0, 2, 1) @ R.reshape(3, 3)  # dR R^T, of each direction
-    U = np.stack([W[:, 2, 1] - W[:, 1, 2], W[:, 0, 2] - W[:, 2, 0], W[:, 1, 0] - W[:, 0, 1]])
-    form = U.T @ J
-    return bool(np.linalg.eigvalsh(form + form.T)[0] > 0)
+def _with_step(constants: Array, h: Array) -> Array:
+    """Return the constants beside each step (1, n) and the steps: (constants + 1, n)."""
+    data = np.empty((constants.size + 1, h.size))
+    data[:-1], data[-1] = np.reshape(constants, (-1, 1)), h
+    return data
+
+
+def _settled(maps: Mapping[str, ca.Function]) -> ca.Function:
+    """Return [every quantity, a stretch near a root] -> [the root, the last change, what "section" gives there]."""
+    given = ca.SX.sym("given", maps["balance"].size1_in(0))
+    column, stretch, change = given[:-1], given[-1], ca.SX(0)
+    for _ in range(_NEWTON_STEPS):
+        rows = maps["balance"](ca.vertcat(column, stretch))
+        change = -rows[0] / rows[1]
+        stretch += change
+    return function("settled", [given], ca.vertcat(stretch, change, maps["section"](ca.vertcat(column, stretch))))
+
+
+def _newton() -> ca.Function:
+    """Return [state at the tip, moment there] -> [largest entry of what is off, Newton's change of M(0)]."""
+    given = ca.SX.sym("given", 4 * STATE + 4)
+    off = given[MOMENT] - given[-3:]
+    change = -_inverse(_tangents(given)[MOMENT, :]) @ off
+    return function("newton", [given], ca.vertcat(ca.norm_inf(off), change))
+
+
+def _judged() -> ca.Function:
+    """Return [state at the tip, moment there, the state by half the step] -> [stability, error, error of rotation].
+
+    stability : positive where no point on the way is conjugate to the base for certain, and where a turn of the tip,
+    held by its moment alone, meets a moment against it.
+    """
+    given = ca.SX.sym("given", 5 * STATE + 4)
+    reached, moment, fine = given[: 4 * STATE + 1], given[4 * STATE + 1 : 4 * STATE + 4], given[4 * STATE + 4 :]
+    V = _tangents(reached)
+    J = V[MOMENT, :]
+    R = ca.reshape(reached[ROTATION], 3, 3)
+    form = turned(R, V).T @ J
+    change = fine - reached[:STATE] + V @ (_inverse(J) @ (moment - fine[MOMENT]))
+    errors = ca.norm_2(change[POSITION]), ca.norm_2(change[ROTATION]) / np.sqrt(2)
+    least = ca.fmin(reached[4 * STATE], smallest_minor(form + form.T))
+    return function("judged", [given], ca.vertcat(least, *(_RICHARDSON * error for error in errors)))
+
+
+def _tangents(reached: Any) -> Any:
+    """Return the derivatives (15, 3) of a state by M(0)."""
+    return ca.reshape(reached[STATE : 4 * STATE], STATE, 3)
+
+
+def _inverse(J: Any) -> Any:
+    """Return the inverse of a 3x3 matrix by its cofactors."""
+    a, b, c = (J[:, k] for k in range(3))
+    rows = [ca.cross(b, c), ca.cross(c, a), ca.cross(a, b)]
+    return ca.horzcat(*rows).T / ca.dot(a, rows[0])
 
 
 def single_shooting(functions: RodFunctions) -> SingleShooting | None:
@@ -187,6 +243,8 @@ def single_shooting(functions: RodFunctions) -> SingleShooting | None:
     given = ca.SX.sym("given", maps["section"].size1_in(0))
     arc = functions.arc(given[:-1], given[-1], 1.0)
     maps["section"] = function("section", [given], ca.vertcat(maps["section"](given), arc[:3]))
+    if not functions.model.section.coupled:
+        maps["settled"] = _settled(maps)
     kernels = Kernels(
         {
             "directions": reduced.directions,
@@ -194,8 +252,8 @@ def single_shooting(functions: RodFunctions) -> SingleShooting | None:
             "interval": Step(function("interval", [with_integrals, data, s], h * ca.vertcat(*along))),
             "between": Step(function("between", [x, data, s], h * functions.field(x, c))),
         },
-        {"strains": function("strains", [state], strains), **maps},
-        traced=("directions",),
+        {"strains": function("strains", [state], strains), "newton": _newton(), "judged": _judged(), **maps},
+        solved={"directions": Newton("newton", MOMENT.start, STATE, _CONVERGED, _DIVERGED, _PASSES)},
     )
     code = shooting(kernels)
     return SingleShooting(functions, code) if isinstance(code, Compiled) else None

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import casadi as ca
@@ -65,8 +66,14 @@ class PoseSolver:
     def _set_model(self, model: Model) -> None:
         self.model = model
         self.quantities = self.equations.quantities_of(model)
-        self._numbers = {name: q.nominal for name, q in self.quantities.items()}
+        self._set_numbers({name: q.nominal for name, q in self.quantities.items()})
         self.ahead: tuple[Array, tuple[Step, Solved | None]] | None = None  # what a wall's place has asked for already
+
+    def _set_numbers(self, numbers: Mapping[str, Any]) -> None:
+        self._numbers = dict(numbers)
+        self._column = np.concatenate([np.ravel(v).astype(float) for v in self._numbers.values()])
+        starts = np.cumsum([0, *(q.size for q in self.quantities.values())]).tolist()
+        self._places = {name: slice(*ends) for name, ends in zip(self.quantities, pairwise(starts), strict=True)}
 
     @property
     def branch(self) -> ca.Function:
@@ -93,7 +100,7 @@ class PoseSolver:
     def with_values(self, values: Mapping[str, Any]) -> PoseSolver:
         """Return a solver with other values [SI] of its quantities, which need not be possible ones of a model."""
         other = copy(self)
-        other._numbers = {**self._numbers, **{name: v for name, v in values.items() if name in self.quantities}}
+        other._set_numbers({**self._numbers, **{name: v for name, v in values.items() if name in self.quantities}})
         return other
 
     def grid(self, intervals: int, transcription: Transcribing | None = None) -> Grid:
@@ -307,7 +314,14 @@ class PoseSolver:
 
     def column(self, values: Mapping[str, Any]) -> Array:
         """Return every quantity in its order, SI."""
-        return np.concatenate([np.ravel(values.get(name, q.nominal)) for name, q in self.quantities.items()])
+        column = self._column.copy()
+        for name, at in self._places.items():
+            value = values.get(name)
+            if value is None:
+                column[at] = self.quantities[name].nominal
+            elif value is not self._numbers[name]:
+                column[at] = np.ravel(value)
+        return column
 
     def _stretch(self, values: Mapping[str, Any]) -> float:
         """Return the stretch on the branch from zero pressure at the pressure in `values`."""

@@ -149,10 +149,13 @@ class Pose:
         """Whether a body can take the shape, found when it is first asked for."""
         shape = self.shape
         bend, v_z = np.hypot(shape.curvature[:, 0], shape.curvature[:, 1]), shape.shear_extension[:, 2]
-        curvature = np.full(bend.shape, np.inf)
-        np.divide(bend, v_z, out=curvature, where=v_z > 0)
+        if v_z.min() > 0:
+            curvature = bend / v_z
+        else:
+            curvature = np.full(bend.shape, np.inf)
+            np.divide(bend, v_z, out=curvature, where=v_z > 0)
         radii = self.radii if self.outline is None else self.outline
-        return fit_of(shape.position, shape.rotation, radii.outer, curvature)
+        return fit_of(shape.position, shape.rotation, radii.outer, curvature, self.bending_angle)
 
 
 @dataclass(frozen=True)

@@ -69,34 +69,36 @@ class Stretches:
 
     def find(self, columns: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Return the stretch of each pose, and whether it is on the branch for certain; NaN where it is not."""
-        n = columns.shape[1]
         if self._coupled:
             return self._followed(columns)
+        start = self.starts(columns)
+        stretch, known = np.full(start.size, np.nan), np.isfinite(start)
+        known[known] = self._polish(columns[:, known], start, known)
+        stretch[known] = start[known]
+        stretch[known & (columns[: self._sets].sum(axis=0) == 0)] = 1.0
+        return stretch, known
+
+    def starts(self, columns: Array) -> Array:
+        """Return stretches (poses,) between two samples of the curve, NaN beyond it: where Newton's method begins."""
         total = columns[: self._sets].sum(axis=0)
-        stretch = np.full(n, np.nan)
         if not self._by_sum:
-            return stretch, np.zeros(n, bool)
+            return np.full(total.size, np.nan)
         if self._shared:
             if self._curve is None:
                 sums, safe = self._sampled(columns[:, :1])
                 self._curve = sums[0, : safe[0]], self._grid[: safe[0]]
-            sums, grid = self._curve
-            start = np.interp(total, sums, grid, right=np.nan)
-        else:
-            sums, safe = self._sampled(columns)
-            beyond = np.arange(self._grid.size) >= safe[:, None]
-            above = np.argmax((sums >= total[:, None]) | beyond, axis=1)
-            inside = above < safe
-            k = np.clip(above, 1, None)
-            poses = np.arange(n)
-            low, high = sums[poses, k - 1], sums[poses, k]
-            part = np.where(inside, (total - low) / (high - low), np.nan)
-            start = self._grid[k - 1] + part * (self._grid[k] - self._grid[k - 1])
-        known = np.isfinite(start)
-        known[known] = self._polish(columns[:, known], start, known)
-        stretch[known] = start[known]
-        stretch[known & (total == 0)] = 1.0
-        return stretch, known
+            start: Array = np.interp(total, *self._curve, right=np.nan)
+            return start
+        sums, safe = self._sampled(columns)
+        beyond = np.arange(self._grid.size) >= safe[:, None]
+        above = np.argmax((sums >= total[:, None]) | beyond, axis=1)
+        inside = above < safe
+        k = np.clip(above, 1, None)
+        poses = np.arange(total.size)
+        low, high = sums[poses, k - 1], sums[poses, k]
+        part = np.where(inside, (total - low) / (high - low), np.nan)
+        between: Array = self._grid[k - 1] + part * (self._grid[k] - self._grid[k - 1])
+        return between
 
     def _followed(self, columns: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Return the same of sections that bend with the pressure: followed in equal parts of it."""
