@@ -83,13 +83,13 @@ class Fit:
 
 
 def fit_of(
-    position: Array, rotation: Array, radius: float | Array, curvature: Array | None = None, turn: float = np.inf
+    position: Array, rotation: Array, radius: float | Array, curvature: Array | None = None, most_turn: float = np.inf
 ) -> Fit:
     """Return how a shape suits a body.
 
     position : (M, 3) of the axis [m]. rotation : (M, 3, 3), columns are the body axes. radius : outer, deformed, one
     or (M,) [m]. curvature : (M,) of the axis per its deformed length [1/m], inf where v_z <= 0; by default that of the
-    screws between stations, with one radius. turn : what the axis does not turn more than, where that is known [rad].
+    screws between stations, with one radius. most_turn : of the axis, where that is known [rad].
     """
     if curvature is None:
         chord = np.linalg.norm(np.diff(position, axis=0), axis=1)
@@ -97,7 +97,7 @@ def fit_of(
         with np.errstate(divide="ignore", invalid="ignore"):  # a circular arc over this chord
             curvature = np.where(advances(position, rotation) > 0, 2 * np.sin(turn / 2) / chord, np.inf)
     tightness = float(np.max(curvature * radius))
-    if turn <= TURN:
+    if most_turn <= TURN:
         return Fit(tightness, overlaps=False)
     return Fit(tightness, bool(overlapping(position[None], rotation[None, :, :, 2], np.asarray(radius)[None])[0]))
 

@@ -68,12 +68,15 @@ def between_nodes(function: Mapped, nodes: Array, constants: Array, s: Array) ->
     return np.asarray(function.map(s.size)(nodes[:, left], constants, (s - left / K)[None, :]))
 
 
-def shape_and_bend(function: Mapped, nodes: Array, constants: Array) -> tuple[Array, Array, float]:
+def shape_and_bend(
+    function: Mapped, nodes: Array, constants: Array, *, fine: bool = False
+) -> tuple[Array, Array, float]:
     """Return s of the shape's points (M,), what `between_nodes` gives there, and `bending_angle`, of a uniform rod.
 
-    Half as many parts as intervals do for the angle where the section has no kinks.
+    fine : whether the grid was refined to an accuracy, so that half as many parts as intervals do for the angle.
     """
-    K = -(-_parts(nodes) // 2)
+    K = _parts(nodes)
+    K = -(-K // 2) if fine else K
     bend = _places(K)
     every = between_nodes(function, nodes, constants, np.concatenate([_SHAPE, bend]))
     length = float(unpack_section(constants).length)

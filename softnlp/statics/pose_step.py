@@ -43,7 +43,8 @@ def solved_step(
         result, lines = outputs(problem, solution), certificate(problem, solution)
         L_0, F_0 = (float(v) for v in np.asarray(problem.units(solution.x, solution.p)).ravel())
         arc_tip = np.asarray(equations.functions.arc(solution.p, float(result["stretch"][0]), 1.0)).ravel()[:3]
-    s, values, bending = shape_and_bend(equations.shape, solved.nodes, solved.constants)
+    fine = solved.shot is not None and numerics.intervals is None
+    s, values, bending = shape_and_bend(equations.shape, solved.nodes, solved.constants, fine=fine)
     shape = shape_of(values, s, L_0, F_0)
     pose = pose_of(model, result, shape, bending, arc_tip * L_0, stability(loads, solved.stable))
     warnings = list(pose_warnings(model, pose))

@@ -159,7 +159,7 @@ class SingleShooting:
         return self._between
 
     def _between(self, nodes: Array, constants: Array, h: Array) -> Array:
-        data = _with_step(constants, h)
+        data = _with_step(np.asarray(constants, dtype=float).ravel(), np.asarray(h))
         ends = self._code.run_each("between", _SUBSTEPS, data, nodes)
         return np.concatenate([ends, self._code.apply("strains", np.concatenate([ends, data[:-1]]))])
 
@@ -173,7 +173,7 @@ class SingleShooting:
 def _with_step(constants: Array, h: Array) -> Array:
     """Return the constants beside each step (1, n) and the steps: (constants + 1, n)."""
     data = np.empty((constants.size + 1, h.size))
-    data[:-1], data[-1] = np.reshape(constants, (-1, 1)), h
+    data[:-1], data[-1] = constants[:, None], h
     return data
 
 
