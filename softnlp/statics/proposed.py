@@ -29,7 +29,7 @@ def proposed(
     if at is None:
         return None
     force, moment = single.loads(column, at)
-    loaded = bool(np.any(single.dead_loads(column)))
+    loaded = single.loaded(column)
     first = numerics.intervals or first_intervals("multiple-shooting", at.constants, moment, None if loaded else target)
     size, start = first, np.zeros(3)
     if near is not None:

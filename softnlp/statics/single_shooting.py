@@ -93,9 +93,9 @@ class SingleShooting:
             self._where[name] = slice(start, start + q.size)
             start += q.size
 
-    def dead_loads(self, column: Array) -> Array:
-        """Return tip force, tip moment and gravity (9,) in a column of every quantity [SI]."""
-        return np.concatenate([column[self._where[name]] for name in LOADS])
+    def loaded(self, column: Array) -> bool:
+        """Whether tip force, tip moment or gravity acts, in a column of every quantity [SI]."""
+        return bool(column[self._where[LOADS[0]].start : self._where[LOADS[-1]].stop].any())
 
     def loads(self, column: Array, at: AtStretch) -> tuple[Array, Array]:
         """Return the scaled tip force and moment (3,)."""
