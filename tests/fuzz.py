@@ -273,8 +273,9 @@ def change_bytes(content: bytes, rng: random.Random) -> tuple[bytes, str]:
 
 def change_csv(text: str, rng: random.Random) -> tuple[str, str]:
     """Return a CSV table with one thing changed, and what."""
-    rows = list(csv.reader(io.StringIO(text)))
-    r, c = rng.randrange(len(rows)), rng.randrange(len(rows[0]))
+    rows = [row for row in csv.reader(io.StringIO(text)) if row]
+    r = rng.randrange(len(rows))
+    c = rng.randrange(len(rows[r]))  # rows above a header may be shorter
     separator = ","
     kind = rng.choice(
         ("cell", "cell", "cell", "blank", "extra", "twice", "drop", "short", "separator", "header", "noise")
@@ -288,7 +289,7 @@ def change_csv(text: str, rng: random.Random) -> tuple[str, str]:
     elif kind == "extra":
         rows = [[*row, rng.choice(("", "1", "x"))] for row in rows]
     elif kind == "twice":
-        rows = [[*row, row[c]] for row in rows]
+        rows = [[*row, *row[c : c + 1]] for row in rows]
     elif kind == "drop":
         rows = [row[:c] + row[c + 1 :] for row in rows]
     elif kind == "short":
@@ -296,9 +297,11 @@ def change_csv(text: str, rng: random.Random) -> tuple[str, str]:
     elif kind == "separator":
         separator = rng.choice((";", "\t", " ", "|"))
     elif kind == "header":
-        rows[0][c] = rng.choice(("t_s", "p1_bar", "p9_bar", "x", "", "robot", "weight", "sigma_bending_angle_deg"))
+        rows[0][rng.randrange(len(rows[0]))] = rng.choice(
+            ("t_s", "p1_bar", "p9_bar", "x", "", "robot", "weight", "sigma_bending_angle_deg")
+        )
     else:
-        rows[max(r, 1)][c] = rng.choice(("-0.003", "-0.05", "-0.051", "-0.0"))
+        rows[r or -1][-1] = rng.choice(("-0.003", "-0.05", "-0.051", "-0.0"))
     out = io.StringIO()
     csv.writer(out, delimiter=separator, lineterminator="\n").writerows(rows)
     return out.getvalue(), kind

@@ -53,7 +53,7 @@ def test_bounds_beyond_the_last_pressure_of_a_segment_are_refused(tmp_path: Path
     more = "[target]\ntip_position_mm = [[4.0, 3.0, 65.0]]\n" + bounds
     file = tmp_path / "scenario.toml"
     file.write_text(scenario([BASE, TOP], "", more, study="inverse"))
-    with pytest.raises(InputError, match=r"\[bounds\] pressure_bar: expected lower ones: segment 1: "):
+    with pytest.raises(InputError, match=r"scenario.toml: \[bounds\] pressure_bar: expected lower ones: segment 1: "):
         run_scenario(load_scenario(file))
 
 

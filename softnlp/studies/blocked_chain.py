@@ -7,6 +7,7 @@ not modelled. The branch begins where the free shape meets the wall on the way f
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -151,7 +152,7 @@ class ChainWall:
         cost = iteration_cost(chain.method.intervals, name)
         return ChainGrid(chain, engine, engine, engine, name, chain.method.order, cost)
 
-    def _moved(self, answer: Answer, posed: Problem, values: dict[str, Any]) -> Answer | None:
+    def _moved(self, answer: Answer, posed: Problem, values: Mapping[str, Any]) -> Answer | None:
         """Return an answer solved again on another grid; None where that leads elsewhere."""
         if answer.problem is posed:
             return answer
@@ -258,8 +259,9 @@ class ChainWall:
 
 def _intervals(answer: Answer) -> int:
     """Return the intervals of each segment."""
-    method = answer.problem.cases[0].method  # type: ignore[attr-defined]
-    return int(method.intervals)
+    method = answer.problem.cases[0].method
+    assert method is not None
+    return method.intervals
 
 
 def _chambers(poses: ChainSolver) -> list[int]:
