@@ -58,7 +58,7 @@ MADE: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
     "made/segments dynamic": (
         "two_segments",
         ('"forward"', "[pressure]"),
-        ('"dynamic"', _MOVING + "[solver]\nintervals = 6\n\n[pressure]\nt_s = [0.0, 0.1, 0.2, 0.3]"),
+        ('"dynamic"', _MOVING + "[solver]\nintervals = 2\n\n[pressure]\nt_s = [0.0, 0.1, 0.2, 0.3]"),
     ),
     "made/energy dynamic": (
         "D25L60_energy",
