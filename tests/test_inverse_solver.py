@@ -399,7 +399,7 @@ def test_a_lost_start_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None
 def test_smaller_pressures_that_leave_the_target_are_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     """A search for the least pressures that gives way on the target is put aside: the target comes first."""
 
-    def gives_way(self: Reduced, p: Array, start: Point, limits: Limits, *_: Any) -> tuple[Point, Array]:
+    def gives_way(self: Reduced, p: Array, start: Point, limits: Limits, *_: Any, **__: Any) -> tuple[Point, Array]:
         far = self.at(np.zeros(3), p, np.ones(1))
         assert far is not None
         return far, np.zeros((3, 3))
