@@ -28,6 +28,45 @@ LONGEST = 5.0  # seconds of the processor, for a refusal and for an answer of fe
 
 Tables = dict[str, Any]
 
+MOULDED, LONGEST_MOULD = "mould (command)", 60.0  # which makes and checks every solid
+_BALL = 'kind = "sphere"\ncentre_mm = [-30.0, 0.0, 40.0]\nradius_mm = 10.0'
+_MOVING = "[dynamic]\nduration_s = 0.02\nstep_s = 0.005\ndamping_s = 0.002\noutput_step_s = 0.005\n\n"
+_BLOCKED = '[contact]\nclosure = "free"\n\n'
+# name: (shipped scenario, what is replaced in it, by what)
+MADE: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
+    "made/plane": ("contact/sphere", (_BALL,), ('kind = "plane"\npoint_mm = [-20.0, 0, 0]\nnormal = [1, 0, 0]',)),
+    "made/capsule": (
+        "contact/sphere",
+        (_BALL,),
+        ('kind = "capsule"\nfrom_mm = [-30.0, -9.0, 40.0]\nto_mm = [-30.0, 9.0, 40.0]\nradius_mm = 8.0',),
+    ),
+    "made/tube": (
+        "contact/sphere",
+        (_BALL,),
+        ('kind = "tube"\nfrom_mm = [0, 0, 0]\nto_mm = [0, 0, 80]\nradius_mm = 16',),
+    ),
+    "made/trocar": (
+        "contact/sphere",
+        (_BALL,),
+        ('kind = "trocar"\npoint_mm = [0, 0, 20]\naxis = [0, 0, 1]\nradius_mm = 15\nlength_mm = 6\npart = "body"',),
+    ),
+    "made/segments blocked": (
+        "two_segments",
+        ('"forward"', "[pressure]"),
+        ('"blocked-force"', _BLOCKED + "[pressure]"),
+    ),
+    "made/segments dynamic": (
+        "two_segments",
+        ('"forward"', "[pressure]"),
+        ('"dynamic"', _MOVING + "[solver]\nintervals = 2\n\n[pressure]\nt_s = [0.0, 0.1, 0.2, 0.3]"),
+    ),
+    "made/energy dynamic": (
+        "D25L60_energy",
+        ('"forward"', "ramp = { sets = [1], to_bar = 1.5, steps = 6 }"),
+        ('"dynamic"', "sequence_bar = [[0, 0, 0], [0.4, 0, 0]]\nt_s = [0.0, 0.01]\n\n" + _MOVING),
+    ),
+}
+
 
 @dataclass(frozen=True)
 class Case:
@@ -48,11 +87,8 @@ class Case:
 def small_scenarios() -> dict[str, tuple[Tables, dict[str, str], tuple[str, ...]]]:
     """Return the shipped scenarios by name with the files that they name, cut down to a few steps, and the command."""
     found = {}
-    for path in sorted(SHIPPED.rglob("*.toml")):
-        tables = tomllib.loads(path.read_text())
-        if "study" not in tables or path.parent.name == "paper":
-            continue
-        name = path.relative_to(SHIPPED).with_suffix("").as_posix()
+    for name, path, text in _valid_texts():
+        tables = tomllib.loads(text)
         files: dict[str, str] = {}
         _bring_files(tables, path.parent, files)
         _cut(tables)
@@ -62,7 +98,25 @@ def small_scenarios() -> dict[str, tuple[Tables, dict[str, str], tuple[str, ...]
             files[measured] = _few_rows((SHIPPED / "files" / measured).read_text())
             command = ("compare", MAIN, measured, "--json")
         found[name] = tables, files, command
+    found[MOULDED] = *found["mould"][:2], ("mould", MAIN, "--out", "out")
     return found
+
+
+def _valid_texts() -> Iterator[tuple[str, Path, str]]:
+    """Yield name, file and text of the shipped scenarios, and of those made of them for what none of them has."""
+    texts = {}
+    for path in sorted(SHIPPED.rglob("*.toml")):
+        name, text = path.relative_to(SHIPPED).with_suffix("").as_posix(), path.read_text()
+        if "study" in tomllib.loads(text) and path.parent.name != "paper":
+            texts[name] = path, text
+    for name, (base, old, new) in MADE.items():
+        path, text = texts[base]
+        for before, after in zip(old, new, strict=True):
+            assert before in text, name
+            text = text.replace(before, after)
+        texts[name] = path, text
+    for name, (path, text) in texts.items():
+        yield name, path, text
 
 
 def _bring_files(value: Any, folder: Path, files: dict[str, str]) -> None:
@@ -73,11 +127,11 @@ def _bring_files(value: Any, folder: Path, files: dict[str, str]) -> None:
         elif key == "file":
             text = (folder / item).read_text()
             value[key] = Path(item).name
-            files[value[key]] = _few_rows(text) if item.endswith(".csv") else text
+            whole = "import" in value or not item.endswith(".csv")
+            files[value[key]] = text if whole else _few_rows(text)
         elif key == "files":
-            value["file"] = item[0]
-            del value["files"]
-            _bring_files(value, folder, files)
+            value["files"] = [Path(name).name for name in item]
+            files.update({Path(name).name: (folder / name).read_text() for name in item})
 
 
 def _few_rows(text: str) -> str:
@@ -89,7 +143,7 @@ def _few_rows(text: str) -> str:
 def _cut(tables: Tables) -> None:
     """Leave few steps, poses, targets and candidates of a scenario."""
     pressure = tables.get("pressure", {})
-    pressure.update({"sequence_bar": pressure["sequence_bar"][-2:]} if "sequence_bar" in pressure else {})
+    pressure.update({key: pressure[key][-2:] for key in ("sequence_bar", "t_s") if key in pressure})
     for ramp in (pressure.get("ramp"), tables.get("contact", {}).get("offset_ramp")):
         if ramp is not None:
             ramp["steps"] = 2
@@ -101,6 +155,8 @@ def _cut(tables: Tables) -> None:
     workspace.update({key: size for key, size in (("levels", 2), ("samples", 6)) if key in workspace})
     for entry in workspace.get("vary", {}).values():
         entry.update({"levels": 2} if "levels" in entry else {})
+    if "dynamic" in tables:
+        tables["dynamic"]["duration_s"] = 0.02
     if "measurements" in tables:
         tables["solver"] = {"accuracy": 1e-3}
         tables["measurements"]["free"] = tables["measurements"]["free"][:2]
@@ -142,9 +198,6 @@ ODD = (
     *(math.nan, math.inf, -math.inf, True, False, "", "x", "1.0", "$^_{}\\", "a\tb", "é\u2028", "x" * 300, [], {}),
     *([0], [1, 2], [[0, 0, 0]], [[]], {"a": 1}, {"from": 1, "to": 2}, ["x"], [None] * 0, [1e300] * 3, [True]),
 )
-STRAY = (b"\xff", b"\0", b"\x1b", b'"', b"'", b"[", b"{", b"=", b"\\", b"#")
-CELLS = ("nan", "inf", "-1", "1e300", "-1e300", "1e-300", "1_0", "0x1", "1,5", "x", '"', "=1+1", "0.2")
-TABLE_CHANGES = (*("cell",) * 3, "blank", "extra", "twice", "drop", "short", "separator", "header", "noise")
 NAMES = ("name", "file", "study", "model", "levels", "constants", "x", "__class__", "", "a b", "p1_bar", "length_mm")
 
 
@@ -220,8 +273,9 @@ def change_bytes(content: bytes, rng: random.Random) -> tuple[bytes, str]:
 
 def change_csv(text: str, rng: random.Random) -> tuple[str, str]:
     """Return a CSV table with one thing changed, and what."""
-    rows = list(csv.reader(io.StringIO(text)))
-    r, c = rng.randrange(len(rows)), rng.randrange(len(rows[0]))
+    rows = [row for row in csv.reader(io.StringIO(text)) if row]
+    r = rng.randrange(len(rows))
+    c = rng.randrange(len(rows[r]))  # rows above a header may be shorter
     separator = ","
     kind = rng.choice(
         ("cell", "cell", "cell", "blank", "extra", "twice", "drop", "short", "separator", "header", "noise")
@@ -235,7 +289,7 @@ def change_csv(text: str, rng: random.Random) -> tuple[str, str]:
     elif kind == "extra":
         rows = [[*row, rng.choice(("", "1", "x"))] for row in rows]
     elif kind == "twice":
-        rows = [[*row, row[c]] for row in rows]
+        rows = [[*row, *row[c : c + 1]] for row in rows]
     elif kind == "drop":
         rows = [row[:c] + row[c + 1 :] for row in rows]
     elif kind == "short":
@@ -243,9 +297,11 @@ def change_csv(text: str, rng: random.Random) -> tuple[str, str]:
     elif kind == "separator":
         separator = rng.choice((";", "\t", " ", "|"))
     elif kind == "header":
-        rows[0][c] = rng.choice(("t_s", "p1_bar", "p9_bar", "x", "", "robot", "weight", "sigma_bending_angle_deg"))
+        rows[0][rng.randrange(len(rows[0]))] = rng.choice(
+            ("t_s", "p1_bar", "p9_bar", "x", "", "robot", "weight", "sigma_bending_angle_deg")
+        )
     else:
-        rows[max(r, 1)][c] = rng.choice(("-0.003", "-0.05", "-0.051", "-0.0"))
+        rows[r or -1][-1] = rng.choice(("-0.003", "-0.05", "-0.051", "-0.0"))
     out = io.StringIO()
     csv.writer(out, delimiter=separator, lineterminator="\n").writerows(rows)
     return out.getvalue(), kind
@@ -323,7 +379,7 @@ def outcome(case: Case, folder: Path) -> Outcome:
 def wrong_with(case: Case, found: Outcome) -> str | None:
     """Return what is not as it has to be: bad input is one line and writes nothing, all else is a right answer."""
     lines = found.err.splitlines()
-    if found.seconds > LONGEST:
+    if found.seconds > (LONGEST_MOULD if case.command[0] == "mould" else LONGEST):
         return f"{found.seconds:.1f} s of the processor"
     if found.status == 2:
         if len(lines) != 1 or not found.err.startswith("softnlp: ") or len(found.err) > 2000 or found.out:

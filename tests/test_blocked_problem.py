@@ -9,8 +9,9 @@ import pytest
 from softnlp import BAR, Loads, Numerics, material, robot
 from softnlp.model.contact_settings import ClosureWeights, ContactSettings
 from softnlp.model.quantities import Model
+from softnlp.nlp import solver as nlp
 from softnlp.nlp.problem import compile_problem
-from softnlp.nlp.solver import Engine
+from softnlp.nlp.solver import Engine, discretisation_correction
 from softnlp.nlp.transcription import MultipleShooting
 from softnlp.statics.blocked import BlockedSolver
 from softnlp.statics.blocked_grid import Blocked
@@ -100,6 +101,21 @@ def test_weighted_is_the_minimum_of_an_objective(weights: tuple[float, float, fl
         found_error = np.abs(problem.free_values(best.x)[f"contact.{name}_error"]).max()
         assert found_error == pytest.approx(left[line], rel=1e-6, abs=1e-9)
     np.testing.assert_allclose(best.x[problem.free_size :], found.solution.x, atol=1e-6)
+
+
+def test_the_error_of_a_minimum_by_collocation_needs_no_factorisation(monkeypatch: pytest.MonkeyPatch) -> None:
+    contact = ContactSettings(closure="weighted", weights=ClosureWeights(2.0, 100.0, 30.0, None))
+    blocked = BlockedSolver(Model(robot("D25L40"), ECOFLEX), Numerics("collocation", intervals=2), contact)
+    _, found = blocked.solve(np.array([1.2 * BAR, 0.0, 0.0]), Loads(), WALL)
+    assert found is not None
+    problem, linear = found.grid.problem, found.grid.reference.linear
+    expected = discretisation_correction(problem, found.solution)
+    size = np.abs(expected).max()
+    assert size > 1e-9
+    monkeypatch.setattr(nlp, "sparse_solve", lambda *_: pytest.fail("the whole matrix was factorised"))
+    assert discretisation_correction(problem, found.solution, linear) == pytest.approx(expected, abs=1e-6 * size)
+    again = found.grid.refinement(found.solution)
+    assert (again[0], max(again[0], again[1] / 5, again[2] / 5)) == (found.error, found.refinement_error)
 
 
 @pytest.mark.thorough

@@ -131,3 +131,11 @@ def test_dimensions_that_rings_would_have_to_follow_have_no_deviation(tmp_path):
     taken = load_scenario(written(tmp_path, "forward", ENERGETIC, "[uncertainty]\nmodulus_factor = 0.05", PRESSURE))
     assert taken.uncertainty is not None
     assert [source.moves for source in taken.uncertainty.sources] == [{"corrections.modulus_factor": 0.05}]
+
+
+def test_a_factor_of_the_stress_that_no_measurement_depends_on_is_refused(tmp_path: Path) -> None:
+    """Without pressure and loads no stress moves the robot; what rounding leaves of that is no slope."""
+    (tmp_path / "measured.csv").write_text("p1_bar,p2_bar,p3_bar,bending_angle_deg\n0,0,0,0.0\n0,0,0,0.5\n")
+    path = written(tmp_path, "identify", ENERGETIC, '[measurements]\nfile = "measured.csv"\nfree = ["c_m"]\n')
+    with pytest.raises(InputError, match="no measurement depends on 'c_m'"):
+        run_scenario(load_scenario(path))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from fuzz import Case, cases, outcome, small_scenarios, wrong_with
+from fuzz import MAIN, Case, as_toml, cases, outcome, small_scenarios, wrong_with
 
 SEED, COUNT = 20261128, 2000
 QUICK = 80
@@ -25,6 +25,20 @@ def check(case: Case, folder: Path) -> int:
 def test_the_cases_are_the_same_every_time() -> None:
     assert list(cases(SEED, 30)) == list(cases(SEED, 30))
     assert len(small_scenarios()) > 30
+
+
+def test_every_file_is_valid_before_it_is_changed(tmp_path: Path) -> None:
+    """A base that is refused as it is would hide what its changes do."""
+    for number, (name, (tables, texts, _)) in enumerate(small_scenarios().items()):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        files = {file: text.encode() for file, text in texts.items()}
+        case = Case(name, {**files, MAIN: as_toml(tables).encode()}, ("check", MAIN))
+        found = outcome(case, folder)
+        assert found.status != 2, f"{name}: {found.err}"
+    assert {"obstacle", "dynamic", "mould", "segment", "uncertainty"} <= {
+        table for tables, _, _ in small_scenarios().values() for table in tables
+    }
 
 
 @pytest.mark.thorough

@@ -17,6 +17,7 @@ from softnlp.nlp import bounded
 from softnlp.nlp.bounded import Limits
 from softnlp.nlp.reduced import Point, Reduced
 from softnlp.nlp.solver import Solution
+from softnlp.statics.attempts import Work
 from softnlp.statics.branch import stretch_on_branch
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
@@ -279,7 +280,7 @@ def test_the_search_among_stable_poses_ends_at_the_fence(begun: bool, monkeypatc
     monkeypatch.setattr(solver, "_at", judge)
     start = judge(aim, np.array([0.9, 0.2, 0.4]) * BAR) if begun else None
     assert not isinstance(start, Step)
-    found = solver._searched(aim, start)
+    found = solver._searched(aim, start, Work(np.inf))
     assert found is not None
     if start is not None:
         assert found.cost < start.cost
@@ -300,7 +301,7 @@ def test_where_no_pose_of_the_table_is_stable_there_is_no_answer(monkeypatch: py
     solver.nearest(at(0.012, -0.004, 0.072), None)
     judge = Fenced(solver, like, 99.0)
     monkeypatch.setattr(solver, "_at", judge)
-    assert solver._searched(aim, None) is None
+    assert solver._searched(aim, None, Work(np.inf)) is None
     assert len(judge.asked) > 3
     assert all(np.abs(a - b).max() > 0.3 for k, a in enumerate(judge.asked) for b in judge.asked[:k])
 
@@ -320,7 +321,7 @@ def test_an_answer_is_refined_while_it_comes_nearer(
 ) -> None:
     solver = unloaded()
     aim, like = reached_at(solver, np.full(3, 0.5))
-    found = next(solver._ends(aim, None))
+    found = next(solver._ends(aim, None, Work(np.inf)))
     found = replace(found, cost=0.0)
     judged: list[Array] = []
 
@@ -363,7 +364,7 @@ def test_of_two_answers_the_nearer_one_is_taken() -> None:
     solver = unloaded()
     asked = np.array([0.0, 0.0, -0.03])
     aim = aim_of(solver.task, Target(asked, None), float(LENGTH))
-    ends = [solver._finished(aim, found) for found in solver._ends(aim, None)]
+    ends = [solver._finished(aim, found) for found in solver._ends(aim, None, Work(np.inf))]
     costs = [end.cost for end in ends if isinstance(end, Reached)]
     assert len(costs) > 1
     assert costs.index(min(costs)) < len(costs) - 1
@@ -398,7 +399,7 @@ def test_a_lost_start_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None
 def test_smaller_pressures_that_leave_the_target_are_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     """A search for the least pressures that gives way on the target is put aside: the target comes first."""
 
-    def gives_way(self: Reduced, p: Array, start: Point, limits: Limits, *_: Any) -> tuple[Point, Array]:
+    def gives_way(self: Reduced, p: Array, start: Point, limits: Limits, *_: Any, **__: Any) -> tuple[Point, Array]:
         far = self.at(np.zeros(3), p, np.ones(1))
         assert far is not None
         return far, np.zeros((3, 3))
@@ -406,7 +407,7 @@ def test_smaller_pressures_that_leave_the_target_are_not_taken(monkeypatch: pyte
     solver = solver_of()
     aim = Aim(Target(None, TOWARDS), float(LENGTH), 1.0)
     monkeypatch.setattr(Reduced, "minimum_norm", gives_way)
-    found = solver._search(aim, (np.array([0.9, 0.1, 0.3]), None, False))
+    found = solver._search(aim, Work(np.inf), (np.array([0.9, 0.1, 0.3]), None, False))
     assert found is not None
     assert found.met
     met = at_arc(solver._arcs, aim, found.point.theta)[1]

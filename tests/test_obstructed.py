@@ -278,7 +278,7 @@ def test_a_run_leaves_forces_in_every_file_and_its_figure_can_be_drawn_again(
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (HEAD + PRESSED + BALL.replace("-30,", "-20,"), "[obstacle.1]: the robot overlaps sphere 1 by 2.5 mm at rest"),
+        (HEAD + PRESSED + BALL.replace("-30,", "-20,"), "x.toml: [obstacle.1]: the robot overlaps sphere 1 by 2.5 mm"),
         (HEAD + PRESSED + BALL.replace("centre_mm", "center_mm"), "did you mean 'centre_mm'"),
         (HEAD + PRESSED + BALL.replace('"sphere"', '"ball"'), "[obstacle] kind: item 1: expected 'plane', 'sphere'"),
         (HEAD + PRESSED + BALL + "length_mm = 3\n", "[obstacle.1] length_mm: a sphere has none"),

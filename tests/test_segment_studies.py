@@ -9,6 +9,8 @@ import pytest
 from segment_files import scenario, segment, solved
 
 from softnlp import BAR, InputError, load_scenario, run_scenario
+from softnlp.nlp.reduced import Reduced
+from softnlp.studies import blocked_chain, inverse_solver
 from softnlp.sweep.read import load_workspace
 
 BASE = segment(own="connector_mm = 3.0")
@@ -51,7 +53,7 @@ def test_bounds_beyond_the_last_pressure_of_a_segment_are_refused(tmp_path: Path
     more = "[target]\ntip_position_mm = [[4.0, 3.0, 65.0]]\n" + bounds
     file = tmp_path / "scenario.toml"
     file.write_text(scenario([BASE, TOP], "", more, study="inverse"))
-    with pytest.raises(InputError, match=r"\[bounds\] pressure_bar: expected lower ones: segment 1: "):
+    with pytest.raises(InputError, match=r"scenario.toml: \[bounds\] pressure_bar: expected lower ones: segment 1: "):
         run_scenario(load_scenario(file))
 
 
@@ -90,6 +92,41 @@ def test_the_blocked_force_of_two_halves_is_that_of_the_whole(tmp_path: Path) ->
             assert a["length_error_mm"] == pytest.approx(b["length_error_mm"], abs=1e-5)
         assert two[1]["blocked_force_N"] > 0.1
         assert two[1]["stable"] is None
+
+
+def test_a_blocked_force_does_not_depend_on_the_grids_of_its_way(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Alone it is followed on a coarse grid, after another on that one's, else on its own from first contact."""
+    wall = '[contact]\nclosure = "free"\n[solver]\nengine = "newton"\n'
+    less, more = "[1.5, 0, 0, 0, 0, 0]", "[2.5, 0, 0, 0, 0, 0]"
+    alone = solved(tmp_path, scenario([BASE, TOP], more, wall, "blocked-force"))[0]
+    after = solved(tmp_path, scenario([BASE, TOP], f"{less}, {more}", wall, "blocked-force"))[1]
+    given = solved(tmp_path, scenario([BASE, TOP], more, wall + "intervals = 120\n", "blocked-force"))[0]
+    assert given["blocked_force_N"] > 0.1
+    monkeypatch.setattr(blocked_chain, "_SAME", 0.0)
+    followed = solved(tmp_path, scenario([BASE, TOP], f"{less}, {more}", wall, "blocked-force"))[1]
+    for one in (alone, after, followed):
+        assert one["status"] == "solved"
+        assert one["blocked_force_N"] == pytest.approx(given["blocked_force_N"], rel=3e-6)
+        np.testing.assert_allclose(one["tip_position_mm"], given["tip_position_mm"], atol=1e-6 * 93)
+
+
+def test_the_search_for_a_target_out_of_reach_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    target = '[target]\ntip_position_mm = [[300.0, 20.0, 20.0]]\n[solver]\nengine = "newton"\n'
+    points, at = [], Reduced.at
+    monkeypatch.setattr(Reduced, "at", lambda *given: points.append(1) or at(*given))
+    found = {}
+    for most in (inverse_solver._MOST_WORK, 1):
+        monkeypatch.setattr(inverse_solver, "_MOST_WORK", most)
+        points.clear()
+        (step,) = solved(tmp_path, scenario([BASE, TOP], "", target, study="inverse"))
+        assert step["status"] == "out_of_reach"
+        assert ("the search was stopped, since it took too long" in step["message"]) == (most == 1)
+        found[most] = len(points), step["distance_mm"]
+    (all_points, least), (few_points, more) = found.values()
+    assert few_points < all_points - 20
+    assert least <= more < 300
 
 
 def test_a_wall_of_segments_stands_also_where_the_last_pressure_has_no_shape(tmp_path: Path) -> None:

@@ -108,6 +108,13 @@ def test_the_fine_equations_estimate_the_error(method: Transcription) -> None:
     assert np.linalg.norm(estimate) == pytest.approx(np.linalg.norm(true), rel=0.3)
 
 
+@pytest.mark.parametrize("method", METHODS, ids=named)
+def test_the_fine_equations_are_two_steps_of_half_the_length(method: Transcription) -> None:
+    one, two = Solved(method.with_intervals(1)), Solved(method.with_intervals(2))
+    gap = np.asarray(one.fine(one.x, CONSTANTS)).ravel()[-2:]
+    assert gap + one.nodes[:, -1] == pytest.approx(two.nodes[:, -1], abs=1e-11)
+
+
 @pytest.mark.parametrize("method", METHODS[2:], ids=named)
 def test_quadratures_converge_with_the_method(method: Transcription) -> None:
     x, c = ca.SX.sym("x", 2), ca.SX.sym("c", 3)

@@ -56,20 +56,31 @@ class SparseSolver:
 
     def solve_many(self, x: Array, p: Array, G: Array) -> Array:
         """Return the columns dx for as many right sides G (n, r), of one factorisation. Raises as `solve`."""
-        from scipy.sparse import csc_matrix
-        from scipy.sparse.linalg import splu
-
         (J,) = self._problem.jacobian.call([x, p])
-        entries = np.array(J.nonzeros())
-        rows, columns = self._pattern
-        if not np.all(np.isfinite(entries)):
-            raise np.linalg.LinAlgError("the Jacobian is not finite")
-        try:
-            factors = splu(csc_matrix((entries, rows, columns), shape=J.shape))
-        except RuntimeError as error:
-            raise np.linalg.LinAlgError(str(error)) from error
+        factors = _factors(np.array(J.nonzeros()), *self._pattern)
         self._last = np.array(x), np.array(p), factors
         return np.asarray(factors.solve(-np.asarray(G, dtype=float)))
+
+
+def sparse_solve(J: ca.DM, right: Array) -> Array:
+    """Return J^-1 right (n,). Raises `numpy.linalg.LinAlgError` where J is singular or not finite."""
+    pattern = J.sparsity()
+    factors = _factors(np.array(J.nonzeros()), np.array(pattern.row(), np.int32), np.array(pattern.colind(), np.int32))
+    return np.asarray(factors.solve(np.asarray(right, dtype=float)))
+
+
+def _factors(entries: Array, rows: NDArray[np.int32], columns: NDArray[np.int32]) -> Any:
+    """Return the sparse LU factors of a square matrix, by columns."""
+    from scipy.sparse import csc_matrix
+    from scipy.sparse.linalg import splu
+
+    size = len(columns) - 1
+    if not np.all(np.isfinite(entries)):
+        raise np.linalg.LinAlgError("the Jacobian is not finite")
+    try:
+        return splu(csc_matrix((entries, rows, columns), shape=(size, size)))
+    except RuntimeError as error:
+        raise np.linalg.LinAlgError(str(error)) from error
 
 
 class LastFactors:

@@ -30,6 +30,10 @@ _LEAST_SLOPE = 1e-5
 _SHORTEST = 1 / 64  # of a step of the search, where the states do not follow a whole one
 
 
+def _always() -> bool:
+    return True
+
+
 @dataclass(frozen=True, eq=False)
 class Point:
     """Where the states are solved at theta: the states, their slopes by theta, and what follows from them.
@@ -147,22 +151,41 @@ class Reduced:
         return Measured(point.theta, (point.c - self.lower)[equal], point.c_slope[equal], point)
 
     def least_squares(
-        self, p: Array, start: Point, limits: Limits, second: Array | None = None, unit: float = 1.0
+        self,
+        p: Array,
+        start: Point,
+        limits: Limits,
+        second: Array | None = None,
+        unit: float = 1.0,
+        afford: Callable[[], bool] = _always,
     ) -> tuple[Point, Array]:
-        """Return the point of least residuals near a start, and their curvature: `softnlp.nlp.bounded.nearest`."""
-        end, second = nearest(self._map(p, unit), self.measured(start, unit), limits, second)
+        """Return the point of least residuals near a start, and their curvature: `softnlp.nlp.bounded.nearest`.
+
+        afford : asked before each point, whether it may be solved; without it the search ends at the best one known.
+        """
+        end, second = nearest(self._map(p, unit, afford), self.measured(start, unit), limits, second)
         return end.memo, second
 
-    def minimum_norm(self, p: Array, start: Point, limits: Limits, second: Array | None = None) -> tuple[Point, Array]:
-        """Return the point of least theta near a start that keeps the equalities: `softnlp.nlp.bounded.least_norm`."""
-        end, second = least_norm(self._map(p), self.measured(start), limits, second)
+    def minimum_norm(
+        self,
+        p: Array,
+        start: Point,
+        limits: Limits,
+        second: Array | None = None,
+        afford: Callable[[], bool] = _always,
+    ) -> tuple[Point, Array]:
+        """Return the point of least theta near a start that keeps the equalities: `softnlp.nlp.bounded.least_norm`.
+
+        afford : as of `least_squares`.
+        """
+        end, second = least_norm(self._map(p, afford=afford), self.measured(start), limits, second)
         return end.memo, second
 
-    def _map(self, p: Array, unit: float = 1.0) -> Map:
+    def _map(self, p: Array, unit: float = 1.0, afford: Callable[[], bool] = _always) -> Map:
         """Return the residuals by theta, or the equalities."""
 
         def measure(theta: Array, near: Measured) -> Measured | None:
-            point = self.at(theta, p, near.memo)
+            point = self.at(theta, p, near.memo) if afford() else None
             return None if point is None else self.measured(point, unit)
 
         return measure

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.nlp.evaluation import evaluated
-from softnlp.nlp.linear import LinearSolver
+from softnlp.nlp.linear import LinearSolver, sparse_solve
 from softnlp.nlp.optimality import OPTIMAL, kkt_error
 from softnlp.nlp.problem import CompiledProblem
 
@@ -313,7 +313,7 @@ def discretisation_correction(
     """Return the first-order change of x from halving every step: one Newton step on the fine equations.
 
     The fine equations reuse the coarse Jacobian, which differs from theirs by the discretisation error itself. Where
-    the problem is not square, the free quantities are held.
+    the problem is not square, the free quantities are held. Raises `numpy.linalg.LinAlgError` where it is singular.
     """
     fine = np.asarray(problem.fine_residual(solution.x, solution.p)).ravel()
     if linear is not None:
@@ -322,6 +322,5 @@ def discretisation_correction(
     n = J.size2()
     skip = 0 if problem.is_square else problem.free_size
     size = n - skip
-    J = J[:size, skip:]
-    step = np.asarray(ca.solve(J, ca.DM(-fine[:size]), "qr")).ravel()
+    step = sparse_solve(J[:size, skip:], -fine[:size])
     return np.concatenate([np.zeros(skip), step])

@@ -344,8 +344,10 @@ class Collocation:
         windows = ca.vertcat(left, ca.reshape(states[:, inner], nx * d, K), right)
         residuals = self.interval(field).map(K)(windows, constants, h)
 
-        flow = self._flow(field, h / 2).map(K)
-        fine_gap = flow(flow(left, constants), constants) - right
+        flow, (first, second) = self._flow(field, h / 2).map(K), self._halves()
+        polynomials = ca.reshape(ca.vertcat(left, ca.reshape(states[:, inner], nx * d, K)), nx, (d + 1) * K)
+        half = flow(left, constants, _on_each(polynomials, first, nx, K))
+        fine_gap = flow(half, constants, _on_each(polynomials, second, nx, K)) - right
         fine = ca.vertcat(ca.DM.zeros(nx * d, K), fine_gap)
 
         # Not collocation_coeff's weights, which give s = 0 a share: with one Radau point they sum to a half.
@@ -367,15 +369,27 @@ class Collocation:
             slopes=lambda moved: _slopes(field, self, unknowns, constants, moved),
         )
 
+    def _halves(self) -> tuple[Array, Array]:
+        """Return what takes a polynomial's start and stages (d + 1) to its stages in each half of the interval."""
+        tau = np.array([0.0, *ca.collocation_points(self.degree, self.points)])
+        powers, places = np.vander(tau, increasing=True), np.concatenate([tau[1:], 1 + tau[1:]]) / 2
+        first, second = np.split(np.linalg.solve(powers.T, np.vander(places, tau.size, increasing=True).T), 2, axis=1)
+        return first, second
+
     def _flow(self, field: ca.Function, h: float) -> ca.Function:
-        """Return the step of the method over an interval of length h, as a function (x, c) -> x_next."""
+        """Return the step of the method over an interval of length h: (x, c, guess of the stages) -> x_next."""
         nx, d = field.size1_in(0), self.degree
         x, c, z = ca.SX.sym("x", nx), ca.SX.sym("c", field.size1_in(1)), ca.SX.sym("z", nx * d)
         stage, reached = self._stage_residuals(field, x, ca.reshape(z, nx, d), c, h)
         equations = ca.Function("stages", [z, x, c], [ca.vec(stage), reached])
-        newton = ca.rootfinder("flow", "newton", equations, {"abstol": 1e-14, "max_iter": 50, "error_on_fail": False})
-        start, constants = ca.MX.sym("x", nx), ca.MX.sym("c", field.size1_in(1))
-        return ca.Function("flow", [start, constants], [newton(ca.repmat(start, d, 1), start, constants)[1]])
+        newton = ca.rootfinder("flow", "newton", equations, {"abstol": 1e-13, "max_iter": 50, "error_on_fail": False})
+        start, constants, guess = ca.MX.sym("x", nx), ca.MX.sym("c", field.size1_in(1)), ca.MX.sym("guess", nx * d)
+        return ca.Function("flow", [start, constants, guess], [newton(guess, start, constants)[1]])
+
+
+def _on_each(polynomials: ca.MX, weights: Array, rows: int, count: int) -> ca.MX:
+    """Return polynomials side by side, each (rows, n) times weights (n, m), as columns (rows m, count)."""
+    return ca.reshape(polynomials @ ca.kron(ca.DM.eye(count), ca.DM(weights)), rows * weights.shape[1], count)
 
 
 def method_named(name: str, intervals: int) -> Transcription:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from os import PathLike
+from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
-from softnlp.base.errors import InputError
+from softnlp.base.errors import InputError, located
 from softnlp.base.processes import require_workers
+from softnlp.base.reading import one_line
 from softnlp.scenario.blocked_force import run_blocked
 from softnlp.scenario.data import Scenario, run_of, scenario_of
 from softnlp.scenario.design import run_design
@@ -76,7 +77,12 @@ def run_scenario(
 
 
 def solve_steps(scenario: Scenario, progress: Progress | None = None, branches: int = 0) -> Run:
-    """Run a scenario whose study is a run, every step in order; as `run_scenario`."""
+    """Run a scenario whose study is a run, every step in order; as `run_scenario`, an error naming the file."""
+    with located(source=one_line(fspath(scenario.path))):
+        return _solved(scenario, progress, branches)
+
+
+def _solved(scenario: Scenario, progress: Progress | None, branches: int) -> Run:
     study = STUDIES[scenario.study]
     if scenario.uncertainty is None:
         return replace(study(scenario, progress, branches), warnings=scenario.warnings)

@@ -127,7 +127,8 @@ class BlockedGrid:
         Of forces relative to those above one.
         """
         order = method_named(self.transcription, 1).order
-        correction = discretisation_correction(self.problem, solution, self.engine.linear)
+        linear = self.engine.linear or self.reference.linear  # of a minimum by collocation: with the errors it left
+        correction = discretisation_correction(self.problem, solution, linear)
         change = correction * 2**order / (2**order - 1)
         tip = self.nodes(change)[:, -1]
         forces = self.tip_forces(change) / np.maximum(1.0, np.abs(self.tip_forces(solution.x)))

@@ -23,7 +23,7 @@ from softnlp.nlp.solver import Engine, Solution
 from softnlp.nlp.transcription import method_named
 from softnlp.statics.chain import Chain, Part, chain_case
 from softnlp.statics.compiled import RodEquations
-from softnlp.statics.pose import Mapped
+from softnlp.statics.pose import Mapped, between_nodes
 from softnlp.statics.pose_grid import Grid, iteration_cost
 from softnlp.statics.single_shooting import SingleShooting
 from softnlp.statics.stability import answered, through_junction
@@ -178,6 +178,15 @@ class ChainGrid(Grid):
             found.append(Piece(part, rod, own, own_constants, *(float(unit) for unit in units[:, k])))
             column, row = column + count, row + size
         return found
+
+    def resampled(self, pieces: list[Piece], stretches: list[float]) -> Array:
+        """Return x, without what the loads add, of the same body's parts on another grid. stretches : of each part."""
+        found = []
+        for piece, stretch, part in zip(pieces, stretches, self.case.parts, strict=True):
+            own = between_nodes(piece.shape, piece.nodes, piece.constants, part.transcribed.points)
+            states = np.vstack([own[:STATE_SIZE], own[30:32]]) if part.varies else own[:STATE_SIZE]
+            found += [np.array([stretch]), states.T.ravel()]
+        return np.concatenate(found)
 
     def unloaded(self, p: Array) -> tuple[Array, Array]:
         """Return x and the last state of the shape without loads at fixed values, see `Chain.first_guess`."""

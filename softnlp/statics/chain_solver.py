@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from softnlp.base.status import Status
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
-from softnlp.model.rod import STATE_SIZE, Loads
+from softnlp.model.rod import Loads
 from softnlp.model.segments import body_of
 from softnlp.nlp.solver import Solution
 from softnlp.statics.attempts import Neighbour
@@ -20,7 +20,6 @@ from softnlp.statics.branch import BranchPoint
 from softnlp.statics.chain_grid import ChainEquations, ChainGrid, compiled_chain
 from softnlp.statics.chain_step import chain_step
 from softnlp.statics.grid_size import first_intervals
-from softnlp.statics.pose import between_nodes
 from softnlp.statics.pose_grid import Grid, Solved
 from softnlp.statics.solver import UNLOADED_ACCURACY, PoseSolver
 from softnlp.statics.step import Step
@@ -132,13 +131,8 @@ class ChainSolver(PoseSolver):
         if solved.grid is not grid:
             before = solved.grid
             assert isinstance(before, ChainGrid)
-            parts = []
             pieces = before.pieces(solved.limit, solved.constants, solved.solution)
-            for piece, stretch_then, part in zip(pieces, before.stretches(x_old), grid.case.parts, strict=True):
-                own = between_nodes(piece.shape, piece.nodes, piece.constants, part.transcribed.points)
-                states = np.vstack([own[:STATE_SIZE], own[30:32]]) if part.varies else own[:STATE_SIZE]
-                parts += [np.array([stretch_then]), states.T.ravel()]
-            x = np.concatenate(parts)
+            x = grid.resampled(pieces, before.stretches(x_old))
         arcs = self.arc_guess(grid, p_old, 0.0), self.arc_guess(grid, p, stretch)
         return Neighbour(x=x, p=p_old, moved=x + arcs[1] - arcs[0], stable=solved.stable)
 

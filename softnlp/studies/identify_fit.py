@@ -41,6 +41,7 @@ _MOVED = 1e-4  # relative; constants that move more are followed once more from 
 _TIGHT = 1e-13
 _NEARLY = 1e-2  # of a constant or its scale: a rough search that ends nearer to a bound is about to reach it
 _AT_BOUND = 1e-6  # of a constant or its scale
+_NO_EFFECT = 1e-9  # of a standard deviation: what rounding leaves where a constant over its scale moves nothing
 _NOTHING = Uncertainty(np.zeros(0), np.zeros((0, 0)), np.nan, ())
 _LOOSE = 1e-4  # residuals of a registration that is a typical size away from where it began
 _SMALL = 1e-6  # root mean square of residuals with nothing left in them [sigma]
@@ -185,7 +186,7 @@ class Fit:
         """Refuse a constant that no measurement depends on."""
         J = np.abs(self.jacobian(found)) * self.free.scale
         for k, name in enumerate(self.free.names):
-            if not np.max(J[:, k]) > 0:
+            if not np.max(J[:, k]) > _NO_EFFECT:
                 raise InputError(f"no measurement depends on {name!r}; fix it", key="free")
 
     def _found(self, x: Array, first: Sequence[Prediction], last: Sequence[Prediction]) -> Identified:

@@ -5,7 +5,7 @@ It is posed once. `Reduced` searches it in the pressures alone, IPOPT in all unk
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -41,6 +41,7 @@ from softnlp.studies.targets import Aim
 Array = NDArray[np.float64]
 
 _ARCS, _POSES = 729, 64  # entries of a table of tips
+_FEWEST, _TABLE_WORK = 16, 20_000  # poses of a table where each is dear, and what it may cost, as of `Grid`
 _APART = 0.35  # of the bounds: starts differ by more in some set
 _FOLD_MARGIN = 1e-6  # of the last pressure with an equilibrium
 _LEAST_STRETCH = 0.5  # of the branch from zero pressure, which begins at 1 and rises
@@ -88,7 +89,7 @@ def inverse_problem(case: LoadCase | Chain, aim: Aim, limits: Limits, *, meets: 
 class Program:
     """The problem of one target on one grid, and what searches it.
 
-    p : its fixed values. Free are the pressures z [bar].
+    p : its fixed values. Free are the pressures z [bar]. afford : see `Reduced.least_squares`.
     """
 
     problem: Problem
@@ -96,6 +97,7 @@ class Program:
     tips: Tips
     meets: bool
     p: Array
+    afford: Callable[[], bool] = lambda: True
 
     def at(self, z: Array, near: Point | Array | None = None) -> Point | None:
         """Return the tip at pressures, from one nearby or its states, else from the arc; see `Reduced.at`."""
@@ -108,7 +110,7 @@ class Program:
     def searched(self, start: Point, second: Array | None = None) -> tuple[Point, Array]:
         """Return the best tip near a start, and the curvature there, see `Reduced.least_squares`."""
         search = self.reduced.minimum_norm if self.meets else self.reduced.least_squares
-        return search(self.p, start, self.tips.limits, second)
+        return search(self.p, start, self.tips.limits, second, afford=self.afford)
 
     def engine(self, **options: Any) -> Engine:
         """Return IPOPT on all unknowns, with options beside those asked for; built at first use."""
@@ -190,13 +192,20 @@ class Tips:
 
     def nearest(self, program: Program, most: int | None = None, below: float = np.inf) -> list[Point]:
         """Return tips of a table over the limits, apart from each other, nearer than `below`, the nearest first."""
-        places = spread(self.limits, _ARCS if self.intervals is None else _POSES)
+        places = spread(self.limits, self._entries)
         numbers = program.reduced.fixed(self.limits.lower, program.p).tobytes()
         table = self.poses.equations.kept(("tips", self._key, numbers), lambda: each_from_the_last(places, program.at))
         misfit = program.misfits(table)
         span = np.maximum(self.limits.upper - self.limits.lower, 1e-9)
         chosen = least_apart(misfit, places, _APART * span, most or len(misfit))
         return [point for k in chosen if misfit[k] < below and (point := table[k]) is not None]
+
+    @property
+    def _entries(self) -> int:
+        """The size of the table."""
+        if self.intervals is None:
+            return _ARCS
+        return int(np.clip(_TABLE_WORK // self.poses.grid(self.intervals).iteration_cost, _FEWEST, _POSES))
 
     @property
     def _key(self) -> tuple[Hashable, ...]:

@@ -27,12 +27,13 @@ from softnlp.nlp.optimality import OPTIMAL, not_optimal
 from softnlp.nlp.places import best_first, in_rounds, pattern_search
 from softnlp.nlp.reduced import Point
 from softnlp.nlp.solver import FROM_SOLUTION
+from softnlp.statics.attempts import Work
 from softnlp.statics.chain_solver import ChainSolver
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.kept import pose_solver
 from softnlp.statics.pose_grid import Solved
 from softnlp.statics.step import Aimed, Step
-from softnlp.studies.inverse_problem import Tips, coarse_intervals, pressure_limits
+from softnlp.studies.inverse_problem import Program, Tips, coarse_intervals, pressure_limits
 from softnlp.studies.targets import Aim, InverseTask, Target, aim_of
 
 Array = NDArray[np.float64]
@@ -47,6 +48,7 @@ _JUMP = 0.3  # of the bounds: more is a jump along a path
 _SAME_PLACE = 1e-4  # [bar]
 _FIRST_MOVE, _LAST_MOVE = 0.25, 1e-3  # of the search among stable poses, of the bounds
 _MOST_POSES = 150  # that it solves
+_MOST_WORK, _PER_POINT = 400_000, 3  # to search one target of several segments, see `Work`; iterations to a tip
 _NO_BODY = "the target was found to be met only by a shape that no body can take"
 
 
@@ -94,8 +96,8 @@ class InverseKinematics:
         self._method = "nlp" if numerics.engine == "ipopt" else method
         self._intervals: int | None = None
         # Several segments have no closed form that the search could move in; their arcs only begin it.
-        chained = isinstance(self.poses, ChainSolver)
-        self._arcs = None if chained else self._tips(None)
+        self._chained = isinstance(self.poses, ChainSolver)
+        self._arcs = None if self._chained else self._tips(None)
         if self._arcs is None or loads.act:
             self._coarse = self._tips(numerics.intervals or coarse_intervals(self.poses, self.limits))
         else:
@@ -111,7 +113,8 @@ class InverseKinematics:
         best: Reached | None = None
         rejected: Step | None = None
         chosen = None
-        for ends in (self._ends(aim, near), self._more_ends(aim)):
+        work = Work(_MOST_WORK if self._chained else np.inf)
+        for ends in (self._ends(aim, near, work), self._more_ends(aim, work)):
             for found in ends:
                 judged = self._finished(aim, found)
                 if isinstance(judged, Step):
@@ -124,7 +127,7 @@ class InverseKinematics:
             if rejected is None or (best is not None and self._meets(aim, best)):
                 break
         if rejected is not None and (best is None or not self._meets(aim, best)):
-            searched = self._searched(aim, best)
+            searched = self._searched(aim, best, work)
             if searched is not None and (best is None or searched.cost < best.cost * (1 - _SAME_SPOT)):
                 best, chosen = searched, None
         if best is None:
@@ -144,28 +147,43 @@ class InverseKinematics:
         if not step.status.has_solution:
             return step, None
         if not met:
-            step = replace(step, status=Status.OUT_OF_REACH, message=self._out_of_reach(aim, best, rejected))
+            step = replace(step, status=Status.OUT_OF_REACH, message=self._out_of_reach(aim, best, rejected, work))
         return step, best
 
-    def _ends(self, aim: Aim, near: Reached | None) -> Iterator[Found]:
+    def _program(self, tips: Tips, aim: Aim, work: Work, *, meets: bool = False) -> Program:
+        """Return the problem of a target on a grid, each of whose points takes off its share of the work."""
+        program = tips.program(aim, meets=meets)
+        if not self._chained or tips.intervals is None:
+            return program
+        grid = self.poses.grid(tips.intervals)
+
+        def afford() -> bool:
+            if work.used_up:
+                return False
+            work.spend(grid, _PER_POINT)
+            return True
+
+        return replace(program, afford=afford)
+
+    def _ends(self, aim: Aim, near: Reached | None, work: Work) -> Iterator[Found]:
         """Return where coarse searches end, best first; the first that meets the target at once if no choice is left.
 
         With more sets than the target needs, every start is searched and the smallest pressures come first.
         """
         return best_first(
             self._starts(aim, near),
-            partial(self._search, aim),
+            partial(self._search, aim, work),
             enough=lambda found: found.met and not self._redundant(aim),
             place=lambda found: found.point.theta,
             same=_SAME_PLACE,
             rank=lambda found: found.rank,
         )
 
-    def _more_ends(self, aim: Aim) -> Iterator[Found]:
+    def _more_ends(self, aim: Aim, work: Work) -> Iterator[Found]:
         """Yield where searches from further starts meet the target, where there are many ways to meet it."""
         if self._redundant(aim):
             tips = self._coarse.nearest(self._coarse.program(aim), _STARTS + _MORE_STARTS)[_STARTS:]
-            found = (self._search(aim, (tip.theta, tip, False)) for tip in tips)
+            found = (self._search(aim, work, (tip.theta, tip, False)) for tip in tips)
             yield from (one for one in found if one is not None and one.met)
 
     def _starts(self, aim: Aim, near: Reached | None) -> Iterator[Start]:
@@ -177,10 +195,10 @@ class InverseKinematics:
             yield from ((arc.theta, None, False) for arc in self._arcs.nearest(self._arcs.program(aim), 1))
         yield from ((tip.theta, tip, False) for tip in self._coarse.nearest(self._coarse.program(aim), _STARTS))
 
-    def _search(self, aim: Aim, start: Start) -> Found | None:
+    def _search(self, aim: Aim, work: Work, start: Start) -> Found | None:
         """Search on the coarse map from a start; None where there is no tip."""
         z, near, continues = start
-        program = self._coarse.program(aim)
+        program = self._program(self._coarse, aim, work)
         begin = program.reduced.at(z, program.p, near)
         if begin is None and near is not None:
             begin = program.at(z)
@@ -189,7 +207,7 @@ class InverseKinematics:
         point, second = program.searched(begin)
         met = float(np.linalg.norm(point.r)) <= _COARSE_MET
         if met and self._redundant(aim):
-            strict = self._coarse.program(aim, meets=True)
+            strict = self._program(self._coarse, aim, work, meets=True)
             least, second = strict.searched(strict.again(point))
             least = program.again(least)
             point = least if float(np.linalg.norm(least.r)) <= _COARSE_MET else point
@@ -269,19 +287,31 @@ class InverseKinematics:
         elif fit.self_intersecting and SELF_INTERSECTION not in self.task.allow:
             message = f'{_NO_BODY}: {fit.warnings[-1]}; [robot] allow = ["{SELF_INTERSECTION}"] accepts it'
         if message:
-            return Step(pressure, Status.OUT_OF_REACH, message, residual=step.residual)
+            return Step(pressure, Status.OUT_OF_REACH, message, residual=step.residual, iterations=step.iterations)
         aimed = aim.aimed(step.pose)
         return Reached(pressure, step, solved, aimed, aim.cost(aimed))
 
-    def _searched(self, aim: Aim, best: Reached | None) -> Reached | None:
+    def _searched(self, aim: Aim, best: Reached | None, work: Work) -> Reached | None:
         """Search among stable poses without derivatives: where they end there is no slope to follow.
 
         It begins at the first stable pose of the table that is nearer than the best one known, or else at that one.
         """
         here = best
-        program = self._coarse.program(aim)
+        program, shown = self._coarse.program(aim), self._coarse.intervals or 1
+
+        def judge(z: Array) -> Reached | Step | None:
+            if work.used_up:
+                return None
+            judged = self._at(aim, z * BAR)
+            if self._chained:
+                step, intervals = (
+                    (judged, shown) if isinstance(judged, Step) else (judged.step, judged.solved.intervals)
+                )
+                work.spend(self.poses.grid(intervals), step.iterations)
+            return judged
+
         for tip in self._coarse.nearest(program, below=np.inf if best is None else best.cost):
-            judged = self._at(aim, tip.theta * BAR)
+            judged = judge(tip.theta)
             if isinstance(judged, Reached) and (best is None or judged.cost < best.cost):
                 here = judged
                 break
@@ -290,8 +320,8 @@ class InverseKinematics:
         reached = {(here.pressure / BAR).tobytes(): here}
 
         def cost(z: Array) -> float:
-            judged = self._at(aim, z * BAR)
-            if isinstance(judged, Step):
+            judged = judge(z)
+            if not isinstance(judged, Reached):
                 return np.inf
             reached[z.tobytes()] = judged
             return judged.cost
@@ -334,7 +364,7 @@ class InverseKinematics:
         old, new = (", ".join(f"{p / BAR:.3g}" for p in r.pressure) for r in (near, best))
         return [f"the pressures jump from ({old}) to ({new}) bar: followed from the target before, none is as near"]
 
-    def _out_of_reach(self, aim: Aim, best: Reached, rejected: Step | None) -> str:
+    def _out_of_reach(self, aim: Aim, best: Reached, rejected: Step | None, work: Work) -> str:
         """Say how near the tip comes."""
         left = []
         if best.aimed.distance is not None:
@@ -344,6 +374,8 @@ class InverseKinematics:
         assert best.aimed.tip_position is not None
         tip = ", ".join(f"{x / MILLIMETRE + 0.0:.2f}" for x in np.round(best.aimed.tip_position, 8))
         text = f"{Status.OUT_OF_REACH.advice}; the nearest tip is {' and '.join(left)}, at ({tip}) mm"
+        if work.used_up:
+            text += "; the search was stopped, since it took too long, so another may be nearer"
         if self._ended is not None and best.pressure.sum() > 0.999 * self.limits.largest_sum * BAR:
             text += f"; pressures end where the stretch does ({self._ended.status.value})"
         if rejected is not None and rejected.message.startswith(_NO_BODY):
