@@ -57,7 +57,7 @@ def judged(simulation: Simulation, fresh: Rod) -> float:
     numbers = fresh.sections.at(simulation.chambers.at(now.time, after=False))
     step = rule(simulation.asked.rule, before, now.time, simulation.acting(before[0].time))
     at = fresh.placed(numbers, now.e)
-    off = step.balance(fresh, now.e, at, simulation.acting(now.time, after=False)).off
+    off = step.balance(fresh, now.e, at, numbers, simulation.acting(now.time, after=False)).off
     return float(np.max(np.abs(off)))
 
 

@@ -219,9 +219,8 @@ def _linear(
     none = still(n)[1]
     for j in range(3):
         push = Acting(np.eye(3)[j], np.zeros(3), np.zeros(3))
-        N, M = rod.required(at.slope, at.offsets, none, push)
-        R_T = at.rotation.transpose(0, 2, 1)
-        by_force[:, :3, j], by_force[:, 3:, j] = rotated(R_T, N), rotated(R_T, M)
+        N, m = rod.required(at, at, none, push)
+        by_force[:, :3, j], by_force[:, 3:, j] = rotated(at.rotation.transpose(0, 2, 1), N), m
     solved = np.linalg.solve(mass, np.hstack([K, D, by_pressure.reshape(6 * n, -1), by_force.reshape(6 * n, -1)]))
     m = 6 * n
     states = 2 * m + (sets if lag else 0)

@@ -56,10 +56,10 @@ class Stepper:
         enough = max(self.tolerance, _ROUNDINGS * rod.noise(rule.rate))
         for count in range(_MOST + 1):
             at = rod.placed(numbers, e)
-            balance = rule.balance(rod, e, at, acting)
+            balance = rule.balance(rod, e, at, numbers, acting)
             size = float(np.max(np.abs(balance.off)))
             if size <= enough:
-                return Solved(Instant(t, e, at, balance.motion), balance, size, count)
+                return Solved(Instant(t, e, at, balance.motion, numbers), balance, size, count)
             if not size < 1e6 or count == _MOST:
                 break
             known = self._factors is not None and self._factors[0] == rule.rate
@@ -85,7 +85,7 @@ class Stepper:
             off, N, M, _, motion = at_end(rod, e, at, parts, acting)
             size = float(np.max(np.abs(off)))
             if size <= self.tolerance:
-                return Instant(0.0, e, at, motion), size
+                return Instant(0.0, e, at, motion, numbers), size
             if not size < _LONGEST:
                 break
             e = e - _solved(_factors(rod.slope(at, N, M, 0.0, acting)), off.ravel()).reshape(-1, 6)

@@ -170,7 +170,7 @@ class Simulation:
         if asked.start == "rest":
             numbers = sections.at(np.zeros(self.body.sets))
             e = np.zeros((self.rod.size, 6))
-            begun, residual = Instant(0.0, e, self.rod.placed(numbers, e), still(self.rod.size)[0]), 0.0
+            begun, residual = Instant(0.0, e, self.rod.placed(numbers, e), still(self.rod.size)[0], numbers), 0.0
         else:
             numbers = sections.at(self.chambers.at(0.0, after=False))
             begun, residual = self.stepper.pose(numbers, before := self.acting(0.0, after=False))
@@ -187,7 +187,7 @@ class Simulation:
         """Return an instant with the resultants behind a jump, its shape and speeds as they are."""
         e = self.rod.sections.resultants(numbers, one.at.strains)
         at = self.rod.shape(*self.rod.sections.strains(numbers, e))
-        return replace(one, e=e, at=at)
+        return replace(one, e=e, at=at, numbers=numbers)
 
     def run(self) -> Iterator[Output]:
         """Yield what is kept, in order. Raises `Failed` where a step cannot be solved, its message with the time."""
