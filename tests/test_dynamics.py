@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -29,9 +28,9 @@ from softnlp.base.status import Status
 from softnlp.dynamics.drive import Chambers, Series
 from softnlp.dynamics.rod import matrices, rotated, turned_by
 from softnlp.dynamics.simulation import Dynamics, Output, Simulation
-from softnlp.model.round_chambers import RoundChambers
 from softnlp.studies.dynamic import dynamic
 from softnlp.studies.modes import modes
+from tests.moving_bodies import TWO, Stiffening
 
 Array = NDArray[np.float64]
 D25, RUBBER = robot("D25L60"), material("Ecoflex 00-50")
@@ -188,16 +187,6 @@ def test_it_settles_on_the_pose_of_statics() -> None:
     assert np.allclose(last.shape.curvature, pose.shape.curvature, atol=1e-4 * np.abs(pose.shape.curvature).max())
 
 
-class Stiffening(RoundChambers):
-    """A section that bends less the more it is bent: u = m/EI (1 - (m/m_0)^2/3), of a potential of the resultants."""
-
-    def strains(self, section: Any, own: Any, force: Any, moment: Any) -> tuple[Any, Any]:
-        v, u = super().strains(section, own, force, moment)
-        m_x, m_y = moment[0] + section.pressure_moment_x, moment[1] + section.pressure_moment_y
-        factor = 1 - (m_x**2 + m_y**2) / (3 * (section.bending_x / section.length * 4) ** 2)
-        return v, ca.vertcat(u[0] * factor, u[1] * factor, u[2])
-
-
 def test_a_section_whose_strains_are_not_linear() -> None:
     """It begins at the pose of statics, and keeps the energy of a release."""
     body = Body([Segment(D25, RUBBER, Stiffening)])
@@ -210,12 +199,6 @@ def test_a_section_whose_strains_are_not_linear() -> None:
     assert off < 1e-8
 
 
-TWO = segmented_robot(
-    [
-        Segment(replace(D25, length=0.03), RUBBER, connector=0.005, lines="bonded"),
-        Segment(replace(robot("D20L40"), length=0.02), material("Ecoflex 00-30"), turn=0.7, connector=0.004),
-    ]
-)
 CONE = segmented_robot([Segment(D25, RUBBER, along={"robot.outer_diameter": (0.025, 0.0245)})])
 
 

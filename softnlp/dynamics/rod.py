@@ -236,19 +236,37 @@ class Rod:
         Both are (n, 3). N works on the change of the slope, and m on that of the curvature: the sum of w m over the
         points is the sum of the moments' work on the turn from one shape to the other.
         """
-        f = self.mass[:, None] * (inertia.acceleration[:-1] - acting.gravity)
-        N_tip = acting.force - acting.mass * (inertia.acceleration[-1] - acting.gravity)
+        f, N_tip = self.pulled(inertia, acting)
         N = N_tip - self.B @ f
-        work = np.empty((len(at.collocated), 3))
-        work[: self.size] = self.w[:, None] * (cross((was.slope + at.slope) / 2, N) - inertia.turning)
-        work[self.size] = acting.moment
+        return N, self.turned_back(was, at, self.work(was, at, N, inertia, acting))
+
+    def pulled(self, inertia: Inertia, acting: Acting) -> tuple[Array, Array]:
+        """Return what N loses towards the tip per length (n, 3), and N at the tip (3,)."""
+        f = self.mass[:, None] * (inertia.acceleration[:-1] - acting.gravity)
+        return f, acting.force - acting.mass * (inertia.acceleration[-1] - acting.gravity)
+
+    def work(self, was: Placed, at: Placed, N: Array, inertia: Inertia, acting: Acting) -> Array:
+        """Return the moments that work on the turn at points, tip and connectors (n + 1 + m, 3), world frame."""
+        found = np.empty((len(at.collocated), 3))
+        found[: self.size] = self.w[:, None] * (cross((was.slope + at.slope) / 2, N) - inertia.turning)
+        found[self.size] = acting.moment
         if self.grid.joints.size:
+            f, N_tip = self.pulled(inertia, acting)
             beyond = self.w - self.grid.at_joints
-            work[self.size + 1 :] = cross((was.offsets + at.offsets) / 2, N_tip - beyond @ f)
-        return N, self.turned_back(was, at, work)
+            found[self.size + 1 :] = cross((was.offsets + at.offsets) / 2, N_tip - beyond @ f)
+        return found
 
     def turned_back(self, was: Placed, at: Placed, work: Array) -> Array:
         """Return the moments (n, 3), body frame, whose work on the change of U is that of moments on the turn.
+
+        work : as of `costates`, which the grid carries to the base.
+        """
+        x, q = self.costates(was, at, work)[0], (was.collocated + at.collocated)[: self.size] / 2
+        found: Array = times(q * _CONJUGATE, x)[:, 1:] / 2
+        return found
+
+    def costates(self, was: Placed, at: Placed, work: Array) -> tuple[Array, Array]:
+        """Return the costate of the quaternion at points (n, 4) and at the ends of intervals (K + 1, 4).
 
         work : (n + 1 + m, 3) moments that work on Cayley's vector of the turn at points, tip and connectors, world
         frame. Half that vector is vec(dq q*) / (q_0 . q_1), q the mean and dq the difference of the quaternions, which
@@ -274,16 +292,15 @@ class Rod:
         passed = self._weights[:, :, None, None] * turned / 2
         through, added = -passed[..., 0].sum(axis=1), y[:n].reshape(K, d, 4).sum(axis=1) - passed[..., 1].sum(axis=1)
         through[:, 0] += 1.0
-        ends, now = np.empty((K, 4)), y[n]
+        ends, nodes, now = np.empty((K, 4)), np.empty((K + 1, 4)), y[n]
+        nodes[K] = now
         joints = dict(zip(grid.joints.tolist(), y[n + 1 :], strict=True))
         for k in range(K - 1, -1, -1):
             if k + 1 in joints:
                 now = now + joints[k + 1]
             ends[k] = now
-            now = (now[:, None] * through[k]).ravel() @ _TIMES + added[k]
-        x = times(ends.repeat(d, axis=0), free.reshape(-1, 4)) + forced.reshape(-1, 4)
-        found: Array = times(q[:n] * _CONJUGATE, x)[:, 1:] / 2
-        return found
+            now = nodes[k] = (now[:, None] * through[k]).ravel() @ _TIMES + added[k]
+        return times(ends.repeat(d, axis=0), free.reshape(-1, 4)) + forced.reshape(-1, 4), nodes
 
     def stress(self, e: Array, strain_rate: Array) -> Array:
         """Return (n, 6) resultants with damping, body frame."""

@@ -22,7 +22,7 @@ from softnlp.dynamics.sections import Numbers
 Array = NDArray[np.float64]
 RuleName = Literal["trapezoid", "bdf2"]
 
-_STILL = 1e-8  # of EI/L^2: work of a change so small that its defect is rounding alone
+STILL = 1e-8  # of EI/L^2: work of a change so small that its defect is rounding alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +71,10 @@ class Trapezoid:
         """What a rate at the end gains by the quantity there [1/s]."""
         return 2 / (self.t - self.last.time)
 
+    def acting(self, end: Acting) -> Acting:
+        """Return the mean loads."""
+        return Acting((end.force + self.begun.force) / 2, (end.moment + self.begun.moment) / 2, end.gravity, end.mass)
+
     def balance(self, rod: Rod, e: Array, at: Placed, numbers: Numbers, acting: Acting) -> Balance:
         """Return twice the mean balance over the step, in the body frame of its end."""
         last, was, c = self.last, self.last.at, self.rate
@@ -81,10 +85,7 @@ class Trapezoid:
         J = rod.inertia
         momentum = rotated(at.rotation, J * spin) - rotated(was.rotation, J * last.motion.spin)
         inertia = Inertia(c / 2 * (velocity - last.motion.velocity), c / 2 * momentum)
-        mean = Acting(
-            (acting.force + self.begun.force) / 2, (acting.moment + self.begun.moment) / 2, acting.gravity, acting.mass
-        )
-        N, m = rod.required(was, at, inertia, mean)
+        N, m = rod.required(was, at, inertia, self.acting(acting))
         stress = rod.stress(self.mean(rod, e, at, numbers), strain_rate)
         force = rotated((at.rotation + was.rotation) / 2, stress[:, :3])
         off = 2 * np.hstack([rotated(at.rotation.transpose(0, 2, 1), force - N), stress[:, 3:] - m])
@@ -100,7 +101,7 @@ class Trapezoid:
             return mean
         middle, more = rod.sections.strains(numbers, mean)[0], e - last.e
         defect = ((at.strains + last.at.strains) / 2 - middle) * more
-        work = (more * (at.strains - last.at.strains)).sum(axis=1) + _STILL * rod.units[0]
+        work = (more * (at.strains - last.at.strains)).sum(axis=1) + STILL * rod.units[0]
         found: Array = mean + (2 / 3 * defect.sum(axis=1) / work)[:, None] * more
         return found
 
@@ -122,6 +123,10 @@ class Backward:
     def rate(self) -> float:
         """What a rate at the end gains by the quantity there [1/s]."""
         return -sum(self.weights)
+
+    def acting(self, end: Acting) -> Acting:
+        """Return the loads that count: those at the end."""
+        return end
 
     def balance(self, rod: Rod, e: Array, at: Placed, numbers: Numbers, acting: Acting) -> Balance:
         """Return the balance at the end of the step."""

@@ -118,15 +118,10 @@ def dynamic_task(given: Read) -> DynamicTask:
     Raises
     ------
     InputError
-        With the table and the key, for times that do not fit, and an engine that does not run here.
+        With the table and the key, for times that do not fit.
     """
     table: DynamicTable = given.file.dynamic
     times = _times(given.file.pressure, given.steps)
-    solver = given.file.solver
-    if solver.engine == "ipopt" or solver.ipopt.model_dump(exclude_unset=True):
-        raise InputError(
-            "study 'dynamic' solves its steps by Newton's method alone so far", table="solver", key="engine"
-        )
     duration = table.duration_s
     if duration is None:
         if not times[-1] > 0:

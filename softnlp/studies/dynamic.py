@@ -72,7 +72,8 @@ def dynamic(
     coefficients, conventions
         As `softnlp.forward`.
     numerics
-        Of which `intervals` (to a segment), `accuracy` and `tolerance` count.
+        Of which `intervals` (to a segment), `accuracy`, `tolerance` and the engine with its options count. With "auto"
+        IPOPT closes the pose at the beginning, and the last step before about twenty of the outputs.
     title
         Kept with the run.
     progress
@@ -137,7 +138,9 @@ def _followed(
     outputs = asked.outputs
     try:
         intervals, error = chosen_intervals(body, loads, series, numerics)
-        simulation = Simulation(body, loads, asked, *series, intervals=intervals, tolerance=tolerance)
+        simulation = Simulation(
+            body, loads, asked, *series, intervals=intervals, tolerance=tolerance, numerics=numerics
+        )
         poses = Poses(simulation)
         for output in simulation.run():
             now = time.perf_counter()
@@ -187,7 +190,7 @@ def chosen_intervals(
         stepper = Stepper(Rod(sections, grid))
         try:
             numbers = sections.at(P[row])
-            found: Array = stepper.pose(numbers, acting)[0].at.position[-1]
+            found: Array = stepper.pose(numbers, acting).instant.at.position[-1]
             return found
         except Failed:  # a motion may go where no pose at rest is
             return None
