@@ -122,7 +122,7 @@ def compare_motion(asked: Scenario, measured: Path, out: Path | None, json: bool
     if report is not None:
         require_file(report)
     trace, tips, errors, notes = compared_trace(asked, measured)
-    document = document_text(results.trace_document(asked, measured.name, errors, notes), compact=False)
+    document = document_text(results.trace_document(asked, measured.name, trace, tips, errors, notes), compact=False)
 
     def figures() -> dict[str, object]:
         from softnlp.figures.trace import trace_figure

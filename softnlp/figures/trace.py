@@ -33,12 +33,12 @@ def trace_figure(title: str, trace: Trace, simulated: Mapping[str, Array], error
     if errors is not None and (first := errors.harmonic) is not None and first.measured:
         ratio, phase = abs(first.simulated) / abs(first.measured), np.rad2deg(first.phase)
         said += f"  ·  at {first.frequency:.3g} Hz {ratio:.3g} of the amplitude, {phase:+.3g} deg ahead"
-    figure = new_figure(8.4, 1.7 + 1.55 * (len(axes) + 1), title, said)
-    count, top, foot = len(axes) + 1, 0.86, 0.1
+    figure = new_figure(8.4, 1.6 + 1.45 * (len(axes) + 1), title, said)
+    count, top, foot = len(axes) + 1, 1 - 0.75 / figure.get_figheight(), 0.7 / figure.get_figheight()
     height = (top - foot) / count
     last = list(simulated)[-1]
     for row in range(count):
-        panel = figure.add_axes((0.1, top - (row + 1) * height + 0.02, 0.87, height - 0.05))
+        panel = figure.add_axes((0.1, top - (row + 1) * height + 0.02, 0.87, height - 0.03))
         if row < len(axes):
             k = axes[row]
             plain(panel, "", f"tip {'xyz'[k]} [mm]")
@@ -50,12 +50,13 @@ def trace_figure(title: str, trace: Trace, simulated: Mapping[str, Array], error
             known = shown[np.isfinite(shown)]
             middle, span = (known.max() + known.min()) / 2, max(np.ptp(known), LEAST_SPAN * 1e-3)
             panel.set_ylim(middle - 0.58 * span, middle + 0.72 * span)
-            legend(panel, None, loc="upper right", ncols=3)
+            if row == 0:
+                legend(panel, None, loc="upper right", ncols=3)
             panel.tick_params(labelbottom=False)
         else:
             plain(panel, OUTPUTS["t"].axis, "distance [mm]")
             off = np.sqrt(np.nansum((simulated[last] - trace.tip) ** 2, axis=1)) / MILLIMETRE
             panel.plot(trace.times, off, color=colour(0), linewidth=1.2)
             panel.set_ylim(0, max(1.1 * float(off.max()), 1e-3))
-    figure.text(0.018, 0.012, "time as the pressures have it, tips in the robot's frame", size=SMALL, color=GREY)
+    figure.text(0.018, 0.018, "time as the pressures have it, tips in the robot's frame", size=SMALL, color=GREY)
     return figure

@@ -134,12 +134,18 @@ def trace_table_text(trace: Trace, simulated: dict[str, Array]) -> str:
     return csv_text(header, rows, 10)
 
 
-def trace_document(asked: Scenario, file: str, errors: TraceErrors, notes: tuple[str, ...]) -> dict[str, Any]:
-    """Return the JSON document of a motion compared with a trace."""
+def trace_document(
+    asked: Scenario, file: str, trace: Trace, tips: Array, errors: TraceErrors, notes: tuple[str, ...]
+) -> dict[str, Any]:
+    """Return the JSON document of a motion compared with a trace. tips : simulated (rows, 3) [m]."""
     return {
         **document_head(asked.title, "compare", asked.conventions.name),
         "loads": loads_table(asked.loads),
         "file": file,
         **(errors_table(errors) or {}),
+        "measurements": [
+            {"t_s": float(t), "measured": _place(trace.tip[k]), "simulated": _place(tips[k])}
+            for k, t in enumerate(trace.times)
+        ],
         "notes": list(notes),
     }

@@ -22,7 +22,7 @@ from softnlp.scenario.dynamic import DynamicTask, dynamics_of, row_times
 from softnlp.scenario.laboratory import import_notes, laboratory_columns
 from softnlp.scenario.measured_rows import ALIASES, TIP_COLUMNS, named_columns, near_misses
 from softnlp.scenario.pressures import require_no_gap
-from softnlp.studies.trace import Trace, TraceErrors, checked_trace, simulated_tips, trace_errors
+from softnlp.studies.trace import Trace, TraceErrors, checked_trace, simulated_tips, times_of, trace_errors
 
 if TYPE_CHECKING:  # imported where needed: to read a scenario takes none of them
     from softnlp.studies.identify_motion import MotionFit
@@ -180,8 +180,7 @@ def compared_trace(scenario: Scenario, path: str | PathLike[str]) -> tuple[Trace
     assert isinstance(task, DynamicTask)
     trace, columns, notes = read_trace(Path(), [str(path)])
     duration = float(trace.times[-1])
-    apart = float(np.median(np.diff(trace.times))) if trace.times.size > 1 else duration
-    asked = replace(task.asked, duration=duration, output_step=min(apart, task.asked.output_step, duration))
+    asked = replace(task.asked, duration=duration)
     t, F = series_of(task.times, task.forces, len(scenario.pressures))
     body, both = body_of(scenario.model), (Series(t, scenario.pressures), Series(t, F))
     numerics = scenario.numerics
@@ -189,9 +188,16 @@ def compared_trace(scenario: Scenario, path: str | PathLike[str]) -> tuple[Trace
         intervals, _ = chosen_intervals(body, scenario.loads, both, numerics)
         tolerance = min(numerics.tolerance, 1e-8) / 10
         made = Simulation(
-            body, scenario.loads, asked, *both, intervals=intervals, tolerance=tolerance, numerics=numerics
+            body,
+            scenario.loads,
+            asked,
+            *both,
+            intervals=intervals,
+            tolerance=tolerance,
+            numerics=numerics,
+            kept=times_of(trace),
         )
-        tips = simulated_tips(made, trace.times)
+        tips = simulated_tips(made, trace.times.size)
     except Failed as failure:
         raise InputError(f"{columns.file}: {sentence(failure)}", source=str(scenario.path)) from None
     return trace, tips, trace_errors(trace, tips), notes

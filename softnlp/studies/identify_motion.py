@@ -29,7 +29,7 @@ from softnlp.studies.check import Check, messages
 from softnlp.studies.dynamic import chosen_intervals, sentence, series_of
 from softnlp.studies.fit_statistics import Uncertainty, constant_note, determined, open_constants, uncertainty
 from softnlp.studies.forward import checked_loads, pressure_table
-from softnlp.studies.trace import Trace, TraceErrors, checked_trace, simulated_tips, trace_errors
+from softnlp.studies.trace import Trace, TraceErrors, checked_trace, simulated_tips, times_of, trace_errors
 from softnlp.studies.uncertainty import scalable, scaling_constants
 
 Array = NDArray[np.float64]
@@ -160,7 +160,6 @@ class Motion:
         asked = replace(
             self.asked,
             step=self.step,
-            output_step=self.step,
             damping=found.get("damping_s", self.asked.damping),
             lag=found.get("lag_s", self.asked.lag),
         )
@@ -171,8 +170,8 @@ class Motion:
             return asked, self.material, replace(self.coefficients, modulus_factor=factor)
         return asked, stiffer(self.material, factor), self.coefficients
 
-    def tips(self, values: Array, times: Array, numerics: Numerics | None = None) -> Array:
-        """Return the tips (rows, 3) at some times. Raises `Failed`."""
+    def tips(self, values: Array, trace: Trace, numerics: Numerics | None = None) -> Array:
+        """Return the tips (rows, 3) at the times of a trace. Raises `Failed`."""
         self.evaluations += 1
         asked, material, coefficients = self.with_values(values)
         body = body_of(Model(self.robot, material, coefficients, self.conventions))
@@ -182,9 +181,14 @@ class Motion:
         tolerance = min(self.numerics.tolerance, 1e-8) / 10
         simulation = Simulation(
             body, self.loads, asked, *both, intervals=self.intervals, tolerance=tolerance,
-            numerics=self.numerics.without_ipopt() if numerics is None else numerics,
+            numerics=self.search if numerics is None else numerics, kept=times_of(trace),
         )  # fmt: skip
-        return simulated_tips(simulation, times)
+        return simulated_tips(simulation, trace.times.size)
+
+    @property
+    def search(self) -> Numerics:
+        """What a search is made with: Newton's method alone, but with the engine "ipopt"."""
+        return self.numerics if self.numerics.engine == "ipopt" else self.numerics.without_ipopt()
 
     def modes(self, values: Array) -> Vibration | None:
         """Return how it swings about the pose at rest of the last pressures, None where there is none."""
@@ -323,7 +327,7 @@ class _Fit:
         """Return the tips (rows, 3), kept. Raises `Failed`."""
         key = x.tobytes()
         if key not in self._known:
-            self._known[key] = self.motion.tips(x, self.trace.times)
+            self._known[key] = self.motion.tips(x, self.trace)
             if self.progress is not None:
                 r = self.residuals(self._known[key])
                 self.progress(self.motion.evaluations, float(np.sqrt(np.mean(r**2))))
@@ -372,7 +376,7 @@ class _Fit:
             x = np.where(done.x * scale - self.lower < _AT_BOUND * scale, self.lower, done.x * scale)
             x = np.where(self.upper - x < _AT_BOUND * scale, self.upper, x)
             engine = motion.numerics
-            after = motion.tips(x, self.trace.times, engine) if engine.engine != "newton" else self.tips(x)
+            after = motion.tips(x, self.trace, engine) if engine.engine == "auto" else self.tips(x)
             return self._found(x, before, after)
         except Failed as failure:
             return self._result(failure.status, sentence(failure), before)
@@ -408,7 +412,7 @@ class _Fit:
         asked, material, coefficients = motion.with_values(x)
         warnings = [*known.warnings, *open_constants(names, x, known.standard_errors, held)]
         motion.step /= 2
-        finer = self.residuals(motion.tips(x, self.trace.times)) - r
+        finer = self.residuals(motion.tips(x, self.trace)) - r
         motion.step *= 2
         share = np.linalg.norm(finer) / np.linalg.norm(r)
         if share > _COARSE and np.linalg.norm(finer) > _SMALL * errors.movement * np.sqrt(r.size):

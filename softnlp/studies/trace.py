@@ -108,22 +108,17 @@ def checked_trace(times: Any, tip: Any) -> Trace:
     return Trace(t, p)
 
 
-def simulated_tips(simulation: Simulation, times: Array) -> Array:
-    """Return the tips (rows, 3) of a simulation at some times, by Hermite's polynomials between its outputs.
+def times_of(trace: Trace) -> Array:
+    """Return the times of a trace from 0 on, which a simulation keeps."""
+    return trace.times if trace.times[0] == 0 else np.append(0.0, trace.times)
+
+
+def simulated_tips(simulation: Simulation, rows: int) -> Array:
+    """Return the tips (rows, 3) of the last outputs of a simulation that keeps `times_of` a trace.
 
     Raises `Failed` where it cannot be followed to the last of them.
     """
-    from scipy.interpolate import CubicHermiteSpline
-
-    outputs = [output.instant for output in simulation.run()]
-    t = np.array([one.time for one in outputs])
-    p, v = (
-        np.array(values) for values in zip(*((o.at.position[-1], o.motion.velocity[-1]) for o in outputs), strict=True)
-    )
-    if times[-1] > t[-1] + 1e-9:
-        raise AssertionError("a simulation that ends before what it is compared with")
-    found: Array = CubicHermiteSpline(t, p, v)(np.minimum(times, t[-1]))
-    return found
+    return np.array([output.instant.at.position[-1] for output in simulation.run()])[-rows:]
 
 
 def trace_errors(trace: Trace, simulated: Array) -> TraceErrors:
