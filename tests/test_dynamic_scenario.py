@@ -76,6 +76,21 @@ def test_a_run_leaves_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert (out / "figure.png").stat().st_size > 10_000
 
 
+@pytest.mark.parametrize(("engine", "closed"), [("auto", True), ("ipopt", True), ("newton", False)])
+def test_each_step_says_its_engine(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], engine: str, closed: bool
+) -> None:
+    text = TABLES.replace("duration_s = 0.04", "duration_s = 0.02")
+    options = "" if engine == "newton" else "ipopt.max_iter = 30\n"
+    path = scenario(tmp_path, f'{text}[solver]\nengine = "{engine}"\n{options}')
+    assert main(["run", str(path), "--json"]) == 0
+    for step in json.loads(capsys.readouterr().out)["steps"]:
+        assert step["engine"] == engine
+        assert step["ipopt_status"] == ("Solve_Succeeded" if closed else None)
+        assert (step["ipopt_iterations"] is not None) == closed
+        assert step["residual"] < 1e-8
+
+
 def test_what_is_stopped_is_kept(tmp_path: Path) -> None:
     """Ctrl-C ends a run between two outputs: those before are a run with a balance of its own."""
     asked = load_scenario(scenario(tmp_path))
@@ -137,7 +152,7 @@ LOG = "t_s,p1_bar,p2_bar,p3_bar\n" + "".join(f"{k / 100},0.1,0,0\n" for k in ran
         (TABLES.replace("[0.0, 0.02]", "[0.02, 0.0]"), {}, "[pressure] t_s: item 2: expected a time of at least 0.02"),
         (TABLES.replace("[0.0, 0.02]", "[0.0]"), {}, "[pressure] t_s: expected 2 times, one a row, got 1"),
         (TABLES + '[[obstacle]]\nkind = "sphere"\n', {}, "[obstacle]: this table is not used by study 'dynamic'"),
-        (TABLES + '[solver]\nengine = "ipopt"\n', {}, "[solver] engine: study 'dynamic' solves its steps by Newton's"),
+        (TABLES + '[solver]\nengine = "newton"\nipopt.tol = 1e-9\n', {}, "not used with the engine 'newton'"),
         (TABLES.replace("lag_s", "leg_s"), {}, "leg_s"),
         (TABLES.replace("damping_s = 0.004", "damping_s = -1.0"), {}, "damping_s"),
         (TABLES.replace("damping_s", 'step_s = "small"\ndamping_s'), {}, "step_s: expected 'auto' or a number above 0"),

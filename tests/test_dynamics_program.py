@@ -1,11 +1,12 @@
-"""One step of time as a nonlinear program of the rod's own field, closed by IPOPT, against what Newton's method found.
+"""Steps of time closed by IPOPT: the program of the package, and one that shares nothing with it, as its witness.
 
-Nothing is shared with the steps of a run but the section and the field of statics: all states p, R, N, M at every node
-and Gauss point are unknown, rotations are matrices, and no slope is written by hand.
+With the witness the section and the field of statics are all that is shared with the steps of a run: all states p, R,
+N, M at every node and Gauss point are unknown, rotations are matrices, and no slope is written by hand.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -13,14 +14,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from softnlp import BAR, Body, Loads, Segment, material, robot
+from softnlp import BAR, Body, Loads, Numerics, Segment, material, robot
+from softnlp.base.status import Status
 from softnlp.dynamics.drive import Series
 from softnlp.dynamics.grid import gauss
+from softnlp.dynamics.motion import Stepper
 from softnlp.dynamics.rod import matrices
 from softnlp.dynamics.rules import Instant
-from softnlp.dynamics.simulation import Dynamics, Simulation
+from softnlp.dynamics.sections import Failed
+from softnlp.dynamics.simulation import Dynamics, Output, Simulation
 from softnlp.model import rod
 from softnlp.model.section import RodSection, rod_section
+from tests.moving_bodies import TWO, Stiffening
 
 Array = NDArray[np.float64]
 
@@ -99,3 +104,68 @@ def test_ipopt_closes_a_step_where_newton_found_it(bars: tuple[float, ...]) -> N
     assert moved > 0.005 * body.length
     found = closed_by_ipopt(simulation, first.instant, h)
     assert np.allclose(found, last.instant.at.position[:-1], rtol=0, atol=5e-8 * body.length)
+
+
+# --- the engines ------------------------------------------------------------------------------------------------------
+
+RUBBER = material("Ecoflex 00-50")
+ENERGY_LIKE = Body([Segment(robot("D25L60"), RUBBER, Stiffening)])
+BODIES = {
+    "one": (Body([Segment(robot("D25L60"), RUBBER)]), (0.5, 0.2, 0.0)),
+    "segments": (Body(TWO.segments), (0.4, 0.1, 0.0, 0.2, 0.0, 0.3)),
+    "strains not linear": (ENERGY_LIKE, (0.5, 0.2, 0.0)),
+}
+
+
+def followed(which: str, rule: Any, engine: Any, steps: int = 2, **more: Any) -> tuple[Simulation, list[Output]]:
+    """Return a release under a ramp of pressure, with a mass at the tip and damping."""
+    body, bars = BODIES[which]
+    rows = np.array([[0.5], [1.0]]) * np.array([bars]) * BAR
+    asked = Dynamics(5e-3 * steps, 5e-3, rule=rule, damping=2e-3, output_step=5e-3, release=True, tip_mass=2e-3)
+    loads = Loads((0.01, 0.005, 0.008), (5e-5, 0.0, 1e-4), (1.0, 0.0, 9.0))
+    pressures = Series(np.array([0.0, 5e-3 * steps]), rows)
+    force = Series(np.array([0.0, 0.1]), np.array([[0.0] * 3, [0.02, 0.0, 0.01]]))
+    made = Simulation(body, loads, asked, pressures, force, numerics=Numerics(engine=engine), **more)
+    return made, list(made.run())
+
+
+@pytest.mark.parametrize("rule", ["trapezoid", "bdf2"])
+@pytest.mark.parametrize("which", BODIES)
+def test_three_engines_agree(which: str, rule: Any) -> None:
+    """From the pose at rest on: by Newton's method, by IPOPT on the whole program, and the one by the other."""
+    body = BODIES[which][0]
+    by_newton, by_ipopt, both = (followed(which, rule, engine)[1] for engine in ("newton", "ipopt", "auto"))
+    for one, other, third in zip(by_newton, by_ipopt, both, strict=True):
+        here = one.instant.at.position
+        assert np.allclose(other.instant.at.position, here, rtol=0, atol=1e-9 * body.length)
+        assert np.allclose(third.instant.at.position, here, rtol=0, atol=1e-9 * body.length)
+        assert one.ipopt is None
+        assert other.ipopt is not None
+        assert third.ipopt is not None
+        assert other.ipopt.status == third.ipopt.status == "Solve_Succeeded"
+        assert other.ipopt.iterations >= third.ipopt.iterations
+        assert max(other.residual, third.residual) < 1e-9
+    assert np.linalg.norm(by_newton[-1].instant.at.position[-1] - by_newton[0].instant.at.position[-1]) > 1e-4
+
+
+def test_auto_closes_some_steps_of_a_long_run() -> None:
+    """The pose at the beginning, the last step, and about twenty between."""
+    outputs = followed("one", "trapezoid", "auto", steps=50)[1]
+    closed = [k for k, output in enumerate(outputs) if output.ipopt is not None]
+    assert closed == [0, *range(3, 50, 3), 50]
+
+
+def test_what_ipopt_does_not_confirm_is_disputed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A step of Newton's method that is off, as if its equations were others: both tips are said."""
+    plain = Stepper._by_newton
+
+    def off(self: Stepper, *given: Any) -> Any:
+        found = plain(self, *given)
+        e = found.instant.e * 1.001
+        at = self.rod.placed(found.instant.numbers, e)
+        return found._replace(instant=replace(found.instant, e=e, at=at))
+
+    monkeypatch.setattr(Stepper, "_by_newton", off)
+    with pytest.raises(Failed, match=r"at t = .*by Newton's method and at .*by IPOPT") as caught:
+        followed("one", "trapezoid", "auto")
+    assert caught.value.status is Status.DISPUTED

@@ -17,6 +17,7 @@ from softnlp.dynamics.motion import Stepper
 from softnlp.dynamics.rod import Acting, Rod, rotated, still
 from softnlp.dynamics.rules import Instant, at_end
 from softnlp.dynamics.sections import Numbers
+from softnlp.nlp.solver import Ipopt
 
 Array = NDArray[np.float64]
 Kind = Literal["bending", "torsion", "extension"]
@@ -97,6 +98,8 @@ class Vibration:
         (3,) at rest, world frame [m].
     residual
         Of the pose, scaled [1].
+    ipopt
+        What IPOPT said of the pose, None where it took no part.
     """
 
     modes: tuple[Mode, ...]
@@ -105,6 +108,7 @@ class Vibration:
     place: Array
     tip: Array
     residual: float
+    ipopt: Ipopt | None = None
 
     @property
     def stable(self) -> bool:
@@ -115,16 +119,17 @@ class Vibration:
 _NAMES = ("v1", "v2", "v3", "u1 [1/m]", "u2 [1/m]", "u3 [1/m]")
 
 
-def vibration(rod: Rod, pressures: Array, acting: Acting, radius: float, lag: float = 0.0) -> Vibration:
-    """Return modes and linear system about the pose at rest.
+def vibration(stepper: Stepper, pressures: Array, acting: Acting, radius: float, lag: float = 0.0) -> Vibration:
+    """Return modes and linear system about the pose at rest, which the stepper finds.
 
     pressures : (sets,) [Pa]. radius : of the body, which says how torsion counts beside displacement [m]. lag : of
     the chambers behind the regulators, whose pressures are the inputs then [s].
     Raises `Failed` where there is no pose at rest.
     """
-    n = rod.size
-    numbers = rod.sections.at(pressures)
-    pose, residual = Stepper(rod).pose(numbers, acting)
+    rod = stepper.rod
+    n, numbers = rod.size, rod.sections.at(pressures)
+    found = stepper.pose(numbers, acting)
+    pose, residual = found.instant, found.residual
     K, D, mass = _matrices(rod, pose, acting)
     elastic = np.linalg.inv(pose.at.compliance)
     move, turn = rod.kinematics(pose.at)
@@ -164,7 +169,7 @@ def vibration(rod: Rod, pressures: Array, acting: Acting, radius: float, lag: fl
         )
     linear = _linear(rod, numbers, pressures, pose, (K, D, mass), move, lag)
     place = np.append(rod.grid.place, rod.grid.ends[-1]) / rod.grid.ends[-1]
-    return Vibration(tuple(modes), linear, pressures, place, pose.at.position[-1], residual)
+    return Vibration(tuple(modes), linear, pressures, place, pose.at.position[-1], residual, found.ipopt)
 
 
 def grows(rod: Rod, pose: Instant, acting: Acting) -> bool:
@@ -176,7 +181,7 @@ def grows(rod: Rod, pose: Instant, acting: Acting) -> bool:
 def _matrices(rod: Rod, pose: Instant, acting: Acting) -> tuple[Array, Array, Array]:
     """Return K, D and M about a pose at rest."""
     n = rod.size
-    _, N, M, _, _ = at_end(rod, pose.e, pose.at, still(n), acting)
+    _, N, M, *_ = at_end(rod, pose.e, pose.at, still(n), acting)
     K = -rod.tangent(pose.at, N, M, 0.0, acting)
     mass, D = -rod.tangent(pose.at, N, M, 1.0, acting) - K, np.zeros((6 * n, 6 * n))
     K.reshape(n, 6, n, 6)[range(n), :, range(n)] += np.linalg.inv(pose.at.compliance)
@@ -205,7 +210,7 @@ def _linear(
     lag: float,
 ) -> Linear:
     """Return the linear system; the pressures in the chambers are states behind a lag."""
-    n, sets = rod.size, pressures.size
+    n, sets = rod.size, int(pressures.size)
     K, D, mass = matrices
     e, at = pose.e, pose.at
     by_pressure = np.empty((n, 6, sets))
@@ -219,9 +224,8 @@ def _linear(
     none = still(n)[1]
     for j in range(3):
         push = Acting(np.eye(3)[j], np.zeros(3), np.zeros(3))
-        N, M = rod.required(at.slope, at.offsets, none, push)
-        R_T = at.rotation.transpose(0, 2, 1)
-        by_force[:, :3, j], by_force[:, 3:, j] = rotated(R_T, N), rotated(R_T, M)
+        N, moment = rod.required(at, at, none, push)
+        by_force[:, :3, j], by_force[:, 3:, j] = rotated(at.rotation.transpose(0, 2, 1), N), moment
     solved = np.linalg.solve(mass, np.hstack([K, D, by_pressure.reshape(6 * n, -1), by_force.reshape(6 * n, -1)]))
     m = 6 * n
     states = 2 * m + (sets if lag else 0)

@@ -94,7 +94,8 @@ class Poses:
             iterations=output.iterations,
             solve_time=seconds,
             warnings=warnings,
-            engine="newton",
+            engine=self._simulation.numerics.engine if output.ipopt is not None else "newton",
+            ipopt=output.ipopt,
             moving=moving,
         )
 

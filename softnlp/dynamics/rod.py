@@ -4,15 +4,18 @@ What is solved for are the elastic resultants e at every Gauss point, force and 
 strains, strains the shape (from the base), the shape velocities and accelerations (by a rule in time), and those the
 resultants again, from the tip: N' = rho A_0 (a - g), M' = -p' x N + R (J w' + w x J w) per length as cast. With damping
 stress is e + D times the rate of the strains, D the stiffness as cast times a time.
+
+What the resultants have to carry is the exact adjoint of how the shape on the grid follows the strains, between two
+shapes as well as at one: the work of all forces on a step is then that of the resultants, to rounding, on any grid.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
 from softnlp.dynamics.grid import Grid
@@ -37,14 +40,16 @@ class Acting:
 class Placed(NamedTuple):
     """A shape. strains : (n, 6). compliance : (n, 6, 6). turn : (n + 1, 4) quaternions w, x, y, z, the tip last.
 
-    turn_rate : (n, 4) their rates along the rod [1/m]. rotation : (n, 3, 3). slope : (n, 3) p' per length as cast.
-    position : (n + 1, 3), the tip last [m]. offsets : (m, 3) of connectors [m].
+    turn_rate : (n, 4) their rates along the rod [1/m]. collocated : (n + 1 + m, 4) the quaternions as the rates give
+    them, of a length that is 1 but for the grid, those of connectors last. rotation : (n, 3, 3). slope : (n, 3) p' per
+    length as cast. position : (n + 1, 3), the tip last [m]. offsets : (m, 3) of connectors [m].
     """
 
     strains: Array
     compliance: Array
     turn: Array
     turn_rate: Array
+    collocated: Array
     rotation: Array
     slope: Array
     position: Array
@@ -87,39 +92,67 @@ def rotated(R: Array, a: Array) -> Array:
     return found
 
 
+def _bilinear(product: Callable[[Array, Array], Array], left: int, right: int) -> Array:
+    """Return (left right, size) what the outer product of two vectors is multiplied with for a bilinear product."""
+    pairs = [product(a, b) for a in np.eye(left) for b in np.eye(right)]
+    return np.array([np.ravel(pair) for pair in pairs])
+
+
+def _quaternion(a: Array, b: Array) -> Array:
+    return np.array([a[0] * b[0] - a[1:] @ b[1:], *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
+
+
+_ONE = np.array([1.0, 0.0, 0.0, 0.0])
+_CROSS = _bilinear(np.cross, 3, 3)
+_TIMES = _bilinear(_quaternion, 4, 4)
+_CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
+_TURN = _bilinear(
+    lambda a, b: np.array([_quaternion(_quaternion(a, np.array([0.0, *v])), b * _CONJUGATE)[1:] for v in np.eye(3)]).T,
+    4,
+    4,
+)
+"""R of q q: both sides of q v q*."""
+_RIGHT = np.array([[_quaternion(e, np.array([0.0, *u])) for e in np.eye(4)] for u in np.eye(3)])
+_RIGHT = _RIGHT.transpose(0, 2, 1).reshape(3, 16)
+_HATS = np.array([np.cross(u, np.eye(3)).T for u in np.eye(3)]).reshape(3, 9)
+# numpy's own cross and what is written by component cost several times as much at so few points.
+
+
 def cross(a: Array, b: Array) -> Array:
-    """Return a x b along the last axis (np.cross costs ten times as much here)."""
-    found = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    a0, a1, a2 = a[..., 0], a[..., 1], a[..., 2]
-    b0, b1, b2 = b[..., 0], b[..., 1], b[..., 2]
-    found[..., 0], found[..., 1], found[..., 2] = a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
+    """Return a x b along the last axis."""
+    both: Array = a[..., :, None] * b[..., None, :]
+    found: Array = both.reshape(*both.shape[:-2], 9) @ _CROSS
     return found
 
 
 def hats(a: Array) -> Array:
     """Return (n, 3, 3) the matrices that multiply as a x."""
-    found = np.zeros((len(a), 3, 3))
-    found[:, 0, 1], found[:, 0, 2], found[:, 1, 2] = -a[:, 2], a[:, 1], -a[:, 0]
-    found[:, 1, 0], found[:, 2, 0], found[:, 2, 1] = a[:, 2], -a[:, 1], a[:, 0]
+    found: Array = (a @ _HATS).reshape(-1, 3, 3)
+    return found
+
+
+def times(a: Array, b: Array) -> Array:
+    """Return (n, 4) the products of quaternions."""
+    found: Array = (a[:, :, None] * b[:, None, :]).reshape(-1, 16) @ _TIMES
+    return found
+
+
+def by_right(U: Array) -> Array:
+    """Return (n, 4, 4) what multiplies a quaternion by (0, U) from the right."""
+    found: Array = (U @ _RIGHT).reshape(-1, 4, 4)
     return found
 
 
 def matrices(q: Array) -> Array:
     """Return (n, 3, 3) rotations of unit quaternions (n, 4)."""
-    w, x, y, z = q.T
-    R = np.empty((len(q), 3, 3))
-    R[:, 0, 0], R[:, 0, 1], R[:, 0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
-    R[:, 1, 0], R[:, 1, 1], R[:, 1, 2] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
-    R[:, 2, 0], R[:, 2, 1], R[:, 2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
-    return R
+    found: Array = ((q[:, :, None] * q[:, None, :]).reshape(-1, 16) @ _TURN).reshape(-1, 3, 3)
+    return found
 
 
 def turned_by(before: Array, after: Array) -> Array:
     """Return (n, 3) Cayley's vector of the rotation from one quaternion to another, body frame: 2 tan(angle/2) axis."""
-    w0, v0, w1, v1 = before[:, 0], before[:, 1:], after[:, 0], after[:, 1:]
-    w = w0 * w1 + (v0 * v1).sum(axis=1)
-    v = w0[:, None] * v1 - w1[:, None] * v0 - cross(v0, v1)
-    found: Array = 2 * v / w[:, None]
+    q = times(before * _CONJUGATE, after)
+    found: Array = 2 * q[:, 1:] / q[:, :1]
     return found
 
 
@@ -135,7 +168,6 @@ class Rod:
         self.mass, self.inertia = sections.mass, sections.inertia
         self.P, self.B, self.w = grid.from_base, grid.to_tip, grid.weight
         self.P_tip = np.vstack([self.P, self.w])
-        self.P_turn = np.vstack([self.P_tip, grid.at_joints])
         self.length = float(grid.ends[-1] + grid.connectors.sum())
         rest = sections.at(np.zeros(sections.body.sets)) if sections.body.sets else sections.at(np.zeros(0))
         self.at_rest = rest
@@ -146,31 +178,39 @@ class Rod:
         self._noise = (
             np.finfo(float).eps * self.length**2 / EI * np.array([np.mean(self.mass) * self.length**2, damping_s * EA])
         )
-        self._eye = np.eye(4 * n)
-        self._first = np.zeros(4 * n)
-        self._first[::4] = 1.0
-        self._half = self.P / 2
+        d, K = grid.points, grid.of_interval.size
+        inside = np.arange(n).reshape(K, d)
+        self._own = self.P[inside[:, :, None], inside[:, None, :]] / 2
+        self._onward = self.B[inside[:, :, None], inside[:, None, :]] / 2
+        self._weights = self.w.reshape(K, d)
+        self._eye = np.eye(4 * d)
+        self._ones = np.zeros((4 * d, 1))
+        self._ones[::4] = 1.0
 
     def noise(self, rate: float) -> float:
         """Return what rounding leaves of a residual, in `units`, where rates gain so much by what is at the end."""
         return float(self._noise @ [rate**2, rate])
 
-    def turns(self, U: Array) -> tuple[Array, Array, Array]:
-        """Return unit quaternions at points and tip (n + 1, 4), at connectors (m, 4), and their rates (n, 4).
+    def turns(self, U: Array) -> tuple[Array, Array]:
+        """Return quaternions at points, tip and connectors (n + 1 + m, 4), not quite of length 1, and rates (n, 4).
 
-        q' = q (0, U) / 2.
+        q' = q (0, U) / 2. Each interval is solved from the unit quaternion; what is before it multiplies from the left.
         """
-        n = self.size
-        M = np.zeros((n, 4, 4))
-        M[:, 1:, 0], M[:, 0, 1:] = U, -U
-        M[:, 1:, 1:] = -hats(U)
-        A = self._eye - (self._half[:, None, :, None] * M.transpose(1, 0, 2)[None]).reshape(4 * n, 4 * n)
-        q = scipy.linalg.lapack.dgesv(A, self._first)[2].reshape(n, 4)
-        rate = np.matmul(M, q[:, :, None])[:, :, 0] / 2
-        every = self.P_turn @ rate
-        every[:, 0] += 1.0
-        every /= np.sqrt((every**2).sum(axis=1))[:, None]
-        return every[: n + 1], every[n + 1 :], rate
+        grid, M = self.grid, by_right(U)
+        d, K = grid.points, grid.of_interval.size
+        A = self._eye - (self._own[:, :, None, :, None] * M.reshape(K, d, 4, 4).transpose(0, 2, 1, 3)[:, None]).reshape(
+            K, 4 * d, 4 * d
+        )
+        own: Array = np.asarray(np.linalg.solve(A, self._ones)[:, :, 0].reshape(-1, 4), float)
+        rate = np.matmul(M, own[:, :, None])[:, :, 0] / 2
+        ends = (self._weights[:, :, None] * rate.reshape(K, d, 4)).sum(axis=1)
+        ends[:, 0] += 1.0
+        nodes = np.empty((K + 1, 4))
+        nodes[0] = _ONE
+        for k in range(K):
+            nodes[k + 1] = (nodes[k][:, None] * ends[k]).ravel() @ _TIMES
+        before = nodes[:-1].repeat(d, axis=0)
+        return np.concatenate([times(before, own), nodes[-1:], nodes[grid.joints]]), times(before, rate)
 
     def placed(self, numbers: Numbers, e: Array) -> Placed:
         """Return the shape under elastic resultants (n, 6)."""
@@ -178,7 +218,9 @@ class Rod:
 
     def shape(self, strains: Array, compliance: Array) -> Placed:
         """Return the shape of strains (n, 6)."""
-        q, joints, rate = self.turns(strains[:, 3:])
+        collocated, rate = self.turns(strains[:, 3:])
+        unit, n = collocated / np.sqrt((collocated**2).sum(axis=1))[:, None], self.size
+        q, joints = unit[: n + 1], unit[n + 1 :]
         R = matrices(q[:-1])
         slope = np.matmul(R, strains[:, :3, None])[:, :, 0]
         p = self.P_tip @ slope
@@ -186,18 +228,79 @@ class Rod:
         if self.grid.joints.size:
             offsets = self.grid.connectors[:, None] * matrices(joints)[:, :, 2]
             p = p + self.grid.beyond @ offsets
-        return Placed(strains, compliance, q, rate, R, slope, p, offsets)
+        return Placed(strains, compliance, q, rate, collocated, R, slope, p, offsets)
 
-    def required(self, slope: Array, offsets: Array, inertia: Inertia, acting: Acting) -> tuple[Array, Array]:
-        """Return N and M (n, 3) that inertia and loads ask for at a slope p', with connectors' offsets; world frame."""
-        f = self.mass[:, None] * (inertia.acceleration[:-1] - acting.gravity)
-        N_tip = acting.force - acting.mass * (inertia.acceleration[-1] - acting.gravity)
+    def required(self, was: Placed, at: Placed, inertia: Inertia, acting: Acting) -> tuple[Array, Array]:
+        """Return what inertia and loads ask for between two shapes, which may be one: N world frame, m body frame.
+
+        Both are (n, 3). N works on the change of the slope, and m on that of the curvature: the sum of w m over the
+        points is the sum of the moments' work on the turn from one shape to the other.
+        """
+        f, N_tip = self.pulled(inertia, acting)
         N = N_tip - self.B @ f
-        M = acting.moment - self.B @ (inertia.turning - cross(slope, N))
+        return N, self.turned_back(was, at, self.work(was, at, N, inertia, acting))
+
+    def pulled(self, inertia: Inertia, acting: Acting) -> tuple[Array, Array]:
+        """Return what N loses towards the tip per length (n, 3), and N at the tip (3,)."""
+        f = self.mass[:, None] * (inertia.acceleration[:-1] - acting.gravity)
+        return f, acting.force - acting.mass * (inertia.acceleration[-1] - acting.gravity)
+
+    def work(self, was: Placed, at: Placed, N: Array, inertia: Inertia, acting: Acting) -> Array:
+        """Return the moments that work on the turn at points, tip and connectors (n + 1 + m, 3), world frame."""
+        found = np.empty((len(at.collocated), 3))
+        found[: self.size] = self.w[:, None] * (cross((was.slope + at.slope) / 2, N) - inertia.turning)
+        found[self.size] = acting.moment
         if self.grid.joints.size:
+            f, N_tip = self.pulled(inertia, acting)
             beyond = self.w - self.grid.at_joints
-            M = M + (1 - self.grid.beyond[:-1]) @ cross(offsets, N_tip - beyond @ f)
-        return N, M
+            found[self.size + 1 :] = cross((was.offsets + at.offsets) / 2, N_tip - beyond @ f)
+        return found
+
+    def turned_back(self, was: Placed, at: Placed, work: Array) -> Array:
+        """Return the moments (n, 3), body frame, whose work on the change of U is that of moments on the turn.
+
+        work : as of `costates`, which the grid carries to the base.
+        """
+        x, q = self.costates(was, at, work)[0], (was.collocated + at.collocated)[: self.size] / 2
+        found: Array = times(q * _CONJUGATE, x)[:, 1:] / 2
+        return found
+
+    def costates(self, was: Placed, at: Placed, work: Array) -> tuple[Array, Array]:
+        """Return the costate of the quaternion at points (n, 4) and at the ends of intervals (K + 1, 4).
+
+        work : (n + 1 + m, 3) moments that work on Cayley's vector of the turn at points, tip and connectors, world
+        frame. Half that vector is vec(dq q*) / (q_0 . q_1), q the mean and dq the difference of the quaternions, which
+        the grid gives by dq = P r, r = (dq U + q dU) / 2, U the mean: linear in dU, so its transpose is solved for.
+        """
+        grid, before, after = self.grid, was.collocated, at.collocated
+        q, U = (before + after) / 2, (was.strains[:, 3:] + at.strains[:, 3:]) / 2
+        n, d, K = self.size, grid.points, grid.of_interval.size
+        y = np.zeros_like(q)
+        y[:, 1:] = 2 / (before * after).sum(axis=1)[:, None] * work
+        y = times(y, q)
+        M = by_right(U)
+        A = self._eye + (
+            self._onward[:, :, None, :, None] * M.reshape(K, d, 4, 4).transpose(0, 2, 1, 3)[:, None]
+        ).reshape(K, 4 * d, 4 * d)
+        b = np.empty((K, 4 * d, 2))
+        b[:, :, :1] = self._ones
+        b[:, :, 1] = np.matmul(2 * self._onward, (y[:n] / self.w[:, None]).reshape(K, d, 4)).reshape(K, 4 * d)
+        both: Array = np.asarray(np.linalg.solve(A, b).reshape(K, d, 4, 2), float)
+        free, forced = both[..., 0], both[..., 1]
+        # what an interval adds from its end to its beginning, of what it was given and of what acts in it
+        turned = np.matmul(M.reshape(K, d, 4, 4), both)
+        passed = self._weights[:, :, None, None] * turned / 2
+        through, added = -passed[..., 0].sum(axis=1), y[:n].reshape(K, d, 4).sum(axis=1) - passed[..., 1].sum(axis=1)
+        through[:, 0] += 1.0
+        ends, nodes, now = np.empty((K, 4)), np.empty((K + 1, 4)), y[n]
+        nodes[K] = now
+        joints = dict(zip(grid.joints.tolist(), y[n + 1 :], strict=True))
+        for k in range(K - 1, -1, -1):
+            if k + 1 in joints:
+                now = now + joints[k + 1]
+            ends[k] = now
+            now = nodes[k] = (now[:, None] * through[k]).ravel() @ _TIMES + added[k]
+        return times(ends.repeat(d, axis=0), free.reshape(-1, 4)) + forced.reshape(-1, 4), nodes
 
     def stress(self, e: Array, strain_rate: Array) -> Array:
         """Return (n, 6) resultants with damping, body frame."""

@@ -2,7 +2,9 @@
 
 The trapezoid takes the balance as a mean over the step: mean resultants, turned with it so that their work is the
 change of elastic energy, on one side; the change of momentum on the other. Of a linear system that is the trapezoid
-to the last bit, and accelerations need not be known, so a jump needs nothing.
+to the last bit, and accelerations need not be known, so a jump needs nothing. Where strains are not linear in the
+resultants the mean of these is corrected along their change (Gonzalez's discrete gradient), so that it keeps the energy
+as well.
 BDF2 takes the balance at the end of the step.
 """
 
@@ -15,26 +17,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.dynamics.rod import Acting, Inertia, Motion, Placed, Rod, cross, rotated, turned_by
+from softnlp.dynamics.sections import Numbers
 
 Array = NDArray[np.float64]
 RuleName = Literal["trapezoid", "bdf2"]
+
+STILL = 1e-8  # of EI/L^2: work of a change so small that its defect is rounding alone
 
 
 @dataclass(frozen=True, eq=False)
 class Instant:
     """A solved instant of a run.
 
-    time : [s]. e : (n, 6) elastic resultants. at : the shape. motion : its rates.
+    time : [s]. e : (n, 6) elastic resultants. at : the shape. motion : its rates. numbers : the sections.
     """
 
     time: float
     e: Array
     at: Placed
     motion: Motion
+    numbers: Numbers
 
 
 class Balance(NamedTuple):
-    """off : (n, 6) the residual in units of the rod. N, M : (n, 3) asked for. inertia, motion : that it was made of."""
+    """off : (n, 6) the residual in units of the rod. N, M : (n, 3) asked for, world frame. inertia, motion : its."""
 
     off: Array
     N: Array
@@ -46,10 +52,10 @@ class Balance(NamedTuple):
 def at_end(rod: Rod, e: Array, at: Placed, parts: tuple[Motion, Inertia], acting: Acting) -> Balance:
     """Return the balance at an instant: what e gives, less what inertia and loads ask for, in the body frame."""
     motion, inertia = parts
-    N, M = rod.required(at.slope, at.offsets, inertia, acting)
+    N, m = rod.required(at, at, inertia, acting)
     stress, R_T = rod.stress(e, motion.strain_rate), at.rotation.transpose(0, 2, 1)
-    off = np.hstack([stress[:, :3] - rotated(R_T, N), stress[:, 3:] - rotated(R_T, M)])
-    return Balance(off / rod.units, N, M, inertia, motion)
+    off = np.hstack([stress[:, :3] - rotated(R_T, N), stress[:, 3:] - m])
+    return Balance(off / rod.units, N, rotated(at.rotation, m), inertia, motion)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +71,11 @@ class Trapezoid:
         """What a rate at the end gains by the quantity there [1/s]."""
         return 2 / (self.t - self.last.time)
 
-    def balance(self, rod: Rod, e: Array, at: Placed, acting: Acting) -> Balance:
+    def acting(self, end: Acting) -> Acting:
+        """Return the mean loads."""
+        return Acting((end.force + self.begun.force) / 2, (end.moment + self.begun.moment) / 2, end.gravity, end.mass)
+
+    def balance(self, rod: Rod, e: Array, at: Placed, numbers: Numbers, acting: Acting) -> Balance:
         """Return twice the mean balance over the step, in the body frame of its end."""
         last, was, c = self.last, self.last.at, self.rate
         theta = turned_by(was.turn[:-1], at.turn[:-1])
@@ -75,17 +85,25 @@ class Trapezoid:
         J = rod.inertia
         momentum = rotated(at.rotation, J * spin) - rotated(was.rotation, J * last.motion.spin)
         inertia = Inertia(c / 2 * (velocity - last.motion.velocity), c / 2 * momentum)
-        mean = Acting(
-            (acting.force + self.begun.force) / 2, (acting.moment + self.begun.moment) / 2, acting.gravity, acting.mass
-        )
-        N, M = rod.required((at.slope + was.slope) / 2, (at.offsets + was.offsets) / 2, inertia, mean)
-        stress = rod.stress((e + last.e) / 2, strain_rate)
+        N, m = rod.required(was, at, inertia, self.acting(acting))
+        stress = rod.stress(self.mean(rod, e, at, numbers), strain_rate)
         force = rotated((at.rotation + was.rotation) / 2, stress[:, :3])
-        turned, moment = rotated(was.rotation, theta), rotated(was.rotation, stress[:, 3:])
-        moment = (moment + cross(turned, moment) / 2) / (1 + (theta**2).sum(axis=1) / 4)[:, None]
-        R_T = at.rotation.transpose(0, 2, 1)
-        off = 2 * np.hstack([rotated(R_T, force - N), rotated(R_T, moment - M)])
-        return Balance(off / rod.units, N, M, inertia, Motion(velocity, spin, strain_rate))
+        off = 2 * np.hstack([rotated(at.rotation.transpose(0, 2, 1), force - N), stress[:, 3:] - m])
+        return Balance(off / rod.units, N, rotated(at.rotation, m), inertia, Motion(velocity, spin, strain_rate))
+
+    def mean(self, rod: Rod, e: Array, at: Placed, numbers: Numbers) -> Array:
+        """Return (n, 6) the elastic resultants whose work on the change of the strains is that of the elastic energy.
+
+        The defect of their mean is de . (mean strains - integral of the strains along de), by Simpson's rule.
+        """
+        last, mean = self.last, (e + self.last.e) / 2
+        if rod.sections.linear or not np.array_equal(last.numbers.rest, numbers.rest):
+            return mean
+        middle, more = rod.sections.strains(numbers, mean)[0], e - last.e
+        defect = ((at.strains + last.at.strains) / 2 - middle) * more
+        work = (more * (at.strains - last.at.strains)).sum(axis=1) + STILL * rod.units[0]
+        found: Array = mean + (2 / 3 * defect.sum(axis=1) / work)[:, None] * more
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +124,11 @@ class Backward:
         """What a rate at the end gains by the quantity there [1/s]."""
         return -sum(self.weights)
 
-    def balance(self, rod: Rod, e: Array, at: Placed, acting: Acting) -> Balance:
+    def acting(self, end: Acting) -> Acting:
+        """Return the loads that count: those at the end."""
+        return end
+
+    def balance(self, rod: Rod, e: Array, at: Placed, numbers: Numbers, acting: Acting) -> Balance:
         """Return the balance at the end of the step."""
         c = self.rate
         velocity, strain_rate, spin = c * at.position, c * at.strains, np.zeros((rod.size, 3))

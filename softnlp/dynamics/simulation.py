@@ -21,7 +21,9 @@ from softnlp.dynamics.rod import Acting, Rod, still
 from softnlp.dynamics.rules import ERROR, Instant, RuleName, rule
 from softnlp.dynamics.sections import Failed, Numbers, Sections
 from softnlp.model.body import Body
+from softnlp.model.numerics import Numerics
 from softnlp.model.rod import Loads
+from softnlp.nlp.solver import Ipopt
 
 Array = NDArray[np.float64]
 
@@ -32,6 +34,10 @@ _SAFE = 0.9
 _FIRST = 1e-3  # part of the duration, of the first step that is chosen
 _LEAST = 1e-9  # part of the duration below which no step is taken
 _ROUND = 1e-9
+_KEPT = 6  # times whose sections are kept
+_GUESSED = 4  # instants that the next one is guessed from
+_CLOSED, _UNHEARD = 20, 1000  # steps closed by IPOPT in a run, about; most steps between two of them, then an output
+NEWTON = Numerics(engine="newton")
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +89,10 @@ class Dynamics:
 
 @dataclass(frozen=True, eq=False)
 class Output:
-    """An instant that is kept. residual : the largest since the last one. steps, iterations : since the last one."""
+    """An instant that is kept. residual : the largest since the last one. steps, iterations : since the last one.
+
+    ipopt : what IPOPT said since then, its iterations together; None where it took no part.
+    """
 
     instant: Instant
     numbers: Numbers
@@ -94,6 +103,7 @@ class Output:
     residual: float
     steps: int
     iterations: int
+    ipopt: Ipopt | None
 
 
 @dataclass
@@ -101,10 +111,17 @@ class _Count:
     steps: int = 0
     iterations: int = 0
     residual: float = 0.0
+    ipopt: Ipopt | None = None
 
     def add(self, solved: Solved) -> None:
         self.steps, self.iterations = self.steps + 1, self.iterations + solved.iterations
+        self.heard(solved)
+
+    def heard(self, solved: Solved) -> None:
         self.residual = max(self.residual, solved.residual)
+        if solved.ipopt is not None:
+            before = 0 if self.ipopt is None else self.ipopt.iterations
+            self.ipopt = replace(solved.ipopt, iterations=solved.ipopt.iterations + before)
 
 
 @dataclass(eq=False)
@@ -113,8 +130,10 @@ class Simulation:
 
     body, loads : as statics take them; of the loads force and moment act at the tip. pressures : at the regulators
     (columns: sets). force : at the tip, beside that of the loads (3 columns) [N]. intervals : to a segment. points :
-    Gauss points to one. refused : steps that were taken again, shorter. recent : the last instants since a jump, the
-    last one first.
+    Gauss points to one. numerics : whose engine counts, its options and its accuracy; with "auto" IPOPT closes the pose
+    that it begins at, and the last step before every so many outputs. kept : times of outputs in place of those asked
+    for, from 0 to the duration [s]. refused : steps that were taken again, shorter. recent : the last instants since a
+    jump, the last one first.
     """
 
     body: Body
@@ -125,6 +144,8 @@ class Simulation:
     intervals: int | None = None
     points: int | None = None
     tolerance: float = TOLERANCE
+    numerics: Numerics = NEWTON
+    kept: Array | None = None
     refused: int = 0
     warnings: list[str] = field(default_factory=list)
     recent: list[Instant] = field(default_factory=list)
@@ -133,11 +154,13 @@ class Simulation:
         asked, body = self.asked, self.body
         self.grid = grid_of(body, self.intervals, *([self.points] if self.points else []))
         self.rod = Rod(Sections(body, self.grid), self.grid, asked.damping)
-        self.stepper = Stepper(self.rod, self.tolerance)
+        numerics = self.numerics
+        self.stepper = Stepper(self.rod, self.tolerance, numerics.engine, numerics.accuracy, numerics.ipopt)
         regulator = self.pressures.delayed(asked.dead_time) if asked.dead_time else self.pressures
         rest = asked.start == "rest"
         first = np.zeros(body.sets) if rest else self.pressures.at(0.0, after=False)
         self.chambers = Chambers(regulator, asked.lag, first)
+        self._known: dict[tuple[float, bool], Numbers] = {}
 
     def acting(self, t: float, *, after: bool = True) -> Acting:
         """Return the loads at a time."""
@@ -149,6 +172,11 @@ class Simulation:
         return Acting(force + self.force.at(t, after=after), moment, gravity, self.asked.tip_mass)
 
     @property
+    def outputs(self) -> Array:
+        """The times that are kept [s]."""
+        return self.asked.outputs if self.kept is None else self.kept
+
+    @property
     def jumps(self) -> Array:
         """The times behind t = 0 at which something jumps [s]."""
         found = np.union1d(self.chambers.jumps, self.force.jumps)
@@ -156,7 +184,7 @@ class Simulation:
 
     def landings(self) -> Array:
         """Return the times that steps end at [s]."""
-        found = np.union1d(self.asked.outputs, self.jumps)
+        found = np.union1d(self.outputs, self.jumps)
         if self.asked.step is None:
             kinks = np.union1d(self.chambers.kinks, self.force.times)
             found = np.union1d(found, kinks[(kinks > 0) & (kinks < self.asked.duration)])
@@ -164,51 +192,57 @@ class Simulation:
         landed: Array = found[apart]
         return landed
 
-    def first(self) -> tuple[Instant, Numbers, float, float]:
-        """Return the first instant with the rates behind t = 0, its sections, its residual, the work of a jump."""
+    def first(self, count: _Count) -> tuple[Instant, Numbers, float]:
+        """Return the first instant with the rates behind t = 0, its sections, the work of a jump; take it down."""
         sections, asked = self.rod.sections, self.asked
         if asked.start == "rest":
             numbers = sections.at(np.zeros(self.body.sets))
             e = np.zeros((self.rod.size, 6))
-            begun, residual = Instant(0.0, e, self.rod.placed(numbers, e), still(self.rod.size)[0]), 0.0
+            begun = Instant(0.0, e, self.rod.placed(numbers, e), still(self.rod.size)[0], numbers)
         else:
             numbers = sections.at(self.chambers.at(0.0, after=False))
-            begun, residual = self.stepper.pose(numbers, before := self.acting(0.0, after=False))
+            found = self.stepper.pose(numbers, before := self.acting(0.0, after=False))
+            begun = found.instant
+            count.heard(found)
             if grows(self.rod, begun, before):
                 self.warnings.append("the pose at rest that it begins at is not stable: the least push makes it buckle")
         held, numbers = numbers, sections.at(self.chambers.at(0.0))
         if numbers is held:
-            return begun, numbers, residual, 0.0
+            return begun, numbers, 0.0
         one, acting = self._behind(begun, numbers), self.acting(0.0)
         after = Ledger(self.rod, one, numbers, acting, 0.0).now.elastic
-        return one, numbers, residual, after - Ledger(self.rod, begun, held, acting, 0.0).now.elastic
+        return one, numbers, after - Ledger(self.rod, begun, held, acting, 0.0).now.elastic
 
     def _behind(self, one: Instant, numbers: Numbers) -> Instant:
         """Return an instant with the resultants behind a jump, its shape and speeds as they are."""
         e = self.rod.sections.resultants(numbers, one.at.strains)
         at = self.rod.shape(*self.rod.sections.strains(numbers, e))
-        return replace(one, e=e, at=at)
+        return replace(one, e=e, at=at, numbers=numbers)
 
     def run(self) -> Iterator[Output]:
         """Yield what is kept, in order. Raises `Failed` where a step cannot be solved, its message with the time."""
         asked = self.asked
-        one, numbers, residual, jump = self.first()
+        count = _Count()
+        one, numbers, jump = self.first(count)
         ledger = self.ledger = Ledger(self.rod, one, numbers, self.acting(0.0), jump)
-        count = _Count(residual=residual)
-        outputs, jumps = asked.outputs, self.jumps
+        outputs, jumps = self.outputs, self.jumps
         yield self._output(one, numbers, ledger, count)
         self.recent = before = [one]
-        kept = 1
+        kept, count, unheard = 1, _Count(), 0
+        every = ceil(outputs.size / _CLOSED)
         h = asked.step or min(_FIRST * asked.duration, asked.output_step)
         landings = self.landings()
         for start, end in pairwise(landings):
+            here = kept < outputs.size and abs(end - outputs[kept]) <= _ROUND * asked.duration
+            close = here and (kept % every == 0 or kept == outputs.size - 1 or unheard + count.steps >= _UNHEARD)
             try:
-                before, h = self._across(before, float(start), float(end), h, ledger, count)
+                before, h = self._across(before, float(start), float(end), h, ledger, count, close)
             except Failed as error:
                 raise Failed(error.status, f"at t = {self.recent[0].time:.6g} s: {error.message}") from None
-            numbers = self.rod.sections.at(self.chambers.at(end, after=False))
-            if kept < outputs.size and abs(end - outputs[kept]) <= _ROUND * asked.duration:
+            numbers = self.sections(float(end), after=False)
+            if here:
                 yield self._output(before[0], numbers, ledger, count)
+                unheard = 0 if close else unheard + count.steps
                 kept, count = kept + 1, _Count()
             if np.any(np.abs(jumps - end) <= _ROUND * asked.duration):
                 after = self.rod.sections.at(self.chambers.at(end))
@@ -219,7 +253,7 @@ class Simulation:
                     h = min(h, _FIRST * asked.duration)
 
     def _across(
-        self, before: list[Instant], start: float, end: float, h: float, ledger: Ledger, count: _Count
+        self, before: list[Instant], start: float, end: float, h: float, ledger: Ledger, count: _Count, close: bool
     ) -> tuple[list[Instant], float]:
         """Go from one landing to the next in equal steps of at most h, shorter ones where they fail or err."""
         asked, refusals, at = self.asked, 0, start
@@ -227,10 +261,11 @@ class Simulation:
             steps = max(1, ceil((end - at) / h - 1e-6))
             t = end if steps == 1 else at + (end - at) / steps
             try:
-                now = self._one(before, t)
+                now = self._one(before, t, close=close and steps == 1)
             except (Failed, np.linalg.LinAlgError) as error:
                 refusals += 1
-                if refusals > _HALVINGS:
+                disputed = isinstance(error, Failed) and error.status is Status.DISPUTED
+                if disputed or refusals > _HALVINGS:
                     if isinstance(error, Failed):
                         raise
                     raise Failed(Status.DIVERGED, "the equations of a step are singular") from None
@@ -249,28 +284,35 @@ class Simulation:
             held, loads = self._ends(before[0].time, t)
             ledger.step(rule(asked.rule, before, t, loads[0]), now, held, loads)
             count.add(now)
-            before, at = [now.instant, *before[:2]], t
+            before, at = [now.instant, *before[: _GUESSED - 1]], t
             self.recent = before
         return before, (asked.step or h)
 
+    def sections(self, t: float, *, after: bool = True) -> Numbers:
+        """Return the sections at a time; those of the last few are kept. Raises `Failed`."""
+        key = t, after
+        if key not in self._known:
+            self._known[key] = self.rod.sections.at(self.chambers.at(t, after=after))
+            while len(self._known) > _KEPT:
+                del self._known[next(iter(self._known))]
+        return self._known[key]
+
     def _ends(self, a: float, b: float) -> tuple[tuple[Numbers, Numbers], tuple[Acting, Acting]]:
         """Return sections and loads at both ends of a step."""
-        sections = self.rod.sections
-        first = sections.at(self.chambers.at(a))
-        return (first, sections.at(self.chambers.at(b, after=False))), (self.acting(a), self.acting(b, after=False))
+        return (self.sections(a), self.sections(b, after=False)), (self.acting(a), self.acting(b, after=False))
 
-    def _one(self, before: list[Instant], t: float) -> Solved:
+    def _one(self, before: list[Instant], t: float, *, close: bool) -> Solved:
         """Return the instant at t, begun from what is extrapolated."""
-        numbers = self.rod.sections.at(self.chambers.at(t, after=False))
+        numbers = self.sections(t, after=False)
         guess = _extrapolated(before, t, [one.e for one in before])
         step = rule(self.asked.rule, before, t, self.acting(before[0].time))
-        return self.stepper.step(step, t, guess, numbers, self.acting(t, after=False))
+        return self.stepper.step(step, t, guess, numbers, self.acting(t, after=False), close=close)
 
     def _error(self, before: list[Instant], now: Instant) -> float:
         """Return the estimated error of the positions in a step over the length, 0 where nothing can be said."""
         if len(before) < 3:
             return 0.0
-        guess = _extrapolated(before, now.time, [one.at.position for one in before])
+        guess = _extrapolated(before, now.time, [one.at.position for one in before[:3]])
         h = now.time - before[0].time
         spread = np.prod([now.time - one.time for one in before[:3]])
         third = 6 * np.linalg.norm(now.at.position - guess, axis=1).max() / spread
@@ -289,12 +331,13 @@ class Simulation:
             residual=count.residual,
             steps=count.steps,
             iterations=count.iterations,
+            ipopt=count.ipopt,
         )
 
 
 def _extrapolated(before: list[Instant], t: float, values: list[Array]) -> Array:
-    """Return the polynomial through the last three values, or as many as there are, at t."""
-    times = [one.time for one in before[:3]]
+    """Return the polynomial through the last values, as many as are given, at t."""
+    times = [one.time for one in before[: len(values)]]
     found = np.zeros_like(values[0])
     for j, a in enumerate(times):
         weight = 1.0

@@ -24,6 +24,7 @@ from softnlp.studies.uncertainty import Deviations
 if TYPE_CHECKING:  # imported where needed: a run takes none of them
     from softnlp.studies.design import Design
     from softnlp.studies.identified import Identified
+    from softnlp.studies.identify_motion import MotionFit
     from softnlp.studies.tensile import TensileFit
     from softnlp.sweep.read import Workspace
 
@@ -37,7 +38,7 @@ def run_scenario(
     *,
     workers: int = 1,
     folder: str | PathLike[str] | None = None,
-) -> Run | Identified | TensileFit | Design | Workspace:
+) -> Run | Identified | MotionFit | TensileFit | Design | Workspace:
     """Run the study of a scenario.
 
     Parameters
@@ -55,7 +56,7 @@ def run_scenario(
 
     Returns
     -------
-    Run, Identified, TensileFit, Design or Workspace
+    Run, Identified, MotionFit, TensileFit, Design or Workspace
         A run for forward, blocked-force, inverse and dynamic, whose steps carry a solution or a named status.
 
     Raises
@@ -85,7 +86,9 @@ def solve_steps(scenario: Scenario, progress: Progress | None = None, branches: 
 def _solved(scenario: Scenario, progress: Progress | None, branches: int) -> Run:
     study = STUDIES[scenario.study]
     if scenario.uncertainty is None:
-        return replace(study(scenario, progress, branches), warnings=scenario.warnings)
+        run = study(scenario, progress, branches)
+        own = run.warnings if scenario.study == "dynamic" else ()  # of the motion, beside those of the robot
+        return replace(run, warnings=tuple(dict.fromkeys((*scenario.warnings, *own))))
     contact = scenario.contact if scenario.study == "blocked-force" else None
     deviations = Deviations(scenario.model, scenario.numerics, scenario.loads, contact, scenario.uncertainty)
     steps: list[Step] = []

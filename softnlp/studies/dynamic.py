@@ -72,7 +72,8 @@ def dynamic(
     coefficients, conventions
         As `softnlp.forward`.
     numerics
-        Of which `intervals` (to a segment), `accuracy` and `tolerance` count.
+        Of which `intervals` (to a segment), `accuracy`, `tolerance` and the engine with its options count. With "auto"
+        IPOPT closes the pose at the beginning, and the last step before about twenty of the outputs.
     title
         Kept with the run.
     progress
@@ -94,7 +95,7 @@ def dynamic(
     warnings = check(robot, allow=LOWERABLE_RULES)
     P = pressure_table(pressures, robot.chamber_sets)
     loads = checked_loads(loads)
-    t, F = _series(times, forces, len(P))
+    t, F = series_of(times, forces, len(P))
     body = body_of(Model(robot, material, coefficients, conventions))
     steps: list[Step] = []
 
@@ -107,7 +108,7 @@ def dynamic(
     return Run(STUDY, robot, material, coefficients, conventions, loads, tuple(steps), title, (*warnings, *notes))
 
 
-def _series(times: Any, forces: Any, rows: int) -> tuple[Array, Array]:
+def series_of(times: Any, forces: Any, rows: int) -> tuple[Array, Array]:
     """Return times and forces of the rows, or raise `InputError`."""
     if times is None:
         if rows > 1:
@@ -137,7 +138,9 @@ def _followed(
     outputs = asked.outputs
     try:
         intervals, error = chosen_intervals(body, loads, series, numerics)
-        simulation = Simulation(body, loads, asked, *series, intervals=intervals, tolerance=tolerance)
+        simulation = Simulation(
+            body, loads, asked, *series, intervals=intervals, tolerance=tolerance, numerics=numerics
+        )
         poses = Poses(simulation)
         for output in simulation.run():
             now = time.perf_counter()
@@ -150,7 +153,7 @@ def _followed(
             Step(
                 pressure=np.asarray(series[0].at(at)),
                 status=failure.status,
-                message=_sentence(failure),
+                message=sentence(failure),
                 time=at,
                 solve_time=time.perf_counter() - began,
             )
@@ -159,7 +162,8 @@ def _followed(
     return simulation.warnings
 
 
-def _sentence(failure: Failed) -> str:
+def sentence(failure: Failed) -> str:
+    """Return what ended a motion, in words."""
     if failure.status is Status.DIVERGED:
         return f"the motion could not be followed: {failure.message}"
     advice = failure.status.advice
@@ -187,7 +191,7 @@ def chosen_intervals(
         stepper = Stepper(Rod(sections, grid))
         try:
             numbers = sections.at(P[row])
-            found: Array = stepper.pose(numbers, acting)[0].at.position[-1]
+            found: Array = stepper.pose(numbers, acting).instant.at.position[-1]
             return found
         except Failed:  # a motion may go where no pose at rest is
             return None

@@ -12,6 +12,7 @@ from softnlp.base.status import Status
 from softnlp.dynamics.drive import Series
 from softnlp.dynamics.grid import grid_of
 from softnlp.dynamics.modes import Vibration, vibration
+from softnlp.dynamics.motion import Stepper
 from softnlp.dynamics.rod import Acting, Rod
 from softnlp.dynamics.sections import Failed, Sections
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
@@ -80,7 +81,7 @@ def modes(
     tip_mass
         Beside the silicone's own [kg].
     coefficients, conventions, numerics
-        As `softnlp.forward`; of the numerics `intervals` (to a segment) and `accuracy` count.
+        As `softnlp.forward`; of the numerics `intervals` (to a segment), `accuracy` and the engine count.
 
     Returns
     -------
@@ -105,7 +106,9 @@ def modes(
         intervals, _ = chosen_intervals(body, loads, rows, numerics)
         grid = grid_of(body, intervals)
         radius = max(float(own.outer_diameter) for own, _ in segments_of(robot)) / 2
-        found = vibration(Rod(Sections(body, grid), grid, damping), P, acting, radius, lag)
+        rod = Rod(Sections(body, grid), grid, damping)
+        stepper = Stepper(rod, engine=numerics.engine, accuracy=numerics.accuracy, options=numerics.ipopt)
+        found = vibration(stepper, P, acting, radius, lag)
     except Failed as failure:
         advice = failure.status.advice
         message = failure.message if advice in failure.message else f"{advice}: {failure.message}"
