@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, Protocol, runtime_checkable
@@ -38,10 +38,15 @@ class ManySidedSolver(Protocol):
 
 
 class SparseSolver:
-    """Solves J dx = -g of any square problem by sparse LU factorisation."""
+    """Solves J dx = -g of any square problem by sparse LU factorisation.
 
-    def __init__(self, problem: CompiledProblem) -> None:
-        self._problem = problem
+    entries : those of the Jacobian at (x, p), in the problem's order, where they are to be had faster than from it.
+    """
+
+    def __init__(
+        self, problem: CompiledProblem, entries: Callable[[Array, Array], Array | None] | None = None
+    ) -> None:
+        self._problem, self._entries = problem, entries
         self._last: tuple[Array, Array, Any] | None = None  # where the last factorisation was made, and that
 
     @cached_property
@@ -59,13 +64,14 @@ class SparseSolver:
         from scipy.sparse import csc_matrix
         from scipy.sparse.linalg import splu
 
-        (J,) = self._problem.jacobian.call([x, p])
-        entries = np.array(J.nonzeros())
+        entries = None if self._entries is None else self._entries(x, p)
+        if entries is None:
+            entries = np.array(self._problem.jacobian.call([x, p])[0].nonzeros())
         rows, columns = self._pattern
         if not np.all(np.isfinite(entries)):
             raise np.linalg.LinAlgError("the Jacobian is not finite")
         try:
-            factors = splu(csc_matrix((entries, rows, columns), shape=J.shape))
+            factors = splu(csc_matrix((entries, rows, columns), shape=(x.size, x.size)))
         except RuntimeError as error:
             raise np.linalg.LinAlgError(str(error)) from error
         self._last = np.array(x), np.array(p), factors
