@@ -20,7 +20,7 @@ from softnlp.statics.obstructed import SMOOTHING, STEPS, ObstructedCase, numbers
 
 Array = NDArray[np.float64]
 
-SHARP = 1e-7
+SHARP = 1e-6
 """tau of a solution: gap times force is its square, in L_0 times EI/L_0^2."""
 ACTIVE = 10 * SHARP
 """Scaled push from which a node touches."""

@@ -20,7 +20,7 @@ from softnlp.nlp.evaluation import evaluated
 from softnlp.nlp.linear import SparseSolver
 from softnlp.nlp.problem import CompiledProblem
 from softnlp.statics.condensed import LARGEST
-from softnlp.statics.obstructed import SMOOTHING, STEPS, ObstructedCase
+from softnlp.statics.obstructed import SMOOTHING, STEPS, STIFFNESS, ObstructedCase
 from softnlp.statics.tangents import tangents
 
 Array = NDArray[np.float64]
@@ -92,8 +92,9 @@ class ObstacleSlope:
         of_tip.append((by_tip[:, n] + push @ by_stretch[:, K])[:, None])
 
         at = self._obstacle_of, self._node_of
-        root = np.sqrt(G[at] ** 2 + F**2 + 2 * p[self._smoothing] ** 2)
-        held = 1 - G[at] / root
+        gap = STIFFNESS * G[at]
+        root = np.sqrt(gap**2 + F**2 + 2 * p[self._smoothing] ** 2)
+        held = STIFFNESS * (1 - gap / root)
         touch = np.zeros((F.size, n + 2))
         touch[:, _POSE] = held[:, None] * G_pose[at]
         touch[:, n], touch[:, n + 1] = held * G_stretch[at], 1 - F / root

@@ -29,11 +29,11 @@ from softnlp.statics.step import Step
 
 Array = NDArray[np.float64]
 
-_FIRST, _FINEST = 40, 320  # intervals
+_FIRST, _FINEST = 20, 320  # intervals
 _FEWEST = 4
 _REST, _TOUCHING = 400, 1e-9  # points of the unpressurised robot that are looked at, and the overlap that counts
-_PATH_TAU = 1e-3  # tau along a path: a gap of 6 um under a push of 1/100
-_SHARPER, _LEAST_SHARPER = 0.1, 0.8  # by what tau falls at once, and at least
+_PATH_TAU = 1e-2  # tau along a path: a gap of 6 um under a push of 1/100
+_SHARPER, _LEAST_SHARPER = 0.01, 0.8  # by what tau falls at once, and at least
 _LARGEST_JUMP = 0.1  # between points of a path, in scaled positions and direction cosines
 _SMALLEST_STEP = 1 / 1024
 _THROUGH = 5e-3  # of L_0: an overlap half-way between two points of a path from which that went through an obstacle
