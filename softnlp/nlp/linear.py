@@ -43,9 +43,7 @@ class SparseSolver:
     entries : those of the Jacobian at (x, p), in the problem's order, where they are to be had faster than from it.
     """
 
-    def __init__(
-        self, problem: CompiledProblem, entries: Callable[[Array, Array], Array | None] | None = None
-    ) -> None:
+    def __init__(self, problem: CompiledProblem, entries: Callable[[Array, Array], Array | None] | None = None) -> None:
         self._problem, self._entries = problem, entries
         self._last: tuple[Array, Array, Any] | None = None  # where the last factorisation was made, and that
 

@@ -1,7 +1,7 @@
 """The Jacobian of a pose among obstacles in numbers, with the intervals in machine code, and what solves with it.
 
-The states between are eliminated interval by interval, as in `softnlp.statics.condensed`. The pushes of nodes that touch
-stay unknown beside N(0), M(0); each of the others follows from the state at its own node.
+The states between are eliminated interval by interval, as in `softnlp.statics.condensed`. The pushes of nodes that
+touch stay unknown beside N(0), M(0); each of the others follows from the state at its own node.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ class ObstacleSlope:
         inner = node[known] < K
         rows, of_push = node[known][inner], obstacle[known][inner]
         np.add.at(states, rows, blocks.pushes[rows, :, of_push][:, :, None] * follows[inner][:, None, :])
-        np.add.at(forced, (rows, slice(None), -1), blocks.pushes[rows, :, of_push] * alone[inner][:, None])
+        np.add.at(forced[:, :, -1], rows, blocks.pushes[rows, :, of_push] * alone[inner][:, None])
         before = node[unknown] < K
         rows = node[unknown][before]
         forced[rows, :, border[before]] = blocks.pushes[rows, :, obstacle[unknown][before]]
@@ -190,7 +190,7 @@ class ObstacleSlope:
         order = np.argsort(keys, kind="stable")
         r, c = (np.asarray(part, int) for part in self._problem.jacobian.sparsity_out(0).get_triplet())
         wanted = c * size + r
-        found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), keys.size - 1)]
+        found: NDArray[np.int64] = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), keys.size - 1)]
         assert np.array_equal(keys[found], wanted), "an entry of the Jacobian is in no block"
         return found
 
@@ -207,7 +207,7 @@ def _values(blocks: Blocks) -> Array:
     return np.concatenate([[blocks.balance], *(part.ravel() for part in parts)])
 
 
-class _Slope(ca.Callback):  # type: ignore[misc]
+class _Slope(ca.Callback):
     """(x, p) -> the residual and its Jacobian, from entries in numbers where there are any."""
 
     def __init__(self, problem: CompiledProblem, entries: Callable[[Array, Array], Array | None]) -> None:
@@ -237,7 +237,9 @@ class _Slope(ca.Callback):  # type: ignore[misc]
         if res[1] is not None:
             with np.errstate(all="ignore"):
                 entries = self._own(x, p)
-            np.frombuffer(res[1], float)[:] = self._problem.jacobian.call([x, p])[0].nonzeros() if entries is None else entries
+            np.frombuffer(res[1], float)[:] = (
+                self._problem.jacobian.call([x, p])[0].nonzeros() if entries is None else entries
+            )
         return 0
 
 
@@ -268,8 +270,8 @@ def _of_stretch(case: ObstructedCase, problem: CompiledProblem, more: list[ca.MX
 def _node(case: ObstructedCase) -> ca.Function:
     """Return what pushes do at all nodes, by columns: (state, pushes, fields, how they follow the stretch) of each.
 
-    It returns the state behind them; N, M there by the pose, by the pushes and by the stretch; the gaps, and those by the
-    pose and by the stretch.
+    It returns the state behind them; N, M there by the pose, by the pushes and by the stretch; the gaps, and those by
+    the pose and by the stretch.
     """
     touch, nc, count = case.touching, case.functions.field.size1_in(1), len(case.obstacles)
     x, F = ca.SX.sym("x", STATE_SIZE), ca.SX.sym("F", count)

@@ -316,5 +316,5 @@ def _equations(K: int, functions: RodFunctions, L_0: ca.MX, F_0: ca.MX, pushes: 
         named.append(Equation(f"continuity of {block}", rows[:, where].ravel(), *units[block]))
     start = 13 + rows.size
     named += tip_equations(start, functions.loads, L_0, F_0)
-    named.append(Equation("contact gap or force", start + 6 + np.arange(pushes), "m", L_0))
+    named.append(Equation("contact gap or force", start + 6 + np.arange(pushes), "m", L_0 / STIFFNESS))
     return tuple(named)
