@@ -41,6 +41,7 @@ _AROUND: dict[str, Any] = {"first_step": 0.02, "largest_step": 0.2}
 _MOST_AROUND, _ONWARDS = 400, 5e-3  # solves around one fold, and how far beyond it the path is taken again
 _MOST = 1500  # iterations to find one pose
 _PASSES, _ENOUGH = 3, 6  # of putting nodes where obstacles touch, and how many are to be there
+_SETTLED = 0.2  # of the accuracy: a tip that moves by less when nodes are placed anew stays where it is
 _STEEPER = 4.0  # growth of what a step changes from which a path that ends has turned
 _ORDER = 2  # of the tip's error, since pushes are those of nodes
 
@@ -273,7 +274,7 @@ class ObstacleSolver:
             spent += solution.iterations
             if solution.holds(self.numerics.tolerance):
                 tau, x = following, solution.x
-                if tau <= SHARP:
+                if tau <= 1.01 * SHARP:  # but for round-off
                     return touched(grid, solution, sharpened(values, SHARP)), spent
             else:
                 ratio = ratio**0.5
@@ -357,8 +358,10 @@ class ObstacleSolver:
                 trial = self._on(grid, found, halved(found))
             if trial is None:
                 break
+            same = trial.grid is found.grid
+            moved = float(np.linalg.norm(trial.before[:3, -1] - found.before[:3, -1]))
             spent, found = spent + trial.solution.iterations, trial
-            if fewest_touching(found) >= _ENOUGH:
+            if fewest_touching(found) >= _ENOUGH or (same and moved <= _SETTLED * self.numerics.accuracy):
                 break
         return found, spent
 
