@@ -9,25 +9,43 @@ from pathlib import Path
 from typing import Any
 
 import casadi as ca
+import h5netcdf
 import numpy as np
 import pytest
 from designs import random_design
 from scipy.optimize import fsolve
 
-from softnlp import BAR, ContactSettings, Loads, Numerics, blocked_force, forward, load_scenario, material, robot
+from softnlp import (
+    BAR,
+    ENERGY,
+    Coefficients,
+    ContactSettings,
+    Loads,
+    Numerics,
+    blocked_force,
+    forward,
+    load_scenario,
+    material,
+    robot,
+)
 from softnlp.base.errors import InputError
 from softnlp.base.status import Status
 from softnlp.cli import main
 from softnlp.figures import run_figure
-from softnlp.model.obstacle_distance import signed_distance
+from softnlp.model.conventions import REPRODUCTION
 from softnlp.model.obstacles import Capsule, Cylinder, Obstacle, Plane, Sphere, Trocar, Tube
 from softnlp.model.quantities import Model
 from softnlp.results import load_run, view_of_run
 from softnlp.statics.kept import pose_solver
 from softnlp.statics.loadcase import whole_weight
 from softnlp.statics.obstacle_grid import Touched
+from softnlp.statics.obstacle_slope import ObstacleSlope
 from softnlp.statics.obstacle_solver import ObstacleSolver, among_obstacles
 from softnlp.statics.step import Run
+from softnlp.studies.blocked_obstacles import blocked_among
+from softnlp.studies.forward import several_poses
+from softnlp.studies.inverse_obstacles import InverseAmongObstacles
+from softnlp.studies.targets import InverseTask, Target
 
 SHIPPED = Path(__file__).parents[1] / "scenarios" / "contact"
 SILICONE = material("Ecoflex 00-50")
@@ -131,6 +149,17 @@ def test_pressed_in_and_pulled_out_the_poses_are_the_same() -> None:
         assert step.complementarity == pytest.approx(0, abs=1e-8)
 
 
+def test_two_poses_at_the_same_pressures_are_named() -> None:
+    there, _, _, _, back = against_a_ball().steps
+    assert not any("not unique" in warning for step in against_a_ball().steps for warning in step.warnings)
+    assert back.pose is not None
+    moved = replace(back, pose=replace(back.pose, tip_position=back.pose.tip_position + np.array([0, 0, 1e-3])))
+    first, second = several_poses([there, moved], 1e-6)
+    assert first.warnings == there.warnings
+    assert second.warnings[-1].startswith("the branch is not unique: step 1 has the same pressures")
+    assert "1 mm" in second.warnings[-1]
+
+
 @pytest.mark.parametrize("engine", ["auto", "ipopt"])
 def test_the_engines_agree(engine: str) -> None:
     step = run([Sphere(centre=(-0.03, 0, 0.04), radius=0.01)], [0.6], Numerics(engine=engine)).steps[0]  # type: ignore[arg-type]
@@ -165,6 +194,24 @@ def test_a_port_holds_the_robot_and_its_radius_grows_thin_with_stretch() -> None
     assert float(step.contacts[0].force[0]) > 0.1
 
 
+def test_a_measuring_wall_stands_beside_obstacles() -> None:
+    poses = pose_solver(Model(robot("D25L60"), SILICONE), NEWTON)
+    wall = ContactSettings(closure="free", wall_point=(-0.025, 0, 0), wall_normal=(1, 0, 0))
+    pressures = np.array([[0.3, 0, 0], [1.0, 0, 0]]) * BAR
+    ball = Sphere(centre=(-0.024, 0, 0.03), radius=0.01)
+    apart = blocked_among(poses, pressures, Loads(), wall, [Sphere(centre=(0.1, 0, 0.04), radius=0.01)])
+    alone = blocked_force(robot("D25L60"), SILICONE, pressures, wall, numerics=NEWTON).steps
+    beside = blocked_among(poses, pressures, Loads(), wall, [ball])
+    assert apart[0].status is alone[0].status is Status.NO_CONTACT
+    for steps in (apart, beside, alone):
+        assert steps[1].contact is not None
+    assert apart[1].contact.force == pytest.approx(alone[1].contact.force, abs=1e-6)  # type: ignore[union-attr]
+    assert apart[1].contact.gap == pytest.approx(alone[1].contact.gap, abs=1e-7)  # type: ignore[union-attr]
+    assert len(beside[1].contacts) == 1
+    assert beside[1].contacts[0].force[0] > 0.01
+    assert beside[1].contact.force != pytest.approx(alone[1].contact.force, abs=1e-3)  # type: ignore[union-attr]
+
+
 def test_a_rim_pushes_further_out_than_the_axis() -> None:
     forces, bending = [], []
     for part in ("tip axis", "tip rim", "body"):
@@ -185,23 +232,38 @@ def test_forces_balance_and_nothing_overlaps(seed: int) -> None:
 
 @pytest.mark.slow
 def test_hundreds_of_random_obstacles() -> None:
-    ended = [check_random(seed) for seed in range(200)]
-    known = [status for status in ended if status is not None]
-    assert known.count(Status.SOLVED) >= 0.93 * len(known)
+    ended = [check_random(seed) for seed in range(150)]
+    energy, paper = ended[2::3], ended[0::3] + ended[1::3]
+    assert paper.count(Status.SOLVED) >= 0.93 * len(paper)
+    assert energy.count(Status.SOLVED) >= 0.65 * len(energy)  # it curls further at the same pressures
 
 
-def check_random(seed: int) -> Status | None:
-    """Solve a random robot among random obstacles and judge the answer; None where it overlaps one at rest."""
+def random_case(seed: int) -> tuple[ObstacleSolver, Any, Loads]:
+    """Return a random robot, one in three with the energy section, among one or two random obstacles."""
     rng = np.random.default_rng(seed)
-    design = random_design(rng)
-    L, D = design.robot.length, design.robot.outer_diameter
-    loads = Loads(design.loads.tip_force, (0, 0, 0), design.loads.gravity) if rng.random() < 0.5 else Loads()
-    obstacles = [random_obstacle(rng, L, D) for _ in range(1 + int(rng.random() < 0.3))]
-    try:
-        solver = among_obstacles(pose_solver(Model(design.robot, design.material), NEWTON), obstacles)
-    except InputError:
-        return None
-    step, found = solver.solve(design.pressure, loads)
+    while True:
+        design = random_design(rng)
+        L, D = design.robot.length, design.robot.outer_diameter
+        loads = Loads(design.loads.tip_force, (0, 0, 0), design.loads.gravity) if rng.random() < 0.5 else Loads()
+        obstacles = [random_obstacle(rng, L, D) for _ in range(1 + int(rng.random() < 0.3))]
+        energy = seed % 3 == 2
+        conventions, coefficients = (ENERGY, Coefficients()) if energy else (REPRODUCTION, Coefficients())
+        poses = pose_solver(Model(design.robot, design.material, coefficients, conventions), NEWTON)
+        try:
+            solver = among_obstacles(poses, obstacles)
+        except InputError:  # it overlaps one at rest
+            continue
+        pressure = design.pressure
+        while poses.branch_at(poses.values(pressure, loads)).status is not Status.SOLVED:
+            pressure = pressure / 2  # the other section ends before
+        return solver, pressure, loads
+
+
+def check_random(seed: int) -> Status:
+    """Solve a random robot among random obstacles and judge the answer."""
+    solver, pressure, loads = random_case(seed)
+    obstacles = solver.obstacles
+    step, found = solver.solve(pressure, loads)
     if step.status is Status.SOLVED:
         assert found is not None
         assert step.residual is not None
@@ -209,15 +271,37 @@ def check_random(seed: int) -> Status | None:
         assert min(contact.gap for contact in step.contacts) > -2e-5
         forces = sum((contact.force for contact in step.contacts), np.zeros(3))
         assert balance(solver, found, loads, forces) < 1e-8 * max(1.0, found.units[1])
-        # the distance again, of every point of the shape by itself
         assert step.pose is not None
-        for obstacle in obstacles:
+        for obstacle in obstacles:  # the distance again, of points of the surface
+            points = step.pose.shape.position[1:]
             if obstacle.part == "body":
-                scaled = [ca.DM(p) / L for p in step.pose.shape.position[1:]]
-                own = ca.DM(obstacle.numbers) / [L if unit == "m" else 1.0 for unit in obstacle.units]
-                axis = min(float(signed_distance(obstacle, p, own)) for p in scaled) * L
-                assert axis > -2e-5
+                angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+                around = np.stack([np.cos(angles), np.sin(angles), np.zeros(24)])
+                rings = step.pose.shape.rotation[1:] @ (step.pose.radii.outer * around)
+                points = (points[:, :, None] + rings).transpose(0, 2, 1).reshape(-1, 3)
+            else:
+                points = points[-1:]
+            assert outside(obstacle, points).min() > -2e-5, f"{obstacle}"
     return step.status
+
+
+def outside(obstacle: Obstacle, points: np.ndarray) -> np.ndarray:
+    """Return how far points (n, 3) are out of an obstacle [m], from its surfaces and edges by numpy alone."""
+    if isinstance(obstacle, Plane):
+        return (points - np.array(obstacle.point)) @ np.array(obstacle.normal)
+    if isinstance(obstacle, Sphere):
+        return np.linalg.norm(points - np.array(obstacle.centre), axis=1) - obstacle.radius
+    *ends, radius = obstacle.numbers
+    a, b = np.array(ends[:3]), np.array(ends[3:])
+    length = float(np.linalg.norm(b - a))
+    z = (points - a) @ (b - a) / length
+    if isinstance(obstacle, Capsule):
+        nearest = a + np.clip(z / length, 0, 1)[:, None] * (b - a)
+        return np.linalg.norm(points - nearest, axis=1) - radius
+    wide = np.linalg.norm(points - a - z[:, None] * (b - a) / length, axis=1)
+    radial, beyond = (wide - radius) * (1 if isinstance(obstacle, Cylinder) else -1), np.maximum(-z, z - length)
+    out = np.hypot(np.maximum(radial, 0), np.maximum(beyond, 0))
+    return np.where(out > 0, out, np.maximum(radial, beyond))
 
 
 def random_obstacle(rng: np.random.Generator, L: float, D: float) -> Obstacle:
@@ -247,6 +331,8 @@ def random_obstacle(rng: np.random.Generator, L: float, D: float) -> Obstacle:
 
 HEAD = 'study = "forward"\n[robot]\nname = "D25L60"\n[material]\nname = "Ecoflex 00-50"\nmodel = "mooney-rivlin"\n'
 PRESSED = "[pressure]\nsequence_bar = [[0.5, 0, 0]]\n"
+WORKSPACE = HEAD.replace("forward", "workspace") + "[workspace]\nlevels = 2\nto_bar = 0.6\nsets = [1]\n"
+INVERSE = HEAD.replace("forward", "inverse") + "[target]\ntip_position_mm = [[-24, 5, 68]]\n"
 BALL = '[[obstacle]]\nkind = "sphere"\ncentre_mm = [-30, 0, 40]\nradius_mm = 10\n'
 
 
@@ -283,8 +369,11 @@ def test_a_run_leaves_forces_in_every_file_and_its_figure_can_be_drawn_again(
         (HEAD + PRESSED + BALL.replace('"sphere"', '"ball"'), "[obstacle] kind: item 1: expected 'plane', 'sphere'"),
         (HEAD + PRESSED + BALL + "length_mm = 3\n", "[obstacle.1] length_mm: a sphere has none"),
         (HEAD + PRESSED + BALL + '[solver]\ntranscription = "collocation"\n', "multiple-shooting"),
-        (HEAD.replace("forward", "blocked-force") + PRESSED + BALL, "this table is not used by study 'blocked-force'"),
-        (HEAD.replace("forward", "workspace") + "[workspace]\nlevels = 3\nto_bar = 1\n" + BALL, "obstacle"),
+        (HEAD.replace("forward", "blocked-force") + PRESSED + BALL, "expected 'free' beside [[obstacle]]"),
+        (HEAD.replace("forward", "dynamic") + PRESSED + "[dynamic]\nduration_s = 1\n" + BALL, "obstacles stand in"),
+        (WORKSPACE + '[workspace.vary]\n"robot.length_mm" = { values = [60] }\n' + BALL, "vary takes no [[obstacle]]"),
+        (WORKSPACE + "[contact]\n" + BALL, "a wall takes no [[obstacle]] beside it"),
+        (INVERSE + "contact_force_N = 0.1\n", "expected only with [[obstacle]]"),
         (HEAD + PRESSED + BALL + BALL + 'name = "sphere 1"\n', "two obstacles are called 'sphere 1'"),
         (HEAD + PRESSED + BALL + "[uncertainty]\nmaterial = 0.1\n", "beside [[obstacle]]"),
     ],
@@ -299,6 +388,73 @@ def test_obstacles_that_cannot_be_are_one_line(
     assert error.count("\n") == 1
     assert said in error
     assert not (tmp_path / "out").exists()
+
+
+def test_a_workspace_knows_what_touches(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "cavity.toml"
+    file.write_text(WORKSPACE + '[solver]\nengine = "newton"\n' + BALL)
+    assert main(["sweep", str(file), "--out", str(tmp_path / "out"), "--csv"]) == 0
+    capsys.readouterr()
+    with h5netcdf.File(tmp_path / "out" / "workspace.nc", "r") as found:
+        force, gap = np.array(found["contact_force_N"]), np.array(found["contact_gap_mm"])
+        tip = np.array(found["tip_position_mm"])
+    other = against_a_ball().steps[1]
+    assert other.pose is not None
+    assert tip[1] == pytest.approx(1e3 * other.pose.tip_position, abs=1e-4)
+    assert force[1, 0] == pytest.approx(other.contacts[0].force, abs=1e-5)
+    assert np.linalg.norm(force[0]) < 1e-9
+    assert gap[0, 0] > 1 > gap[1, 0]
+    assert "contact_force_1_x_N" in (tmp_path / "out" / "workspace.csv").read_text().splitlines()[0]
+
+
+@pytest.mark.parametrize("most", [None, pytest.param(0.03, marks=pytest.mark.thorough)])
+def test_a_target_is_reached_with_no_more_force_than_is_allowed(most: float | None) -> None:
+    task = InverseTask((Target(np.array([-0.024, 0.005, 0.068]), None),), np.zeros(3), np.full(3, 1.5e5), 0.06)
+    ball = Sphere(centre=(-0.03, 0, 0.04), radius=0.01)
+    asked = Model(robot("D25L60"), SILICONE), NEWTON, Loads(), replace(task, contact_force=most), [ball]
+    step, _ = InverseAmongObstacles(*asked).nearest(task.targets[0], None)
+    assert step.aimed is not None
+    force = np.linalg.norm(step.contacts[0].force)
+    if most is None:
+        assert step.status is Status.SOLVED
+        assert step.aimed.distance == pytest.approx(0, abs=1e-6 * 0.06)
+        assert force == pytest.approx(0.0639, abs=1e-3)
+    else:
+        assert step.status is Status.OUT_OF_REACH
+        assert "sphere 1 may not be pushed harder" in step.message
+        assert force == pytest.approx(most, abs=1e-4)
+        assert step.aimed.distance is not None
+        assert 1e-4 < step.aimed.distance < 5e-3
+
+
+def test_the_jacobian_in_numbers_is_that_of_the_expressions() -> None:
+    rng = np.random.default_rng(1)
+    obstacles = [
+        Sphere(centre=(-0.03, 0, 0.04), radius=0.01),
+        Plane(point=(-0.03, 0, 0), normal=(1, 0, 0.1), part="tip rim"),
+        Trocar(point=(0, 0, 0.03), axis=(0, 0, 1), radius=0.014, length=0.01),
+    ]
+    solver = among_obstacles(pose_solver(Model(robot("D25L60"), SILICONE), NEWTON), obstacles)
+    _, found = solver.solve(np.array([0.9e5, 0.1e5, 0]), Loads((0.02, 0, 0), (0, 0, 0), (0, 0, -9.8)))
+    assert found is not None
+    grid, p = found.grid, found.solution.p
+    x = found.solution.x + 1e-9 * rng.normal(size=found.solution.x.size)
+    slope = grid.engine.linear
+    assert isinstance(slope, ObstacleSlope)
+    tried = 0
+    while (blocks := slope.blocks(x, p)) is None and tried < 1000:
+        tried += 1
+    if blocks is None:
+        pytest.skip("there is nothing to compile with")
+    entries = slope._entries(x, p)
+    assert entries is not None
+    assert entries == pytest.approx(np.array(grid.problem.jacobian(x, p).nonzeros()), abs=1e-10)
+    assert np.any(blocks.touch[:, -1] < 0.5)
+    g = rng.normal(size=x.size)
+    dx = slope._condensed(blocks, g)
+    size = abs(np.asarray(ca.DM(grid.problem.jacobian(x, p)))) @ abs(dx)
+    left = np.asarray(ca.DM(grid.problem.jacobian(x, p))) @ dx + g
+    assert np.max(abs(left) / (size + 1)) < 1e-9
 
 
 def test_the_shipped_scenario_touches_and_is_drawn() -> None:

@@ -15,11 +15,10 @@ from softnlp.model.rod import Loads
 from softnlp.model.segments import SegmentedRobot, body_of
 from softnlp.model.tip import TipContact
 from softnlp.statics.blocked import BlockedSolver
-from softnlp.statics.blocked_grid import Blocked
 from softnlp.statics.chain_grid import chain_equations
 from softnlp.statics.chain_solver import ChainSolver
 from softnlp.statics.compiled import rod_equations
-from softnlp.statics.pose_grid import Solved
+from softnlp.statics.obstacle_solver import ObstacleSolver
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Step
 
@@ -36,13 +35,17 @@ class Alone:
         self._free: PoseSolver | None = None
         self._blocked: BlockedSolver | None = None
 
-    def solve(self, column: Array, near: Any = None) -> tuple[Step, Solved | Blocked | None]:
+    def solve(self, column: Array, near: Any = None) -> tuple[Step, Any]:
         """Solve one pose, given by every quantity, from a neighbour where there is one."""
         model, pressure, loads = self._pose(column)
         plan = self.plan
         if plan.contact is None:
             self._free = self._free or self._solver()
-            return self._free.with_model(model).solve(pressure, loads, near)
+            own = self._free.with_model(model)
+            if plan.obstacles:
+                # from the unpressurised shape: the neighbours in a chunk are not on the way to each other
+                return ObstacleSolver(own, plan.obstacles).solve(pressure, loads)
+            return own.solve(pressure, loads, near)
         if self._blocked is None:
             poses = self._solver(unloaded_accuracy=self._numerics.accuracy)
             wall = (TipContact(plan.contact.closure),)

@@ -29,7 +29,7 @@ class ChunkSolver:
         self.plan = plan
         # The batch proposes and some poses are audited; what is solved alone is not closed one by one.
         self._alone = Alone(plan, plan.numerics if self.by_ipopt else plan.numerics.without_ipopt())
-        single = not isinstance(plan.model.robot, SegmentedRobot)
+        single = not isinstance(plan.model.robot, SegmentedRobot) and not plan.obstacles
         together = single and plan.numerics.transcription == "multiple-shooting" and not self.by_ipopt
         self._free = PoseLane(plan) if together else None
         self._wall = self._alone.wall
@@ -143,6 +143,9 @@ def _fill(rows: Rows, k: int, step: Step) -> None:
     rows["error"][k] = step.discretisation_error
     for name in ("stretch", "tip_position", "tip_rotation", "bending_angle", "backbone_length", "chamber_length"):
         rows[name][k] = getattr(pose, name)
+    for j, contact in enumerate(step.contacts):
+        rows["contact_force"][k, j] = contact.force
+        rows["contact_gap"][k, j] = contact.gap
     if step.contact is not None:
         rows["blocked_force"][k] = step.contact.force
         rows["gap"][k] = step.contact.gap

@@ -16,6 +16,8 @@ from softnlp.batch.poses import row_type
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.inputs import conventions_table, segment_tables
 from softnlp.model.numerics import Numerics
+from softnlp.model.obstacle_tables import obstacle_tables
+from softnlp.model.obstacles import Obstacle
 from softnlp.model.quantities import LOADS, Model, contact_quantities
 from softnlp.model.rod import Loads
 from softnlp.model.segments import SegmentedRobot, declared
@@ -34,7 +36,7 @@ class Plan:
     values : (poses, columns) of those, SI, a column an entry in the order of `varied`.
     order : (poses,) numbers of the poses, neighbours next to each other. Each `chunk` of them is one piece of work,
     whose result depends on nothing outside it.
-    times : (poses,) [s] of poses that were read with a time, or None.
+    times : (poses,) [s] of poses that were read with a time, or None. obstacles : what every pose is among.
     """
 
     model: Model
@@ -46,6 +48,7 @@ class Plan:
     order: NDArray[np.int64]
     chunk: int = CHUNK
     times: Array | None = None
+    obstacles: tuple[Obstacle, ...] = ()
 
     @property
     def poses(self) -> int:
@@ -64,7 +67,7 @@ class Plan:
     @property
     def row_type(self) -> np.dtype[Any]:
         """The type of a row of the result."""
-        return row_type(self.model.chambers, wall=self.contact is not None)
+        return row_type(self.model.chambers, wall=self.contact is not None, obstacles=len(self.obstacles))
 
     @cached_property
     def nominal(self) -> dict[str, Array]:
@@ -108,6 +111,8 @@ class Plan:
             "varied": list(self.varied),
             "chunk": self.chunk,
         }
+        if self.obstacles:
+            told = {**told, "obstacles": obstacle_tables(self.obstacles)}
         if isinstance(self.model.robot, SegmentedRobot):
             told = {**told, "segment": segment_tables(self.model.robot)}
         digest = hashlib.sha256(json.dumps(told, sort_keys=True).encode())

@@ -25,13 +25,14 @@ class Lane(IntEnum):
     PROBLEM = 1
 
 
-def row_type(chambers: int, *, wall: bool) -> np.dtype[Any]:
+def row_type(chambers: int, *, wall: bool, obstacles: int = 0) -> np.dtype[Any]:
     """Return the type of a row; SI units, world frame, NaN where there is no solution.
 
     pose : number of the pose in the plan. status : position in `STATUSES`. stable : of `STABLE_FLAGS`.
     self_intersecting : 1, 0, or -1 without a solution. lane : `Lane`. error : estimated tip position error over L_0.
     The rest is as in `softnlp.statics.step.Pose`; with a wall the blocked shape's, blocked_force [N] and gap, of the
-    free shape's contact point to the wall [m].
+    free shape's contact point to the wall [m]; among obstacles contact_force (obstacles, 3) on the robot [N] and
+    contact_gap (obstacles,) [m].
     """
     fields: list[tuple[Any, ...]] = [
         ("pose", "<i8"),
@@ -52,6 +53,8 @@ def row_type(chambers: int, *, wall: bool) -> np.dtype[Any]:
     ]
     if wall:
         fields += [("blocked_force", "<f8"), ("gap", "<f8")]
+    if obstacles:
+        fields += [("contact_force", "<f8", (obstacles, 3)), ("contact_gap", "<f8", (obstacles,))]
     return np.dtype(fields)
 
 

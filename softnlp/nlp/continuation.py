@@ -145,8 +145,9 @@ def around_folds(
     largest_step: float = 0.3,
     smallest_step: float = 1e-5,
     most_solves: int = 1500,
+    target: float = 1.0,
 ) -> Iterator[tuple[Array | None, int]]:
-    """Follow the curve of solutions (x, t) by arc length from t = `fraction`; yield x near every passage of t = 1.
+    """Follow the curve of solutions (x, t) by arc length from t = `fraction`; yield x near every passage of a target.
 
     Where a load path turns back, its curve goes on through unstable equilibria and often turns forward again: the robot
     snaps through. weight : per entry of x, for the arc length. Yields also the linear solves spent since the last
@@ -169,8 +170,8 @@ def around_folds(
         else:
             break
         x_new, t_new = corrected
-        if (t - 1.0) * (t_new - 1.0) <= 0.0 and t_new != t:
-            yield x + (x_new - x) * (1.0 - t) / (t_new - t), spent - told
+        if (t - target) * (t_new - target) <= 0.0 and t_new != t:
+            yield x + (x_new - x) * (target - t) / (t_new - t), spent - told
             told = spent
         x, t, tangent = x_new, t_new, heading
         step = min(largest_step, step * (1.5 if steps_taken <= 3 else 1.0))

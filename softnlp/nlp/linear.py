@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, Protocol, runtime_checkable
@@ -38,10 +38,13 @@ class ManySidedSolver(Protocol):
 
 
 class SparseSolver:
-    """Solves J dx = -g of any square problem by sparse LU factorisation."""
+    """Solves J dx = -g of any square problem by sparse LU factorisation.
 
-    def __init__(self, problem: CompiledProblem) -> None:
-        self._problem = problem
+    entries : those of the Jacobian at (x, p), in the problem's order, where they are to be had faster than from it.
+    """
+
+    def __init__(self, problem: CompiledProblem, entries: Callable[[Array, Array], Array | None] | None = None) -> None:
+        self._problem, self._entries = problem, entries
         self._last: tuple[Array, Array, Any] | None = None  # where the last factorisation was made, and that
 
     @cached_property
@@ -56,8 +59,10 @@ class SparseSolver:
 
     def solve_many(self, x: Array, p: Array, G: Array) -> Array:
         """Return the columns dx for as many right sides G (n, r), of one factorisation. Raises as `solve`."""
-        (J,) = self._problem.jacobian.call([x, p])
-        factors = _factors(np.array(J.nonzeros()), *self._pattern)
+        entries = None if self._entries is None else self._entries(x, p)
+        if entries is None:
+            entries = np.array(self._problem.jacobian.call([x, p])[0].nonzeros())
+        factors = _factors(entries, *self._pattern)
         self._last = np.array(x), np.array(p), factors
         return np.asarray(factors.solve(-np.asarray(G, dtype=float)))
 

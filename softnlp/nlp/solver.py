@@ -114,8 +114,8 @@ class Engine:
 
     IPOPT is the reference: it solves what Newton does not, unless `newton_only` or too large for it in bounded time (no
     limit reaches into one sparse factorisation), and solves alone where `ipopt_only`. options : of IPOPT. A square
-    problem needs no Hessian: with a zero one IPOPT's step is Newton's too. Safe to share between threads:
-    calls wait for each other.
+    problem needs no Hessian: with a zero one IPOPT's step is Newton's too. slope : (x, p) -> residual and Jacobian for
+    IPOPT, where it is not that of the problem. Safe to share between threads: calls wait for each other.
     """
 
     def __init__(
@@ -128,8 +128,10 @@ class Engine:
         max_iterations: int | None = None,
         tolerance: float = 1e-11,
         options: Mapping[str, Any] | Sequence[tuple[str, Any]] = (),
+        slope: ca.Function | None = None,
     ) -> None:
         self.problem = problem
+        self._slope = slope
         self.linear = linear
         self.newton_only = newton_only
         self.ipopt_only = ipopt_only
@@ -171,7 +173,9 @@ class Engine:
                 **self._options,
             },
         }
-        if self.problem.cases:
+        if self._slope is not None:
+            options["jac_g"] = self._slope
+        elif self.problem.cases:
             options["jac_g"] = ca.Function("jac_g", [nlp["x"], nlp["p"]], [nlp["g"], self.problem.slope])
         if self.problem.is_square:
             x, p = nlp["x"], nlp["p"]

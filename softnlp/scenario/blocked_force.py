@@ -7,16 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from softnlp.base.errors import InputError
+from softnlp.base.errors import InputError, located
 from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.model.contact_settings import ClosureWeights, ContactSettings, ContactTask, require_in_front
 from softnlp.model.robot import Robot
 from softnlp.model.segments import SegmentedRobot
 from softnlp.scenario.data import Read, Scenario, run_of
 from softnlp.scenario.schema import ContactTable
+from softnlp.statics.kept import pose_solver
 from softnlp.statics.step import Run, Step
 from softnlp.studies.blocked_chain import require_free
 from softnlp.studies.blocked_force import blocked_force, constrained_pose, force_against_offset
+from softnlp.studies.blocked_obstacles import blocked_among, require_plain_wall
 from softnlp.studies.force_inversion import pressure_for_force
 
 SEVERAL = ("offsets_mm", "offset_ramp", "target_force_N")
@@ -95,6 +97,14 @@ def contact_task(given: Read) -> ContactTask:
             raise InputError("expected only with one uniform segment so far", key=key)
         if table.mode != "blocked":
             raise InputError("expected 'blocked' with several segments or a section that varies", key="mode")
+    if given.file.obstacle:
+        require_plain_wall(contact_settings(table, energy=given.file.corrections.conventions == "energy"))
+        for key in table.written((*SEVERAL, "weight_sensitivity")):
+            raise InputError("not with [[obstacle]] so far; ask for the force at each pressure", key=key)
+        if table.mode != "blocked":
+            raise InputError(
+                "expected 'blocked' beside [[obstacle]]; without a wall use study = \"forward\"", key="mode"
+            )
     several = table.written(SEVERAL)
     constrained = table.mode == "constrained"
     if table.weight_sensitivity:
@@ -163,6 +173,13 @@ def run_blocked(scenario: Scenario, progress: Callable[[int, Step], None] | None
         if progress is not None:
             progress(0, step)
         return run_of(scenario, [step])
+    if scenario.obstacles:
+        poses = pose_solver(scenario.model, scenario.numerics)
+        with located(source=str(scenario.path)):
+            steps = list(
+                blocked_among(poses, scenario.pressures, scenario.loads, contact, scenario.obstacles, progress, times)
+            )
+        return run_of(scenario, steps)
     settings |= {"title": scenario.title, "progress": progress}
     if task.offsets is not None:
         return force_against_offset(*model, scenario.pressures[0], task.offsets, contact, **settings)

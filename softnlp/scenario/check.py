@@ -16,14 +16,14 @@ from softnlp.scenario.dynamic import DynamicFile
 from softnlp.scenario.identify import IdentifyFile
 from softnlp.scenario.inverse import InverseFile
 from softnlp.scenario.near_keys import meant
-from softnlp.scenario.obstacle_schema import AmongObstaclesFile
-from softnlp.scenario.schema import BlockedForceFile, ScenarioFile
+from softnlp.scenario.obstacle_schema import AmongObstaclesFile, BlockedAmongObstaclesFile
+from softnlp.scenario.schema import ScenarioFile
 from softnlp.scenario.segments import OF_SEGMENTS, of_segment, of_segments
 from softnlp.scenario.workspace import WorkspaceFile
 
 SCHEMAS: Mapping[str, type[ScenarioFile]] = {
     "forward": AmongObstaclesFile,
-    "blocked-force": BlockedForceFile,
+    "blocked-force": BlockedAmongObstaclesFile,
     "inverse": InverseFile,
     "workspace": WorkspaceFile,
     "identify": IdentifyFile,
@@ -31,6 +31,8 @@ SCHEMAS: Mapping[str, type[ScenarioFile]] = {
     "dynamic": DynamicFile,
 }
 """The studies that this version runs, and the file of each."""
+
+_INSTEAD = "obstacles stand in 'forward', 'blocked-force', 'inverse' and 'workspace' so far"
 
 HOW = ": --all-errors"
 """How to see all mistakes of a file."""
@@ -121,7 +123,8 @@ def _errors(study: str, schema: type[ScenarioFile], details: list[ErrorDetails])
     for detail in (d for d in details if d["type"] == "extra_forbidden"):
         *place, key = detail["loc"]
         if not place and key in _TABLES:
-            yield _placed(detail, f"this table is not used by study {study!r}; remove it")
+            instead = _INSTEAD if key == "obstacle" else "remove it"
+            yield _placed(detail, f"this table is not used by study {study!r}; {instead}")
             continue
         name, words = meant(str(key), detail["input"], _model(schema, tuple(place)).model_fields)
         aimed |= {(*place, name)}

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, PlainValidator, TypeAdapter
 
-from softnlp.base.errors import InputError
+from softnlp.base.errors import InputError, located
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.scenario.data import Read, Scenario, run_of
+from softnlp.scenario.obstacle_schema import Obstacles
 from softnlp.scenario.schema import (
     MOST_STEPS,
     Normal,
@@ -25,6 +26,7 @@ from softnlp.scenario.schema import (
 from softnlp.scenario.segments import allowed
 from softnlp.statics.step import Run, Step
 from softnlp.studies.forward import followed
+from softnlp.studies.inverse_obstacles import InverseAmongObstacles
 from softnlp.studies.inverse_solver import InverseKinematics
 from softnlp.studies.targets import InverseTask, Target
 
@@ -50,12 +52,14 @@ class TargetTable(Table):
 
     tip_position_mm : rows of x, y, z; as in [[10.0, 0.0, 60.0]]
     tip_direction : rows of a vector along which the tip is to point; as in [[0.0, 0.0, 1.0]]
+    contact_force_N : that no obstacle may push harder; 0.0 for none touched; as in 0.1
     length_per_radian_mm : weighs a direction against a position; by default the robot's length; as in 60.0
     """
 
     tip_position_mm: Rows | None = None
     tip_direction: Directions | None = None
     length_per_radian_mm: Positive | None = None
+    contact_force_N: NotNegative | None = None
 
 
 class BoundsTable(Table):
@@ -72,6 +76,7 @@ class InverseFile(ScenarioFile):
 
     target: TargetTable = Field(description="a table with tip_position_mm, tip_direction or both")
     bounds: BoundsTable = BoundsTable()
+    obstacle: Obstacles = Field(default=[])
     uncertainty: UncertaintyTable | None = None
 
 
@@ -93,6 +98,8 @@ def inverse_task(given: Read) -> InverseTask:
     elif len(positions) != len(directions):
         problem = f"expected one direction a position, got {len(directions)} for {len(positions)}"
         raise InputError(problem, table="target", key="tip_direction")
+    if not given.file.obstacle:
+        target.refuse(["contact_force_N"], "expected only with [[obstacle]]", "target")
     lower, upper = _pressures(given.file.bounds, given.robot.chamber_sets)
     targets = tuple(
         Target(
@@ -104,7 +111,7 @@ def inverse_task(given: Read) -> InverseTask:
     weight = float(given.robot.length)
     if target.length_per_radian_mm is not None:
         weight = target.length_per_radian_mm * MILLIMETRE
-    return InverseTask(targets, lower, upper, weight, allow=allowed(given.file))
+    return InverseTask(targets, lower, upper, weight, allow=allowed(given.file), contact_force=target.contact_force_N)
 
 
 def _pressures(table: BoundsTable, sets: int) -> tuple[Array, Array]:
@@ -125,5 +132,10 @@ def run_inverse(scenario: Scenario, progress: Callable[[int, Step], None] | None
     """Run inverse kinematics, a step a target; `branches` means nothing here."""
     task = scenario.task
     assert isinstance(task, InverseTask)
+    if scenario.obstacles:
+        asked = scenario.model, scenario.numerics, scenario.loads, task, scenario.obstacles
+        with located(source=str(scenario.path)):
+            among = InverseAmongObstacles(*asked)
+        return run_of(scenario, followed(among.nearest, task.targets, progress))
     solver = InverseKinematics(scenario.model, scenario.numerics, scenario.loads, task, "newton")
     return run_of(scenario, followed(solver.nearest, task.targets, progress))

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from softnlp.scenario.schema import ForwardFile
+from softnlp.scenario.schema import BlockedForceFile, ForwardFile
 from softnlp.scenario.values import Label, Positive, Table, Vector
 
 MOST_OBSTACLES = 20
@@ -41,7 +41,16 @@ class ObstacleTable(Table):
     name: Label | None = None
 
 
+Obstacles = Annotated[list[ObstacleTable], Field(max_length=MOST_OBSTACLES)]
+
+
+class BlockedAmongObstaclesFile(BlockedForceFile):
+    """A whole scenario of `blocked-force`."""
+
+    obstacle: Obstacles = Field(default=[])
+
+
 class AmongObstaclesFile(ForwardFile):
     """A whole scenario of `forward`."""
 
-    obstacle: Annotated[list[ObstacleTable], Field(max_length=MOST_OBSTACLES)] = Field(default=[])
+    obstacle: Obstacles = Field(default=[])

@@ -26,8 +26,11 @@ from softnlp.model.robot import Robot
 from softnlp.model.segments import require_one_segment
 from softnlp.scenario.blocked_force import SEVERAL, contact_settings
 from softnlp.scenario.data import Read, Scenario, scenario_of
+from softnlp.scenario.obstacle_schema import Obstacles
 from softnlp.scenario.pressures import require_sets
 from softnlp.scenario.schema import ContactTable, NotNegative, PressureTable, RegistrationTable, ScenarioFile, Table
+from softnlp.statics.kept import pose_solver
+from softnlp.statics.obstacle_solver import among_obstacles
 from softnlp.sweep.manufacture import check_many
 from softnlp.sweep.task import Axis, WorkspaceTask, combinations, pressure_table, varied_quantities, varied_table
 
@@ -68,6 +71,7 @@ class WorkspaceTable(Table):
 class WorkspaceFile(ScenarioFile):
     """A whole scenario of `workspace`."""
 
+    obstacle: Obstacles = Field(default=[])
     workspace: WorkspaceTable = WorkspaceTable()
     pressure: PressureTable | None = None
     contact: ContactTable | None = None
@@ -94,6 +98,9 @@ def workspace_task(given: Read) -> WorkspaceTask:
     if wall is not None:
         with located(table="contact"):
             require_one_segment(robot, "a wall")
+    if file.obstacle and (wall is not None or table.vary):
+        key, other = ("contact", "a wall") if wall is not None else ("workspace", "vary")
+        raise InputError(f"{other} takes no [[obstacle]] beside it; leave one of them out", table=key)
     if table.vary:
         with located(table="workspace.vary"):
             require_one_segment(robot, "a sweep of other numbers than pressures")
@@ -255,6 +262,9 @@ def plan_of(scenario: Scenario) -> Plan:
     task = scenario_of(scenario, "workspace", "plan_of").task
     assert isinstance(task, WorkspaceTask)
     model = scenario.model
+    if scenario.obstacles:
+        with located(source=str(scenario.path)):
+            among_obstacles(pose_solver(model, scenario.numerics), scenario.obstacles)
     pressures = pressure_table(task, scenario.robot.chamber_sets, scenario.pressures)
     varied, columns = _varied(task, scenario, len(pressures))
     values = np.ascontiguousarray(np.concatenate([pressures, *columns], axis=1))
@@ -268,6 +278,7 @@ def plan_of(scenario: Scenario) -> Plan:
         values=values,
         order=np.arange(len(values), dtype=np.int64) if own_order else cells(values, CHUNK),
         times=None if scenario.times is None else np.tile(scenario.times, len(values) // len(scenario.times)),
+        obstacles=scenario.obstacles,
     )
 
 

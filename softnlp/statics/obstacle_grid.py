@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from softnlp.model.numerics import Numerics
 from softnlp.model.obstacles import Obstacle
 from softnlp.model.rod import STATE_SIZE
-from softnlp.nlp.linear import SparseSolver
 from softnlp.nlp.problem import CompiledProblem, compile_problem
 from softnlp.nlp.solver import Engine, Solution
 from softnlp.statics.compiled import RodEquations
+from softnlp.statics.obstacle_slope import ObstacleSlope
 from softnlp.statics.obstructed import SMOOTHING, STEPS, ObstructedCase, numbers_of, obstructed_case
 
 Array = NDArray[np.float64]
 
-SHARP = 1e-7
+SHARP = 1e-6
 """tau of a solution: gap times force is its square, in L_0 times EI/L_0^2."""
 ACTIVE = 10 * SHARP
 """Scaled push from which a node touches."""
@@ -85,15 +85,15 @@ def compiled_obstacles(
     given = {**equations.declared, **{q.name: q for q in numbers_of(obstacles, intervals)}}
     case = obstructed_case("pose", equations.functions, given, obstacles, intervals)
     problem = compile_problem(list(given.values()), [case])
-    linear = SparseSolver(problem)
+    linear = ObstacleSlope(case, problem)
     chosen: dict[str, Any] = {"linear": linear, "newton_only": True}
     if numerics.engine == "ipopt":
-        chosen = {"linear": linear, "ipopt_only": True, "options": numerics.ipopt}
+        chosen = {"linear": linear, "ipopt_only": True, "options": numerics.ipopt, "slope": linear.function}
     return ObstacleGrid(
         case=case,
         engine=Engine(problem, **chosen),
         stepper=Engine(problem, **chosen, tolerance=1e-7),
-        reference=Engine(problem, options=numerics.ipopt),
+        reference=Engine(problem, options=numerics.ipopt, slope=linear.function),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import groupby
 
 import numpy as np
@@ -14,6 +15,7 @@ from softnlp.statics.pose import Mapped
 Array = NDArray[np.float64]
 
 _SHORT = 0.15  # of the length: up to which all of a piece that touches counts
+_DEEP = 1e-4  # of L_0: overlap between nodes from which some are put there
 _SAMPLES = 8  # of each interval, where gaps are looked at between nodes
 
 
@@ -23,6 +25,7 @@ def between(shape: Mapped, found: Touched, s: Array) -> Array:
     return np.asarray(shape.map(s.size)(found.behind[:, left], found.constants, (s - found.s[left])[None, :]))
 
 
+@lru_cache(maxsize=4)
 def gaps_between(shape: Mapped, found: Touched) -> tuple[Array, Array]:
     """Return points along the rod (M,), nodes among them but not the base, and the gap of each obstacle there."""
     K = found.s.size - 1
@@ -38,8 +41,13 @@ def gaps_between(shape: Mapped, found: Touched) -> tuple[Array, Array]:
     return s, gaps
 
 
-def regraded(found: Touched, intervals: int) -> Array:
-    """Return nodes (K + 1,), half of them where obstacles touch and close by.
+def deepest(shape: Mapped, found: Touched) -> float:
+    """Return how deep the body is in an obstacle, anywhere, in L_0; negative where it is outside of all."""
+    return -float(np.min(gaps_between(shape, found)[1]))
+
+
+def regraded(shape: Mapped, found: Touched, intervals: int) -> Array:
+    """Return nodes (K + 1,), half of them where obstacles touch and close by, or overlap between nodes.
 
     A push at one point makes a kink of the axis, by shear, so that a body touches along a short piece: F / GA over the
     curvature that it has against the obstacle, a few hundredths of the length. Of a long piece both ends count, where
@@ -50,6 +58,10 @@ def regraded(found: Touched, intervals: int) -> Array:
         short = found.s[own[-1]] - found.s[own[0]] <= _SHORT
         ends = [own] if short else [own[:1], own[-1:]]
         windows += [(found.s[max(some[0] - 1, 0)], found.s[min(some[-1] + 1, last)]) for some in ends]
+    s, gaps = gaps_between(shape, found)
+    for k in np.unique(np.searchsorted(found.s, s[np.min(gaps, axis=0) < -_DEEP])):
+        if not any(low <= found.s[k - 1] and found.s[k] <= high for low, high in windows):
+            windows.append((found.s[k - 1], found.s[k]))
     if not windows:
         return np.linspace(0, 1, intervals + 1)
     breaks = np.unique([0.0, 1.0, *(end for window in windows for end in window)])
@@ -58,9 +70,9 @@ def regraded(found: Touched, intervals: int) -> Array:
     size = np.diff(breaks)
     share = np.where(inside, 0.5 / inside.sum(), 0.0) + 0.5 * size
     at = np.concatenate([[0.0], np.cumsum(share)])
-    s: Array = np.interp(np.linspace(0, 1, intervals + 1), at / at[-1], breaks)
-    s[0], s[-1] = 0.0, 1.0
-    return s
+    nodes: Array = np.interp(np.linspace(0, 1, intervals + 1), at / at[-1], breaks)
+    nodes[0], nodes[-1] = 0.0, 1.0
+    return nodes
 
 
 def halved(found: Touched) -> Array:

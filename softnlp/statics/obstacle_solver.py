@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -21,7 +21,7 @@ from softnlp.nlp.continuation import around_folds, follow
 from softnlp.nlp.solver import Solution, discretisation_correction
 from softnlp.statics.closing import DisputedError, closed
 from softnlp.statics.obstacle_grid import SHARP, ObstacleGrid, Touched, compiled_obstacles, sharpened, touched
-from softnlp.statics.obstacle_nodes import fewest_touching, halved, regraded, resampled
+from softnlp.statics.obstacle_nodes import deepest, fewest_touching, halved, regraded, resampled
 from softnlp.statics.obstacle_step import OVERLAP, is_minimum, names_of, obstacle_step
 from softnlp.statics.obstructed import SMOOTHING, STEPS
 from softnlp.statics.solver import PoseSolver
@@ -29,16 +29,19 @@ from softnlp.statics.step import Step
 
 Array = NDArray[np.float64]
 
-_FIRST, _FINEST = 40, 320  # intervals
+_FIRST, _FINEST = 20, 320  # intervals
 _FEWEST = 4
 _REST, _TOUCHING = 400, 1e-9  # points of the unpressurised robot that are looked at, and the overlap that counts
-_PATH_TAU = 1e-3  # tau along a path: a gap of 6 um under a push of 1/100
-_SHARPER, _LEAST_SHARPER = 0.1, 0.8  # by what tau falls at once, and at least
+_PATH_TAU = 1e-2  # tau along a path: a gap of 6 um under a push of 1/100
+_SHARPER, _LEAST_SHARPER = 0.01, 0.8  # by what tau falls at once, and at least
 _LARGEST_JUMP = 0.1  # between points of a path, in scaled positions and direction cosines
 _SMALLEST_STEP = 1 / 1024
 _THROUGH = 5e-3  # of L_0: an overlap half-way between two points of a path from which that went through an obstacle
-_AROUND: dict[str, Any] = {"first_step": 0.02, "largest_step": 0.2, "most_solves": 800}
+_AROUND: dict[str, Any] = {"first_step": 0.02, "largest_step": 0.2}
+_MOST_AROUND, _ONWARDS = 400, 5e-3  # solves around one fold, and how far beyond it the path is taken again
+_MOST = 1500  # iterations to find one pose
 _PASSES, _ENOUGH = 3, 6  # of putting nodes where obstacles touch, and how many are to be there
+_SETTLED = 0.2  # of the accuracy: a tip that moves by less when nodes are placed anew stays where it is
 _STEEPER = 4.0  # growth of what a step changes from which a path that ends has turned
 _ORDER = 2  # of the tip's error, since pushes are those of nodes
 
@@ -68,6 +71,38 @@ def among_obstacles(poses: PoseSolver, obstacles: Sequence[Obstacle]) -> Obstacl
             text = f"the robot overlaps {name} by {deep / MILLIMETRE:.3g} mm at rest; move the obstacle away"
             raise InputError(text, table=f"obstacle.{k + 1}")
     return solver
+
+
+@dataclass(frozen=True, eq=False)
+class _Path:
+    """The straight way between two columns of values, or the end of it."""
+
+    first: Array
+    last: Array
+    start: float = 0.0
+
+    def __call__(self, t: float) -> Array:
+        whole = self.of_whole(t)
+        return self.last if t == 1.0 else self.first + whole * (self.last - self.first)
+
+    def of_whole(self, t: float) -> float:
+        """Return the fraction of the whole at one of what is left."""
+        return self.start + t * (1.0 - self.start)
+
+    def after(self, start: float) -> _Path:
+        """Return what is left from a fraction on."""
+        return replace(self, start=start)
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """Where following a path ended. fraction : of the whole. turned : whether changes grew as before a fold."""
+
+    solution: Solution
+    fraction: float
+    iterations: int
+    arrived: bool
+    turned: bool
 
 
 class ObstacleSolver:
@@ -119,20 +154,27 @@ class ObstacleSolver:
         if branch.status is not Status.SOLVED:
             return Step(pressure, branch.status, branch.message, solve_time=time.perf_counter() - began), None
         first = self.numerics.intervals or _FIRST
-        found: Touched | None = None
+        grids = [first] if self.numerics.intervals else [first, 2 * first, 4 * first]
+        best: tuple[int, Touched, float] | None = None
         spent, reached, turned = 0, 0.0, False
-        for start in [near, None] if near is not None else [None]:
-            found, more, reached, turned = self._followed(pressure, loads, start, first)
-            spent += more
-            if found is not None:
+        for intervals, start in ((k, start) for k in grids for start in ([near, None] if near else [None])):
+            rough, more, came, folded = self._followed(pressure, loads, start, intervals, _MOST - spent)
+            spent, reached, turned = spent + more, max(reached, came), turned or folded
+            if rough is not None:
+                refined, more, error = self._refined(rough)
+                spent += more
+                flaws = int(not self._fits(refined, error))
+                flaws += int(refined.snapped and not is_minimum(self.poses, refined))
+                if best is None or flaws < best[0]:
+                    best = flaws, refined, error
+            if spent >= _MOST or (best is not None and not best[0]):
                 break
-        if found is None:
+        if best is None:
             status = Status.FOLD if turned else Status.DIVERGED
             message = f"{status.advice}; among the obstacles continuation came {100 * reached:.3g} % of the way"
             seconds = time.perf_counter() - began
             return Step(pressure, status, message, iterations=spent, solve_time=seconds), None
-        found, more, error = self._refined(found)
-        spent += more
+        _, found, error = best
         try:
             solution = closed(found.grid.reference, found.solution, self.numerics, found.grid.tip)
         except DisputedError as disputed:
@@ -145,8 +187,8 @@ class ObstacleSolver:
             message = Status.DIVERGED.advice
             return Step(pressure, Status.DIVERGED, message, iterations=spent, solve_time=seconds), None
         step = obstacle_step(self.poses, self.obstacles, pressure, loads, found, error, spent, began)
-        deep = -min(contact.gap for contact in step.contacts)
-        if not np.isfinite(error) or (self.numerics.intervals is None and deep > OVERLAP):
+        if not self._fits(found, error):
+            deep = -min(contact.gap for contact in step.contacts)
             message = f"{Status.INACCURATE.advice}; with {found.grid.intervals} intervals the body is"
             message += f" {max(deep, 0.0) / MILLIMETRE:.2g} mm inside an obstacle between nodes"
             status = Status.INACCURATE
@@ -155,10 +197,18 @@ class ObstacleSolver:
             ), None
         return step, found
 
+    def _fits(self, found: Touched, error: float) -> bool:
+        """Whether a solution is as accurate as it has to be, and outside of obstacles between nodes as well."""
+        outside = self.numerics.intervals is not None or deepest(self.poses.shape, found) * found.units[0] <= OVERLAP
+        return bool(np.isfinite(error)) and outside
+
     def _followed(
-        self, pressure: Array, loads: Loads, near: Touched | None, intervals: int
+        self, pressure: Array, loads: Loads, near: Touched | None, intervals: int, most: int
     ) -> tuple[Touched | None, int, float, bool]:
-        """Follow the branch from a neighbour or from rest; also the iterations, how far it came, and if it turned."""
+        """Follow the branch from a neighbour or from rest; also the iterations, how far it came, and if it turned.
+
+        most : iterations after which it is given up.
+        """
         grid, s = self.grid(intervals), np.linspace(0, 1, intervals + 1)
         shape = self.poses.shape
         end = self.values(pressure, loads, s)
@@ -171,6 +221,22 @@ class ObstacleSolver:
             begin = {**near.values, STEPS: np.diff(s), SMOOTHING: _PATH_TAU}
             x = resampled(shape, near, grid, s)
         a, b = grid.problem.pack(begin), grid.problem.pack(end)
+        way = self._way(grid, _Path(a, b), x, 0.5 if near is not None else 0.25, most)
+        spent, snapped = way.iterations, False
+        while not way.arrived and spent < most:
+            beyond, more = self._beyond(grid, _Path(a, b), way, most - spent)
+            spent += more
+            if beyond is None:
+                break
+            way, snapped = beyond, True
+        if not way.arrived:
+            return None, spent, way.fraction, way.turned
+        found, more = self._sharp(grid, way.solution.x, end)
+        spent += more
+        return None if found is None else replace(found, snapped=snapped), spent, 1.0, False
+
+    def _way(self, grid: ObstacleGrid, path: _Path, x: Array, first_step: float, most: int) -> _Way:
+        """Follow a path by steps of its fraction from a guess at its beginning."""
         points: list[tuple[float, Array]] = []
 
         def passed(t: float, solution: Solution) -> bool:
@@ -179,28 +245,25 @@ class ObstacleSolver:
             points.append((t, solution.x))
             return True
 
-        started = grid.stepper.solve(a, x)
+        started = grid.stepper.solve(path(0.0), x)
         if not started.holds(10 * grid.stepper.tolerance):
-            return None, started.iterations, 0.0, False
+            return _Way(started, path.start, started.iterations, False, False)
         passed(0.0, started)
         way = follow(
             grid.stepper,
-            lambda t: b if t >= 1.0 else a + t * (b - a),
+            path,
             started.x,
             distance=grid.distance,
-            first_step=0.5 if near is not None else 0.25,
+            first_step=first_step,
             smallest_step=_SMALLEST_STEP,
             largest_jump=_LARGEST_JUMP,
             same_branch=passed,
+            most_iterations=most,
         )
-        spent = started.iterations + way.iterations
-        solution = way.solution
-        if not way.arrived:
-            beyond, more = self._beyond(grid, lambda t: a + t * (b - a), solution, way.fraction, end)
-            spent += more
-            return beyond, spent, way.fraction, self._turned(grid, points)
-        found, more = self._sharp(grid, solution.x, end)
-        return found, spent + more, 1.0, False
+        spent, reached = started.iterations + way.iterations, path.of_whole(way.fraction)
+        rates = [grid.distance(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(points) if b[0] > a[0]]
+        turned = len(rates) > 2 and rates[-1] > _STEEPER * float(np.median(rates))
+        return _Way(way.solution, reached, spent, way.arrived, turned)
 
     def _sharp(self, grid: ObstacleGrid, x: Array, values: dict[str, Any]) -> tuple[Touched | None, int]:
         """Solve with less and less smoothing, and return the solution, None where one is lost, and the iterations."""
@@ -211,37 +274,41 @@ class ObstacleSolver:
             spent += solution.iterations
             if solution.holds(self.numerics.tolerance):
                 tau, x = following, solution.x
-                if tau <= SHARP:
+                if tau <= 1.01 * SHARP:  # but for round-off
                     return touched(grid, solution, sharpened(values, SHARP)), spent
             else:
                 ratio = ratio**0.5
                 if ratio > _LEAST_SHARPER:
                     return None, spent
 
-    def _beyond(
-        self, grid: ObstacleGrid, path: Callable[[float], Array], start: Solution, fraction: float, end: dict[str, Any]
-    ) -> tuple[Touched | None, int]:
-        """Go on around the folds of a path and return the first stable pose at its end, to which the robot snaps."""
-        if grid.stepper.linear is None or not start.holds(10 * grid.stepper.tolerance):
+    def _beyond(self, grid: ObstacleGrid, path: _Path, way: _Way, most: int) -> tuple[_Way | None, int]:
+        """Go on around the fold at which a path ended, to where it goes forward again; None where it does not."""
+        if grid.stepper.linear is None or not way.solution.holds(10 * grid.stepper.tolerance):
             return None, 0
-        spent, weight = 0, np.zeros(start.x.size)
+        weight = np.zeros(way.solution.x.size)
         states = np.zeros((grid.intervals + 1, STATE_SIZE))
         states[:, :12] = 1.0 / len(states)
         weight[1 : 1 + states.size] = states.ravel()
+        spent, onwards = 0, min(way.fraction + _ONWARDS, 1.0)
         passages = around_folds(
-            grid.stepper, grid.stepper.linear, path, start, fraction, weight=weight, **_AROUND
-        )  # fmt: skip
+            grid.stepper,
+            grid.stepper.linear,
+            path,
+            way.solution,
+            way.fraction,
+            weight=weight,
+            target=onwards,
+            most_solves=min(most, _MOST_AROUND),
+            **_AROUND,
+        )
         for x, more in passages:
             spent += more
             if x is None:
                 break
-            rough = grid.stepper.solve(path(1.0), x)
-            if not rough.holds(10 * grid.stepper.tolerance):
-                continue
-            found, iterations = self._sharp(grid, rough.x, end)
-            spent += rough.iterations + iterations
-            if found is not None and is_minimum(self.poses, found):
-                return replace(found, snapped=True), spent
+            further = self._way(grid, path.after(onwards), x, 0.1, most - spent)
+            spent += further.iterations
+            if further.fraction > onwards + _ONWARDS or further.arrived:
+                return further, spent
         return None, spent
 
     def _through(self, grid: ObstacleGrid, before: Array, solution: Solution) -> bool:
@@ -256,11 +323,6 @@ class ObstacleSolver:
                 if np.min(own) < -_THROUGH:
                     return True
         return False
-
-    def _turned(self, grid: ObstacleGrid, points: Sequence[tuple[float, Array]]) -> bool:
-        """Whether the changes along a path grew as they do before a fold."""
-        rates = [grid.distance(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(points) if b[0] > a[0]]
-        return len(rates) > 2 and rates[-1] > _STEEPER * float(np.median(rates))
 
     def _refined(self, found: Touched) -> tuple[Touched, int, float]:
         """Put nodes where obstacles touch and refine until the accuracy is met; also the iterations and the error."""
@@ -278,7 +340,7 @@ class ObstacleSolver:
             if given:
                 return found, spent, max(error, change * 2**_ORDER / (2**_ORDER - 1))
             found, error = finer, max(self._own_error(finer), change / (2**_ORDER - 1))
-            if error <= accuracy or 2 * found.grid.intervals > _FINEST:
+            if (error <= accuracy and self._fits(found, error)) or 2 * found.grid.intervals > _FINEST:
                 return found, spent, error
 
     def _graded(self, found: Touched, intervals: int) -> tuple[Touched, int]:
@@ -291,13 +353,15 @@ class ObstacleSolver:
             if not found.active.any() and found.grid.intervals == intervals:
                 break
             grid = self.grid(intervals)
-            trial = self._on(grid, found, regraded(found, intervals))
+            trial = self._on(grid, found, regraded(self.poses.shape, found, intervals))
             if trial is None and intervals > found.grid.intervals:
                 trial = self._on(grid, found, halved(found))
             if trial is None:
                 break
+            same = trial.grid is found.grid
+            moved = float(np.linalg.norm(trial.before[:3, -1] - found.before[:3, -1]))
             spent, found = spent + trial.solution.iterations, trial
-            if fewest_touching(found) >= _ENOUGH:
+            if fewest_touching(found) >= _ENOUGH or (same and moved <= _SETTLED * self.numerics.accuracy):
                 break
         return found, spent
 

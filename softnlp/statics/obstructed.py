@@ -32,6 +32,8 @@ from softnlp.statics.wrenches import tip_equations
 Array = NDArray[np.float64]
 
 _FLUSH = 1e-3  # |n_t| of a section that lies flat on what it touches
+STIFFNESS = 1e3
+"""EI/L_0^3 by which a gap weighs against a push, of the order of what one node answers to a push on it alone."""
 SMOOTHING, STEPS = "contact.smoothing", "contact.steps"
 
 
@@ -158,9 +160,10 @@ class ObstructedCase:
         by_state, by_stretch = node.map(K)(nodes[:, 1:], self.fields, along)
         by_state = ca.sparsity_cast(by_state, ca.diagcat(*[node.sparsity_out(0)] * K))
         rows = [(k - 1) * count + j for k, j in self.pushes]
-        G, root = self.gaps, ca.sqrt(self.gaps**2 + F**2 + 2 * self.given[SMOOTHING].symbol ** 2)
+        G = STIFFNESS * self.gaps
+        root = ca.sqrt(G**2 + F**2 + 2 * self.given[SMOOTHING].symbol ** 2)
         dG = ca.horzcat(ca.vec(by_stretch)[rows], ca.horzcat(ca.MX(len(rows), nx), by_state[rows, :]))
-        contact = ca.horzcat(ca.diag(1 - G / root) @ dG, ca.diag(1 - F / root))
+        contact = ca.horzcat(ca.diag(STIFFNESS * (1 - G / root)) @ dG, ca.diag(1 - F / root))
         return ca.vertcat(first, inner, last, contact)
 
     @property
@@ -220,7 +223,7 @@ def obstructed_case(
     base = ca.vertcat(balance, rod.base_balance(nodes[:, 0]))
     tip = functions.tip(out[:, K], constants, ca.MX(0, 1), functions.tip_column(given), units)
     tau = given[SMOOTHING].symbol
-    either = G + F - ca.sqrt(G**2 + F**2 + 2 * tau**2)
+    either = STIFFNESS * G + F - ca.sqrt((STIFFNESS * G) ** 2 + F**2 + 2 * tau**2)
 
     model = functions.model
     integrals = ca.sum2(_integrals(functions).map(K)(out[:, :K], constants, h))
@@ -313,5 +316,5 @@ def _equations(K: int, functions: RodFunctions, L_0: ca.MX, F_0: ca.MX, pushes: 
         named.append(Equation(f"continuity of {block}", rows[:, where].ravel(), *units[block]))
     start = 13 + rows.size
     named += tip_equations(start, functions.loads, L_0, F_0)
-    named.append(Equation("contact gap or force", start + 6 + np.arange(pushes), "m", L_0))
+    named.append(Equation("contact gap or force", start + 6 + np.arange(pushes), "m", L_0 / STIFFNESS))
     return tuple(named)

@@ -56,6 +56,9 @@ def shape_function(functions: RodFunctions) -> ca.Function:
 class Mapped(Protocol):
     """What `shape_function` returns, or the same in machine code."""
 
+    def __hash__(self) -> int:
+        """Return what tells it from others."""
+
     def map(self, n: int) -> Callable[..., Any]:
         """Return what takes n columns of states, the constants and n steps (1, n)."""
         ...

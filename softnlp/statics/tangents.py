@@ -51,10 +51,10 @@ class Tangents:
                 self._code = code if isinstance(code, Compiled) else None
         return self._code is not None
 
-    def maps(self, nodes: Array, constants: Array, slope: Array, h: float) -> tuple[Array, Array]:
+    def maps(self, nodes: Array, constants: Array, slope: Array, h: float | Array) -> tuple[Array, Array]:
         """Return what each interval does to a change of its first node, and of the stretch: (K, nx, nx), (K, nx).
 
-        nodes : (nx, K). slope : of the constants along the stretch. h : the length of an interval.
+        nodes : (nx, K). slope : of the constants along the stretch. h : the length of an interval, or of each (K,).
         """
         assert self._code is not None
         size, K = nodes.shape

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from softnlp.base.errors import InputError
 from softnlp.base.ranges import PRESSURE
+from softnlp.base.units import MILLIMETRE
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.model.materials import Material
 from softnlp.model.numerics import Numerics
@@ -83,6 +84,8 @@ def forward(
     solver = pose_solver(Model(robot, material, coefficients, conventions), numerics)
     among: Any = among_obstacles(solver, obstacles) if obstacles else solver
     steps = followed(lambda pressure, near: among.solve(pressure, loads, near), P, progress, times)
+    if obstacles:
+        steps = several_poses(steps, max(1e-6, 3 * numerics.accuracy) * float(robot.length))
     run = Run("forward", robot, material, coefficients, conventions, loads, steps, title, warnings)
     return replace(run, obstacles=tuple(obstacles))
 
@@ -105,6 +108,29 @@ def followed(
         if progress is not None:
             progress(k, step)
     return tuple(steps)
+
+
+def several_poses(steps: Sequence[Step], apart: float) -> tuple[Step, ...]:
+    """Return steps, with a warning on each that has the pressures of one before and another pose.
+
+    apart : of the tips, from which poses differ [m].
+    """
+    told: list[Step] = []
+    for k, step in enumerate(steps):
+        for j in range(k):
+            before = steps[j].pose
+            if step.pose is None or before is None or not np.array_equal(step.pressure, steps[j].pressure):
+                continue
+            distance = float(np.linalg.norm(step.pose.tip_position - before.tip_position))
+            if distance > apart:
+                text = (
+                    f"the branch is not unique: step {j + 1} has the same pressures and another pose, whose tip is "
+                    f"{distance / MILLIMETRE:.3g} mm from this one's"
+                )
+                step = replace(step, warnings=(*step.warnings, text))
+                break
+        told.append(step)
+    return tuple(told)
 
 
 def pressure_table(pressures: Any, sets: int) -> NDArray[np.float64]:

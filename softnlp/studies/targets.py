@@ -27,7 +27,7 @@ class InverseTask:
 
     lower, upper : (sets,) [Pa]. length_per_radian : how much of a distance [m] a radian of misfit counts for where
     position and direction cannot both be met. allow : with "self_intersection" in it, shapes that no body can take
-    without passing through itself are answers too.
+    without passing through itself are answers too. contact_force : that no obstacle may push harder [N], None for any.
     """
 
     targets: tuple[Target, ...]
@@ -35,6 +35,7 @@ class InverseTask:
     upper: Array
     length_per_radian: float
     allow: tuple[str, ...] = ()
+    contact_force: float | None = None
 
     def step_count(self, pressures: int) -> int:
         """Return how many steps the run has: one a target."""

@@ -48,7 +48,8 @@ def audit(plan: Plan, journal: Journal, stop: Callable[[], bool] | None = None) 
     """Audit the poses that were solved together, or return None where it was stopped. Only with the engine "auto"."""
     if plan.numerics.engine != "auto":
         return Audit()
-    chained = isinstance(plan.model.robot, SegmentedRobot)  # whose poses are all solved one by one
+    # poses of several segments and among obstacles are all solved one by one
+    chained = isinstance(plan.model.robot, SegmentedRobot) or bool(plan.obstacles)
     solver: Alone | None = None
     solved = STATUSES.index(Status.SOLVED)
     audited, largest, disputed, ahead = 0, 0.0, [], 0  # ahead : how many solved poses come before the next audited one

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.base.arrays import Index
-from softnlp.base.columns import OUTPUTS
+from softnlp.base.columns import MM, OUTPUTS, N, Output
 from softnlp.base.netcdf import flag_attributes
 from softnlp.batch.plan import Plan
 from softnlp.batch.poses import STATUSES, Lane, Rows
@@ -53,6 +53,7 @@ def columns(plan: Plan) -> tuple[Column, ...]:
         *(c for name in plan.varied if name != "pressure" for c in _varied(plan, name)),
         *_POSE,
         *(_WALL if plan.contact is not None else ()),
+        *(_CONTACTS if plan.obstacles else ()),
         *_SOLVE,
     )
 
@@ -84,6 +85,22 @@ _POSE = (
     *map(_output, ("stretch", "backbone_length", "chamber_length")),
 )
 _WALL = (_output("blocked_force"), _output("gap"))
+CONTACTS = (
+    Output("contact_force", N, "force of the obstacle on the robot, world frame", ("obstacle", "axis")),
+    Output("contact_gap", MM, "least distance between obstacle and body", ("obstacle",)),
+)
+"""Of poses among obstacles."""
+_CONTACTS = tuple(
+    Column(
+        output.key,
+        output.dims,
+        "f8",
+        output.unit.attribute,
+        output.meaning,
+        lambda rows, numbers, output=output: np.asarray(output.shown(rows[output.name])),  # type: ignore[misc]
+    )
+    for output in CONTACTS
+)
 _LANES = {lane.name.lower(): int(lane) for lane in Lane}
 _SOLVE = (
     _output("stable", kind="i1"),

@@ -22,7 +22,8 @@ from softnlp.base.netcdf import as_characters, encoded, put, put_attributes, put
 from softnlp.batch.plan import Plan
 from softnlp.batch.poses import Rows
 from softnlp.model.inputs import file_attributes
-from softnlp.sweep.columns import LONGEST_STATUS, TEXT, Column, columns
+from softnlp.model.obstacle_tables import obstacle_tables
+from softnlp.sweep.columns import CONTACTS, LONGEST_STATUS, TEXT, Column, columns
 from softnlp.sweep.journal import Journal
 
 MEMORY = 128 * 2**20
@@ -50,7 +51,9 @@ def write_workspace(path: str | PathLike[str], plan: Plan, journal: Journal, abo
     import h5netcdf
 
     listed = columns(plan)
-    own = {"varied": list(plan.varied)}
+    own: dict[str, Any] = {"varied": list(plan.varied)}
+    if plan.obstacles:
+        own["obstacles"] = obstacle_tables(plan.obstacles)
     asked = file_attributes("workspace", plan.model, plan.loads, plan.contact, own, fingerprint=plan.fingerprint())
     with placed_whole(path) as part, part.open("w+b", buffering=0) as raw:
         # HDF5 that writes to a full disk by itself ends the interpreter.
@@ -194,7 +197,8 @@ class Sink:
 
 def _sizes(plan: Plan) -> dict[str, int]:
     robot = plan.model.robot
-    return {"set": robot.chamber_sets, "axis": 3, "row": 3, "col": 3, "chamber": robot.chambers}
+    sizes = {"set": robot.chamber_sets, "axis": 3, "row": 3, "col": 3, "chamber": robot.chambers}
+    return sizes | ({"obstacle": len(plan.obstacles)} if plan.obstacles else {})
 
 
 def _declare(file: Any, plan: Plan, listed: tuple[Column, ...]) -> None:
@@ -206,6 +210,9 @@ def _declare(file: Any, plan: Plan, listed: tuple[Column, ...]) -> None:
         put(file, name, (name,), numbers, said("1", f"{meaning}, from 1"))
     for name, meaning in (("axis", "axis"), ("row", "world axis"), ("col", "body axis")):
         put(file, name, (name,), np.array(_AXES), said("1", meaning))
+    if plan.obstacles:
+        numbers = np.arange(1, sizes["obstacle"] + 1, dtype=np.int64)
+        put(file, "obstacle", ("obstacle",), numbers, said("1", "obstacle, from 1 in the order of the attribute"))
     for column in listed:
         dims, attributes = ("pose", *column.dims), said(column.unit, column.meaning, **column.more)
         if column.kind == TEXT:
@@ -255,7 +262,8 @@ def _write_messages(file: Any, journal: Journal, sink: Sink) -> None:
 
 def _names(column: Column, sizes: Mapping[str, int]) -> list[str]:
     """Return the CSV columns of a variable; those with dimensions are outputs."""
-    output = by_key(column.name) if column.dims else None
+    outputs = {output.key: output for output in CONTACTS}
+    output = (by_key(column.name) or outputs.get(column.name)) if column.dims else None
     return [column.name] if output is None else output.keys(sizes)
 
 
