@@ -93,7 +93,7 @@ def inverse_task(given: Read) -> InverseTask:
     elif len(positions) != len(directions):
         problem = f"expected one direction a position, got {len(directions)} for {len(positions)}"
         raise InputError(problem, table="target", key="tip_direction")
-    lower, upper = _pressures(given.file.bounds, given.robot.chamber_sets)
+    lower, upper = pressures_of(given.file.bounds, given.robot.chamber_sets)
     targets = tuple(
         Target(
             None if positions is None else np.array(positions[k]) * MILLIMETRE,
@@ -107,7 +107,7 @@ def inverse_task(given: Read) -> InverseTask:
     return InverseTask(targets, lower, upper, weight, allow=allowed(given.file))
 
 
-def _pressures(table: BoundsTable, sets: int) -> tuple[Array, Array]:
+def pressures_of(table: BoundsTable, sets: int) -> tuple[Array, Array]:
     """Return the bounds of each set [Pa]."""
     rows = table.pressure_bar
     pairs = rows if any(isinstance(row, list) for row in rows) else [rows] * sets
