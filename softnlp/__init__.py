@@ -106,6 +106,7 @@ if TYPE_CHECKING:
     from softnlp.studies.tensile import fit_tensile as fit_tensile
     from softnlp.studies.tolerances import error_bars as error_bars
     from softnlp.studies.tolerances import monte_carlo as monte_carlo
+    from softnlp.studies.trajectory import trajectory as trajectory
     from softnlp.studies.variants import Variant as Variant
     from softnlp.studies.weight_sensitivity import weight_sensitivity as weight_sensitivity
 
@@ -156,6 +157,7 @@ _HOMES = {
     "studies.sensitivity": ("sensitivities", "tip_compliance", "tip_jacobian"),
     "studies.tensile": ("fit_tensile",),
     "studies.tolerances": ("error_bars", "monte_carlo"),
+    "studies.trajectory": ("trajectory",),
     "studies.variants": ("Variant",),
     "studies.weight_sensitivity": ("weight_sensitivity",),
 }

@@ -29,7 +29,7 @@ import softnlp
 
 SECTION = re.compile(r"^(Parameters|Attributes|Returns|Raises|Yields|Notes|Examples)\n-+\n", re.MULTILINE)
 UNITS = r"1|SI|bar|deg|s|m|N|Pa|N m|N m\^2|rad|kg/m|"
-UNITS += r"kg/m\^3|m/s\^2|m/s|J|Hz|kg|1/N|1/\(N m\)|1/m|m/N|N/m|m/Pa|rad/Pa|m\^3/Pa\^3|%|m, rad or N"
+UNITS += r"Pa/s|kg/m\^3|m/s\^2|m/s|J|Hz|kg|1/N|1/\(N m\)|1/m|m/N|N/m|m/Pa|rad/Pa|m\^3/Pa\^3|%|m, rad or N"
 UNIT = re.compile(rf"\[({UNITS})(, ({UNITS}))*\]")
 SHAPE = re.compile(r"\((\w+,|(\w+, )+\w+|\w+, \.\.\.)\)")
 REFERENCE = re.compile(r"^As `(?:softnlp\.)?(\w+)`")

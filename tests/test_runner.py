@@ -44,6 +44,7 @@ def of(study: str) -> Scenario:
         + SOLVER
         + "target = { tip_position_mm = [[10.0, 0.0, 72.0]] }\nbounds = { pressure_bar = [0.0, 1.5] }\n",
         "design": MODEL + SOLVER + DESIGN,
+        "trajectory": MODEL + SOLVER + "trajectory = { tip_position_mm = [[10.0, 0.0, 72.0], [9.0, 0.0, 72.0]] }\n",
         "dynamic": MODEL + PRESSURE + "dynamic = { duration_s = 0.01, output_step_s = 0.01, damping_s = 0.01 }\n",
     }
     return scenario_from_text(f'study = "{study}"\n{tables[study]}', "quick.toml")
@@ -56,6 +57,7 @@ KINDS = {
     "identify": "TensileFit",
     "design": "Design",
     "dynamic": "Run",
+    "trajectory": "Run",
     "workspace": "Workspace",
 }
 

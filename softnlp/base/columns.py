@@ -47,9 +47,12 @@ PER_M = Unit("per_m", "1/m", 1.0, "1/m", "1/m", "1/m")
 BAR_ = Unit("bar", "Pa", BAR, "bar", "bar", "bar")
 S = Unit("s", "s", 1.0, "s", "s", "s")
 MM_PER_S = Unit("mm_per_s", "m/s", MILLIMETRE, "mm/s", "mm/s", "mm/s")
+BAR_PER_S = Unit("bar_per_s", "Pa/s", BAR, "bar/s", "bar/s", "bar/s")
+N_PER_MM = Unit("N_per_mm", "N/m", 1e3, "N/mm", "N/mm", "N/mm")
 J = Unit("J", "J", 1.0, "J", "J", "J")
 
 _PLACES = {"pose": "pose.", "section": "pose.radii.", "shape": "pose.shape.", "wall": "contact."}
+_PLACES |= {"margins": "margins."}
 _PLACES |= {"free": "contact.free.shape.", "target": "aimed.", "motion": "moving."}
 _AXES = ("axis", "row", "col")
 
@@ -277,6 +280,15 @@ _EVERY = (
     Output("nearest", MM, "the reachable tip position found", _X, "target", "aimed.tip_position", short=_TIP),
     Output("nearest_direction", ONE, "the tip's axis there", _X, "target", "aimed.tip_direction"),
     Output("optimal", ONE, "whether nothing that was left to choose is better nearby", group="target"),
+    # --- of a path: how far a step is from what limits it, known of targets that are not met too
+    Output("margin_pressure", BAR_, "least distance of a pressure from its bounds", group="margins",
+           of="margins.pressure", form=".3f"),
+    Output("margin_rate", BAR_PER_S, "what is left to the largest rate of change of a pressure, on either side",
+           group="margins", of="margins.rate", form=".3f"),
+    Output("margin_clearance", MM, "distance between body and obstacles, less the clearance", group="margins",
+           of="margins.clearance", form=".3f"),
+    Output("margin_stiffness", N_PER_MM, "least stiffness of the tip against a force, 0 where the pose ceases to be "
+           "stable", group="margins", of="margins.stiffness", form=".4f"),
     # --- standard deviations, where uncertainties were given
     *(Output(f"std_{name}", unit, f"standard deviation of {name.replace('_', ' ')}, first order", dims, "std",
              partial(_deviation, name))
@@ -311,6 +323,7 @@ TABLES: dict[str, tuple[str, ...]] = {
     "blocked-force": ("blocked_force", "gap", "bending_angle", "tip_position", "residual"),
     "inverse": (*("distance", "direction_error", "bending_angle", "nearest", "stable", "residual", "solve_time"),),
     "dynamic": ("tip_position", "bending_angle", "stretch", "time_steps", "residual"),
+    "trajectory": ("distance", "direction_error", "margin_pressure", "margin_rate", "margin_clearance", "stable"),
     "page": ("tip_position", "bending_angle", "tilt", "backbone_length", "elongation", "stretch"),
     "page, loads": ("tip_displacement",),
     "page, wall": ("blocked_force", "gap", "free_bending_angle", "length_error"),
@@ -339,7 +352,7 @@ SYMBOLS: dict[str, str] = {
 LEGENDS: dict[str, tuple[str, ...]] = {
     **{
         study: ("step", "t", "pressure", "status", *TABLES[study])
-        for study in ("forward", "blocked-force", "inverse", "dynamic")
+        for study in ("forward", "blocked-force", "inverse", "dynamic", "trajectory")
     },
     "workspace": (
         *("pressure", "t", "tip_position", "tip_rotation", "bending_angle", "tilt", "stretch", "backbone_length"),

@@ -30,6 +30,7 @@ from softnlp.figures.body import (
 )
 from softnlp.figures.dynamic import dynamic_figure
 from softnlp.figures.obstacles import draw_obstacles
+from softnlp.figures.path import path_panels
 from softnlp.figures.series import STEP, Abscissa, abscissa, finish_panels, new_panels, series
 from softnlp.figures.space import draw_faces, draw_lines
 from softnlp.figures.style import (
@@ -150,16 +151,23 @@ def inverse_figure(view: RunView, targets: TargetView) -> Figure:
     """Draw a run of inverse kinematics.
 
     In 3-D the shapes, the path of targets as open squares and of tips as dots, joined where the target is out of reach.
-    Beside it what is left of each target, on a logarithmic axis, the bending angle and the pressure of each set.
+    Beside it what is left of each target, on a logarithmic axis, the bending angle and the pressure of each set; of a
+    path the rate of each pressure in place of the angle, over time, with what limits both dashed.
     """
     figure = _begun(view, f"{len(view.solved)} of {len(view.status)} targets met")
-    _draw_targets(body_panel(figure, _CENTRE, view), view, targets)
-    x = Abscissa(np.arange(1, len(view.status) + 1, dtype=float), STEP, True)
+    axes = body_panel(figure, _CENTRE, view)
+    if view.obstacles:
+        draw_obstacles(axes, view.obstacles, view.robot.length)
+    _draw_targets(axes, view, targets)
     panels = new_panels(figure, 3)
-    _left(panels[0], x, targets)
-    series(panels[1], view, x, BENDING.shown(view.bending_angle), BENDING.heading, std=_std(view, BENDING))
-    finish_panels(figure, panels, view, x)
-    panels[-1].set_xlabel("target")
+    if view.limits and view.time is not None:
+        _left(panels[0], path_panels(figure, panels, view, view.time), targets)
+    else:
+        x = Abscissa(np.arange(1, len(view.status) + 1, dtype=float), STEP, True)
+        _left(panels[0], x, targets)
+        series(panels[1], view, x, BENDING.shown(view.bending_angle), BENDING.heading, std=_std(view, BENDING))
+        finish_panels(figure, panels, view, x)
+        panels[-1].set_xlabel("target")
     _explain_targets(figure, view, targets)
     return figure
 

@@ -27,8 +27,9 @@ class CompiledProblem:
     x stacks the free quantities, then each case's unknowns; p stacks the fixed quantities. residual(x, p) stacks each
     case's equations, then the constraints over their scales, those that are not in the Hessian last. nlp holds x, p, f,
     g as expressions; of g, curved are the rows in the Hessian and left_out the others, if any. function(name,
-    expressions) makes a function of (x, p) of expressions in the symbols of quantities and cases. own_slope : makes the
-    Jacobian where it is that of a case alone.
+    expressions) makes a function of (x, p) of expressions in the symbols of quantities and cases, `dense` or as they
+    are. own_slope : makes the Jacobian where it is that of a case alone, or known in blocks. own_hessian : makes what
+    `hessian` is, likewise.
     """
 
     cases: tuple[Case, ...]
@@ -53,6 +54,7 @@ class CompiledProblem:
     is_square: bool
     function: Callable[..., ca.Function]
     own_slope: Callable[[], ca.MX] | None
+    own_hessian: Callable[[], ca.Function] | None = None
 
     @cached_property
     def jacobian(self) -> ca.Function:
@@ -77,6 +79,8 @@ class CompiledProblem:
     @cached_property
     def hessian(self) -> ca.Function:
         """(x, p, lam_f, lam_g) -> the upper triangle of the Lagrangian's, of the curved rows; built at first use."""
+        if self.own_hessian is not None:
+            return self.own_hessian()
         x, p, f, g = (self.nlp[name] for name in "xpfg")
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", g.numel())
         lagrangian = lam_f * f + ca.dot(lam_g[: self.curved.numel()], self.curved)
@@ -197,8 +201,10 @@ def compile_problem(
     pieces = [scale * part for scale, part in zip(heads, _split(x, originals[: len(heads)]), strict=True)]
     pieces += _split(p, originals[len(heads) :])
 
-    def function(name: str, expressions: Sequence[ca.MX], names: Sequence[str] | None = None) -> ca.Function:
-        inner = ca.Function(name, originals, [ca.densify(ca.MX(e)) for e in expressions])
+    def function(
+        name: str, expressions: Sequence[ca.MX], names: Sequence[str] | None = None, *, dense: bool = True
+    ) -> ca.Function:
+        inner = ca.Function(name, originals, [ca.densify(ca.MX(e)) if dense else ca.MX(e) for e in expressions])
         results = inner.call(pieces, True, False)
         return (
             ca.Function(name, [x, p], results, ["x", "p"], list(names)) if names else ca.Function(name, [x, p], results)

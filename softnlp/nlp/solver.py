@@ -182,6 +182,8 @@ class Engine:
             n, m = x.numel(), nlp["g"].numel()
             symbols = [ca.MX.sym("x", n), ca.MX.sym("p", p.numel()), ca.MX.sym("lam_f"), ca.MX.sym("lam_g", m)]
             options["hess_lag"] = ca.Function("zero_hessian", symbols, [ca.MX(n, n)])
+        elif self.problem.own_hessian is not None:
+            options["hess_lag"] = self.problem.hessian
         elif any(case.once_differentiable for case in self.problem.cases):
             options["ipopt"].setdefault("hessian_approximation", "limited-memory")
         elif self.problem.left_out.numel():

@@ -111,6 +111,8 @@ def _parts(run: Run) -> tuple[dict[str, Variable], dict[str, Variable], dict[str
     own: dict[str, Any] = {"warnings": list(run.warnings)}
     if run.obstacles:
         own["obstacles"] = obstacle_tables(run.obstacles)
+    if run.limits:
+        own["limits"] = dict(run.limits)
     about = file_attributes(run.study, model, run.loads, run.contact, own)
     return variables, _coordinates(run, variables["arc"][1]), {"title": run.title, **about}
 

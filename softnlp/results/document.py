@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from softnlp.base.columns import OUTPUTS
+from softnlp.base.columns import OUTPUTS, outputs
 from softnlp.base.errors import InputError
 from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.model.inputs import asked_tables, contact_table, package_version, pressure_bar, tidy
@@ -23,6 +23,7 @@ from softnlp.statics.step import Run, Step
 from softnlp.studies.fields import (
     BLOCKED_FORCE,
     DYNAMIC,
+    TRAJECTORY,
     closure_of,
     deviation_outputs,
     document_outputs,
@@ -42,6 +43,7 @@ def run_document(run: Run) -> dict[str, Any]:
         **({} if run.contact is None else {"contact": contact_table(run.contact)}),
         **({"uncertainty": dict(run.uncertainty)} if run.uncertainty else {}),
         **({"obstacles": obstacle_tables(run.obstacles)} if run.obstacles else {}),
+        **({"limits": dict(run.limits), "least_margins": _least(run)} if run.study == TRAJECTORY else {}),
         "warnings": list(run.warnings),
         **({"energy": plain(run.energy) or None} if run.study == DYNAMIC else {}),
         "steps": [_step(run, step) for step in run.steps],
@@ -113,6 +115,15 @@ def _step(run: Run, step: Step) -> dict[str, Any]:
     table["certificate"] = _lines(step.certificate)
     table["warnings"] = list(step.warnings)
     return table
+
+
+def _least(run: Run) -> dict[str, Any]:
+    """Return the least of each margin over a path."""
+    found = {}
+    for output in outputs("margins"):
+        known = [v for step in run.steps if (v := value(output, step)) is not None]
+        found[output.key] = plain(min(known, default=None))
+    return found
 
 
 def segments_of(step: Step) -> list[dict[str, Any]] | None:

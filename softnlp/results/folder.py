@@ -25,12 +25,14 @@ from softnlp.model.robot import Robot
 from softnlp.model.rod import Loads
 from softnlp.results.dataset import netcdf_bytes
 from softnlp.results.document import json_text, require_run
+from softnlp.results.path import PATH_FILE, path_text
 from softnlp.results.table import table_text
 from softnlp.statics.step import ObstacleContact, Run, SectionRadii
 from softnlp.studies.fields import (
+    AIMED,
     BLOCKED_FORCE,
     DYNAMIC,
-    INVERSE,
+    TRAJECTORY,
     closure_of,
     deviation_outputs,
     series,
@@ -137,6 +139,7 @@ class RunView:
     backbone_length : (S,) [m]. bodies : S entries. contact : of a blocked force, else None. targets : of inverse
     kinematics, else None. moving : of a run in time, else None. std : standard deviations (S,) of outputs by name
     [SI], none where nothing scatters.
+    limits : of a path, by keys with their units; empty for any other run.
     obstacles : what the body may touch. contact_force : (S, obstacles) size of what each pushes with [N], or None.
     """
 
@@ -160,6 +163,7 @@ class RunView:
     std: Mapping[str, Array] = field(default_factory=dict)
     obstacles: tuple[Obstacle, ...] = ()
     contact_force: Array | None = None
+    limits: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def solved(self) -> tuple[int, ...]:
@@ -197,6 +201,7 @@ def view_of_run(run: Run) -> RunView:
         std=[name for name in DEVIATING if f"std_{name}" in known],
         obstacles=run.obstacles,
         contact_force=_pushed([step.contacts for step in run.steps], len(run.obstacles)),
+        limits=run.limits,
     )
 
 
@@ -245,6 +250,7 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
         std=[name for name in DEVIATING if OUTPUTS[f"std_{name}"].key in values],
         obstacles=obstacles_of_tables(json.loads(attributes["obstacles"])) if "obstacles" in attributes else (),
         contact_force=np.linalg.norm(values["contact_force_N"], axis=2) if "contact_force_N" in values else None,
+        limits=json.loads(attributes["limits"]) if "limits" in attributes else {},
     )
 
 
@@ -263,7 +269,7 @@ def _view(number: Callable[[str], Any], body: Callable[[int, str], Body | None],
             if output.name.startswith("energy_")
         }
         moving = MovingView(number("tip_position"), number("regulator"), energies)
-    if head["study"] == INVERSE:
+    if head["study"] in AIMED:
         targets = TargetView(*map(number, ("target", "target_direction", "distance", "direction_error", "nearest")))
     if head["study"] == BLOCKED_FORCE and (known := np.flatnonzero(np.isfinite(number("blocked_force")))).size:
         contact = ContactView(
@@ -315,7 +321,8 @@ def save(
     run
         Of any study that returns one.
     directory
-        Gets results.nc, table.csv, results.json and versions.json; files of those names are replaced.
+        Gets results.nc, table.csv, results.json and versions.json, of a path path.csv as well; files of those names
+        are replaced.
     scenario_text
         What was asked, kept as scenario.toml.
     figure
@@ -339,6 +346,8 @@ def save(
         "table.csv": table_text(run),
         "results.json": json_text(run),
     }
+    if run.study == TRAJECTORY and any(step.margins is not None for step in run.steps):
+        contents[PATH_FILE] = path_text(run)
     written = write_files(directory, contents, scenario_text)
     if figure is not None:
         png = io.BytesIO()

@@ -19,6 +19,7 @@ from softnlp.scenario.near_keys import meant
 from softnlp.scenario.obstacle_schema import AmongObstaclesFile, BlockedAmongObstaclesFile
 from softnlp.scenario.schema import ScenarioFile
 from softnlp.scenario.segments import OF_SEGMENTS, of_segment, of_segments
+from softnlp.scenario.trajectory import TrajectoryFile
 from softnlp.scenario.workspace import WorkspaceFile
 
 SCHEMAS: Mapping[str, type[ScenarioFile]] = {
@@ -29,6 +30,7 @@ SCHEMAS: Mapping[str, type[ScenarioFile]] = {
     "identify": IdentifyFile,
     "design": DesignFile,
     "dynamic": DynamicFile,
+    "trajectory": TrajectoryFile,
 }
 """The studies that this version runs, and the file of each."""
 

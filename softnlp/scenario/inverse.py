@@ -100,7 +100,7 @@ def inverse_task(given: Read) -> InverseTask:
         raise InputError(problem, table="target", key="tip_direction")
     if not given.file.obstacle:
         target.refuse(["contact_force_N"], "expected only with [[obstacle]]", "target")
-    lower, upper = _pressures(given.file.bounds, given.robot.chamber_sets)
+    lower, upper = pressures_of(given.file.bounds, given.robot.chamber_sets)
     targets = tuple(
         Target(
             None if positions is None else np.array(positions[k]) * MILLIMETRE,
@@ -114,7 +114,7 @@ def inverse_task(given: Read) -> InverseTask:
     return InverseTask(targets, lower, upper, weight, allow=allowed(given.file), contact_force=target.contact_force_N)
 
 
-def _pressures(table: BoundsTable, sets: int) -> tuple[Array, Array]:
+def pressures_of(table: BoundsTable, sets: int) -> tuple[Array, Array]:
     """Return the bounds of each set [Pa]."""
     rows = table.pressure_bar
     pairs = rows if any(isinstance(row, list) for row in rows) else [rows] * sets

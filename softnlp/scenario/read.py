@@ -39,6 +39,7 @@ from softnlp.scenario.obstacles import obstacles_of
 from softnlp.scenario.pressures import PressurePath, pressure_path
 from softnlp.scenario.schema import ScenarioFile
 from softnlp.scenario.segments import OF_SEGMENTS, read_segments
+from softnlp.scenario.trajectory import trajectory_task
 from softnlp.scenario.uncertainty import uncertainty_of
 from softnlp.scenario.workspace import workspace_task
 from softnlp.studies.plausibility import modulus_notes
@@ -285,5 +286,6 @@ TASKS: Mapping[str, tuple[str, Callable[[Read], Task]]] = {
     "identify": ("measurements", identify_task),
     "design": ("choices", design_task),
     "dynamic": ("dynamic", dynamic_task),
+    "trajectory": ("trajectory", trajectory_task),
 }
 """For each study with tables of its own: the table that its errors are about, and what reads them."""

@@ -16,6 +16,7 @@ from softnlp.scenario.design import run_design
 from softnlp.scenario.dynamic import run_dynamic
 from softnlp.scenario.identify import run_identify
 from softnlp.scenario.inverse import run_inverse
+from softnlp.scenario.trajectory import run_trajectory
 from softnlp.scenario.workspace import run_workspace
 from softnlp.statics.step import Run, Step
 from softnlp.studies.forward import forward
@@ -57,7 +58,8 @@ def run_scenario(
     Returns
     -------
     Run, Identified, MotionFit, TensileFit, Design or Workspace
-        A run for forward, blocked-force, inverse and dynamic, whose steps carry a solution or a named status.
+        A run for forward, blocked-force, inverse, dynamic and trajectory, whose steps carry a solution or a named
+        status.
 
     Raises
     ------
@@ -120,4 +122,5 @@ STUDIES: Mapping[str, Callable[[Scenario, Progress | None, int], Run]] = {
     "blocked-force": run_blocked,
     "inverse": run_inverse,
     "dynamic": run_dynamic,
+    "trajectory": run_trajectory,
 }

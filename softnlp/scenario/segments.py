@@ -17,7 +17,7 @@ from softnlp.model.robot import Robot
 from softnlp.model.segments import SegmentedRobot, segmented_robot
 from softnlp.scenario.schema import MaterialTable, NotNegative, RobotTable, ScenarioFile, Table, wrong
 
-OF_SEGMENTS = ("forward", "blocked-force", "inverse", "workspace", "dynamic")
+OF_SEGMENTS = ("forward", "blocked-force", "inverse", "workspace", "dynamic", "trajectory")
 """The studies that take segments, and dimensions that vary along s."""
 MOST_SEGMENTS = 20
 

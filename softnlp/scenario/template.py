@@ -123,6 +123,16 @@ def _inverse(made: Robot, data: str, silicone: Material) -> dict[str, Any]:
     return {"target": {"tip_position_mm": [tip]}, "bounds": {"pressure_bar": [0.0, 1.5]}}
 
 
+def _trajectory(made: Robot, data: str, silicone: Material) -> dict[str, Any]:
+    """Take a path about where the tip of this robot goes, so that it is within reach."""
+    (tip,) = _inverse(made, data, silicone)["target"]["tip_position_mm"]
+    rows = [[round(tip[0] + k, 1), tip[1], tip[2]] for k in (0.0, 0.5, 1.0)]
+    return {
+        "trajectory": {"tip_position_mm": rows, "duration_s": 2.0, "rate_bar_per_s": 0.2},
+        "bounds": {"pressure_bar": [0.0, 1.5]},
+    }
+
+
 def _identify(made: Robot, data: str, silicone: Material) -> dict[str, Any]:
     return {
         "stiffening": {"set": "calibrated"},
@@ -157,5 +167,6 @@ _BEGUN: Mapping[str, Callable[[Robot, str, Material], dict[str, Any]]] = {
     "identify": _identify,
     "design": _design,
     "dynamic": _dynamic,
+    "trajectory": _trajectory,
 }
 """What a scenario of each study begins with beside robot and silicone."""

@@ -136,7 +136,7 @@ def overlapping(position: Array, axis: Array, radius: Array) -> Mask:
     close = np.flatnonzero(found)
     parts = int(np.clip(np.ceil((step / radius.min(axis=1))[close].max(initial=0.0) / _STEP), 1, _FINEST))
     for some in _blocks(close, parts * position.shape[1]):
-        found[some] = _meeting(*_finer(position[some], axis[some], radius[some], parts))
+        found[some] = _meeting(*finer(position[some], axis[some], radius[some], parts))
     return found
 
 
@@ -170,7 +170,7 @@ def _near(apart: Array, s: Array, radius: Array, slack: Array) -> Mask:
     return near
 
 
-def _finer(position: Array, axis: Array, radius: Array, parts: int) -> tuple[Array, Array, Array, Array]:
+def finer(position: Array, axis: Array, radius: Array, parts: int) -> tuple[Array, Array, Array, Array]:
     """Return positions, directions, lengths along the axis and radii, intervals cut by the cubic through their ends."""
     step = np.diff(position, axis=1)
     chord = np.linalg.norm(step, axis=2)
@@ -190,7 +190,7 @@ def _finer(position: Array, axis: Array, radius: Array, parts: int) -> tuple[Arr
 
 
 def _meeting(p: Array, a: Array, s: Array, radius: Array) -> Mask:
-    """Return which of n bodies meet themselves; stations as of `_finer`."""
+    """Return which of n bodies meet themselves; stations as of `finer`."""
     apart = _apart(p)
     near = _near(apart, s, radius, -_ROUNDING * radius.min(axis=1))
     apart = apart / (radius[:, None] + radius[:, :, None]) ** 2

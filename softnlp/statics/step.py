@@ -20,6 +20,7 @@ from softnlp.model.rod import Loads
 from softnlp.model.section import SectionRadii as SectionRadii
 from softnlp.nlp.solver import EquationResidual, Ipopt
 from softnlp.statics.body import Fit, fit_of
+from softnlp.statics.margins import Margins as Margins
 from softnlp.statics.moving import Moving as Moving
 from softnlp.statics.obstacle_contact import ObstacleContact as ObstacleContact
 
@@ -323,6 +324,8 @@ class Step:
         Of obstacles, one each.
     complementarity
         Sum of what each contact pushes with times its gap, None without obstacles [N m].
+    margins
+        Of a path, else None.
     """
 
     pressure: Array
@@ -345,6 +348,7 @@ class Step:
     moving: Moving | None = None
     contacts: tuple[ObstacleContact, ...] = ()
     complementarity: float | None = None
+    margins: Margins | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -368,7 +372,9 @@ class Run:
     uncertainty
         What scatters and how much, by the keys of a scenario and in their units; empty where nothing was said.
     obstacles
-        What the body may touch.
+        What the body may touch, or keeps away from along a path.
+    limits
+        Of a path, by keys with their units; empty for any other run.
     """
 
     study: str
@@ -383,6 +389,7 @@ class Run:
     contact: ContactSettings | None = None
     uncertainty: Mapping[str, Any] = field(default_factory=dict)
     obstacles: tuple[Obstacle, ...] = ()
+    limits: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def failed(self) -> tuple[Step, ...]:

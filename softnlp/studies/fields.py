@@ -13,12 +13,14 @@ from softnlp.model.segments import SegmentedRobot
 from softnlp.nlp.solver import EquationResidual
 from softnlp.statics.step import SELF_INTERSECTING_FLAGS, STABLE_FLAGS, Pose, Run, Step, stable_flag
 
-BLOCKED_FORCE, INVERSE, DYNAMIC = "blocked-force", "inverse", "dynamic"
+BLOCKED_FORCE, INVERSE, DYNAMIC, TRAJECTORY = "blocked-force", "inverse", "dynamic", "trajectory"
+AIMED = (INVERSE, TRAJECTORY)
+"""The studies whose steps have targets."""
 
 FLAGS: Mapping[str, Mapping[str, int]] = {"stable": STABLE_FLAGS, "self_intersecting": SELF_INTERSECTING_FLAGS}
 """What files of numbers hold of the outputs that are true, false or neither."""
 
-_KNOWN_OF_FAILED = ("target", "certificate")
+_KNOWN_OF_FAILED = ("target", "margins", "certificate")
 
 
 def solved_pose(step: Step) -> Pose | None:
@@ -58,7 +60,8 @@ def document_outputs(run: Run) -> tuple[Output, ...]:
     """Return what JSON holds of a step, in order, beside its segments."""
     weights = any(step.contact is not None and step.contact.sensitivity for step in run.steps)
     return (
-        *(outputs("target") if run.study == INVERSE else ()),
+        *(outputs("target") if run.study in AIMED else ()),
+        *(outputs("margins") if run.study == TRAJECTORY else ()),
         *outputs("pose"),
         *(outputs("motion") if run.study == DYNAMIC else ()),
         *(outputs("wall") if run.study == BLOCKED_FORCE else ()),
