@@ -14,12 +14,8 @@ from softnlp.scenario.examples import shipped_scenarios
 
 @cache
 def examples() -> dict[str, str]:
-    """Return the title of every example that the page shows, by name: those of one segment."""
-    return {
-        name: str(table.get("title") or name)
-        for name, (_, table) in shipped_scenarios().items()
-        if "segment" not in table
-    }
+    """Return the title of every example, by name."""
+    return {name: str(table.get("title") or name) for name, (_, table) in shipped_scenarios().items()}
 
 
 def open_example(session: Session, name: str) -> bool:

@@ -11,13 +11,14 @@ from nicegui import background_tasks, ui
 from numpy.typing import NDArray
 
 from softnlp.app.asking import bars, sentence
-from softnlp.app.session import Session, Stage
+from softnlp.app.inputs import Inputs
+from softnlp.app.session import Stage
 from softnlp.app.theme import Redraw
 from softnlp.app.view import frame_of
 from softnlp.base.errors import InputError
 from softnlp.base.status import Status
 from softnlp.model.quantities import quantities
-from softnlp.results import Body
+from softnlp.results import body_of_pose
 from softnlp.scenario.read import Scenario
 from softnlp.statics.branch import branch_function, stretch_on_branch
 from softnlp.statics.step import Pose, Run, Step
@@ -27,6 +28,7 @@ Array = NDArray[np.float64]
 
 
 _PATIENCE_S = 0.6  # of a person, before the page says that it works
+_AMONG_OBSTACLES_S = 0.15  # where a pose always takes long
 _SOLVING = "Solving …"
 _NUMBERS_AFTER_S = 0.04
 
@@ -73,7 +75,8 @@ class LiveView:
             return
         solve = session.live.blocked if scenario.study == "blocked-force" else session.live.pose
         task = asyncio.create_task(asyncio.to_thread(solve, scenario, pressure))
-        if not (await asyncio.wait({task}, timeout=_PATIENCE_S))[0]:
+        patience = _PATIENCE_S if not scenario.obstacles else _AMONG_OBSTACLES_S
+        if not (await asyncio.wait({task}, timeout=patience))[0]:
             with self._client:
                 self._say(_SOLVING, True)
             await asyncio.wait({task})
@@ -114,15 +117,16 @@ class LiveView:
         self._stage.view.show(
             frame_of(
                 scenario.robot,
-                _body(pose),
+                body_of_pose(pose),
                 pressure,
-                ghost=None if ghost is None else _body(ghost),
+                ghost=None if ghost is None else body_of_pose(ghost),
                 tip_force=loads.tip_force,
                 tip_moment=loads.tip_moment,
                 gravity=loads.gravity,
                 wall=Wall(contact.wall_point, contact.normal) if contact is not None and stands else None,
                 wall_force=0.0 if contact is None else contact.force,
                 tip_cap=0.0 if contact is None else contact.tip_cap,
+                contacts=step.contacts,
             )
         )
 
@@ -134,7 +138,7 @@ class LiveView:
 class PoseStretch:
     """Gives the stretch of a session's pose; what is compiled is kept while robot and law are of the same kind."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Inputs) -> None:
         self._session = session
         self._kind: Hashable = None
         self._branch: ca.Function | None = None
@@ -150,7 +154,3 @@ class PoseStretch:
         nominal = {name: q.nominal for name, q in quantities(model).items()} | {"pressure": pressure}
         point = stretch_on_branch(self._branch, np.concatenate([np.ravel(v) for v in nominal.values()]), pressure)
         return point.stretch if point.status is Status.SOLVED else None
-
-
-def _body(pose: Pose) -> Body:
-    return Body(pose.shape.position, pose.shape.rotation, pose.radii)
