@@ -11,6 +11,7 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable, Table
 
 from softnlp.app.rows import Row, in_line, inner_tables, put_rows, rows_of
+from softnlp.app.time_rows import STEP, timed
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.reading import one_line
@@ -38,6 +39,7 @@ sequence_bar = [[0.8, 0.0, 0.0]]
 _NEEDED: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "workspace": {"workspace": {"levels": 8, "to_bar": 1.2}},
     "inverse": {"target": {"tip_position_mm": [[-20.0, 0.0, 62.0]]}, "bounds": {"pressure_bar": [0.0, 1.5]}},
+    "dynamic": {"dynamic": {"duration_s": 0.6, "damping_s": 0.004, "lag_s": 0.03}},
     "design": {
         "choices": {"robot": {"chamber_diameter_mm": {"from": 3.0, "to": 5.0}}},
         "actuation": {"sets": [1], "pressure_bar": 0.8},
@@ -186,13 +188,29 @@ class Document:
                 unused += [*UNUSED_BY_TENSILE, "solver"]  # whose grid means nothing there
             for name in unused:
                 wanted.pop(name, None)
+            self._time(study, wanted)
         if wanted.get("study") != study:
             wanted["study"] = study
         return tomlkit.dumps(wanted)
 
+    def _time(self, study: str, wanted: Any) -> None:
+        """Give the pressures of a file of a study times, or take them away."""
+        before = wanted["pressure"].unwrap() if isinstance(wanted.get("pressure"), Table | InlineTable) else {}
+        after = {key: value for key, value in before.items() if key != "t_s"}
+        if study == "dynamic":
+            duration = (
+                wanted["dynamic"].unwrap().get("duration_s") if isinstance(wanted.get("dynamic"), Table) else None
+            )
+            long = float(duration) if isinstance(duration, int | float) and duration > 0 else 1.0
+            after = timed(before, long, self.sets() or 1, step=STEP in self.offered)
+        if after != before:
+            wanted["pressure"] = _new_table(after)
+
     def start(self, study: str) -> None:
         """Turn to a study, and add the tables that it cannot do without."""
         self.study = study
+        if study == "dynamic" and study not in self._tables:
+            self.offered.add(STEP)
         for name, values in _NEEDED.get(study, {}).items():
             if name not in self._tables:
                 self._tables[name] = _new_table(values)

@@ -19,6 +19,7 @@ from softnlp.base.errors import InputError
 from softnlp.base.status import Status
 from softnlp.model.quantities import quantities
 from softnlp.results import body_of_pose
+from softnlp.scenario.data import run_of
 from softnlp.scenario.read import Scenario
 from softnlp.statics.branch import branch_function, stretch_on_branch
 from softnlp.statics.step import Pose, Run, Step
@@ -107,12 +108,24 @@ class LiveView:
         self._words, self._stale = words, stale
         self._say(words, stale)
 
+    def play(self, scenario: Scenario, step: Step) -> None:
+        """Show a step of a motion in place of the pose of the controls, until these change."""
+        if step.pose is None:
+            return
+        self._draw(scenario, step.pressure, step, step.pose, None)
+        self._run = run_of(scenario, [step])
+        self._tell()
+
     def _show(self, scenario: Scenario, pressure: Array, step: Step, pose: Pose, ghost: Pose | None) -> None:
         if self._last is None or not np.array_equal(self._last[1], pressure) or self._last[0] is not scenario:
             self._said("")
         if self._last is not None and vars(self._last[0].robot) != vars(scenario.robot):
             self._stage.view.clear_trail()  # of another robot
-        self._last, loads, contact = (scenario, pressure), scenario.loads, step.contact
+        self._last = (scenario, pressure)
+        self._draw(scenario, pressure, step, pose, ghost)
+
+    def _draw(self, scenario: Scenario, pressure: Array, step: Step, pose: Pose, ghost: Pose | None) -> None:
+        loads, contact = scenario.loads, step.contact
         stands = contact is not None and contact.normal.any()  # else the chambers alone are held
         self._stage.view.show(
             frame_of(

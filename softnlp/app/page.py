@@ -37,7 +37,7 @@ from softnlp.statics.step import Run
 
 
 def _design(stage: Stage) -> None:
-    from softnlp.app.tabs.design import design_tab  # these three when they are opened: the page is there sooner
+    from softnlp.app.tabs.design import design_tab  # these four when they are opened: the page is there sooner
 
     design_tab(stage)
 
@@ -54,11 +54,18 @@ def _sensitivity(stage: Stage) -> None:
     sensitivity_tab(stage)
 
 
+def _time(stage: Stage) -> None:
+    from softnlp.app.tabs.time import time_tab
+
+    time_tab(stage)
+
+
 STUDIES: dict[str, tuple[str, str | None, Callable[[Stage], None]]] = {
     "kinematics": ("Kinematics", "forward", sequence_tab),
     "blocked": ("Blocked force", "blocked-force", blocked_tab),
     "workspace": ("Workspace", "workspace", workspace_tab),
     "inverse": ("Inverse", "inverse", inverse_tab),
+    "time": ("Time", "dynamic", _time),
     "identify": ("Identification", "identify", identify_tab),
     "design": ("Design", "design", _design),
     "compare": ("Compare", None, _compare),
@@ -139,6 +146,7 @@ def build_page(session: Session, pins: str = "", is_dark: bool = False) -> None:
         pinned.show(run)
 
     live = LiveView(stage, found, say)
+    stage.plays.append(live.play)
     with exports:
         report_menu(stage, lambda: results.run, lambda: pinned.pins)
         mesh_menu(session, lambda: None if results.run is None else results.run.steps[0].pose)

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from softnlp.app.view import RobotView
+    from softnlp.statics.step import Step
 
 Array = NDArray[np.float64]
 Listener = Callable[[], None]
@@ -241,8 +242,8 @@ class Session:
     def text(self) -> str:
         """Return the scenario file of what is on the screen, of `study`."""
         document = Document(self.document.text(self.study))
-        if self.follows_file or not document.table("pressure"):
-            return document.text()
+        if self.follows_file or not document.table("pressure") or self.study == "dynamic":
+            return document.text()  # over time the pose shown is but one of many
         document.replace("pressure", {"sequence_bar": [[float(f"{p / BAR:.12g}") for p in self.pressure]]})
         return document.text()
 
@@ -369,8 +370,10 @@ class Stage:
     """What panels and tabs of one page share.
 
     session, view : its scenario and its 3-D view. figures : what draws what tabs have found, by title, for reports.
+    plays : what shows a step of a motion in place of the pose of the controls.
     """
 
     session: Session
     view: RobotView
     figures: dict[str, Mapping[str, Callable[[], Figure]]] = field(default_factory=dict)
+    plays: list[Callable[[Scenario, Step], None]] = field(default_factory=list)
