@@ -49,7 +49,7 @@ def test_the_live_pose_is_that_of_the_command(file: Path) -> None:
         assert session.scenario is not None
         run, free = live.pose(session.scenario, session.pressure)
         session.set_pressure(session.pressure)
-        asked = to_json(run_scenario(scenario_from_text(session.text(), "x.toml")))  # type: ignore[arg-type]
+        asked = to_json(run_scenario(scenario_from_text(session.text(), "x.toml")))
         found, wanted = to_json(run)["steps"][0], asked["steps"][-1]
         assert np.allclose(found["tip_position_mm"], wanted["tip_position_mm"], atol=1e-4)
         assert [row[0] for row in segment_rows(run.steps[0])] == list(range(1, len(found["segments"]) + 1))
@@ -120,8 +120,8 @@ def test_panels_show_and_change_the_chosen_segment_alone() -> None:
         session.open_path(TWO)
         part = Part(session)
         segments_panel(part)
-        robot_panel(part)  # type: ignore[arg-type]
-        material_panel(part)  # type: ignore[arg-type]
+        robot_panel(part)
+        material_panel(part)
 
     async def person(user: User, session: Session) -> None:
         assert control(user, "robot.length_mm").value == 40

@@ -177,7 +177,7 @@ class Document:
                 wanted.remove(name)
             for name, values in _NEEDED.get(study, {}).items():
                 if name not in wanted and not (name == "workspace" and "pressure" in wanted):
-                    wanted[name] = _new_table(values)
+                    wanted[name] = _new_table(self._offer(name, values))
             own = wanted.get("workspace")
             unused: list[str] = []
             if study == "workspace" and isinstance(own, Mapping) and ("levels" in own or "samples" in own):
@@ -192,6 +192,12 @@ class Document:
         if wanted.get("study") != study:
             wanted["study"] = study
         return tomlkit.dumps(wanted)
+
+    def _offer(self, name: str, values: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return a table to begin with; the energy section takes lists of dimensions and no ranges."""
+        if name != "choices" or self.get("corrections", "conventions") != "energy":
+            return values
+        return {"robot": {key: [range_["from"], range_["to"]] for key, range_ in values["robot"].items()}}
 
     def _time(self, study: str, wanted: Any) -> None:
         """Give the pressures of a file of a study times, or take them away."""
@@ -213,7 +219,7 @@ class Document:
             self.offered.add(STEP)
         for name, values in _NEEDED.get(study, {}).items():
             if name not in self._tables:
-                self._tables[name] = _new_table(values)
+                self._tables[name] = _new_table(self._offer(name, values))
                 self.offered.add(name)
         schema = SCHEMAS.get(study)
         if schema is not None and "pressure" in schema.model_fields and "pressure" not in self._tables:
