@@ -2,8 +2,8 @@
 
 Times the start of `softnlp gui` until its page answers, and from a key press on a slider until the 3-D view has
 drawn the new shape, as the browser sees both: the press travels to the server, the pose is solved, the frame travels
-back and is drawn. Beside it stand the same way without solving, a frame that is drawn again, and the processor time that
-the server spends on a press and on its start, which other work on the machine changes little.
+back and is drawn. Beside it stand the same way without solving (a frame that is drawn again) and the processor time
+that the server spends on a press and on its start, which other work on the machine changes little.
 """
 
 from __future__ import annotations
