@@ -87,7 +87,8 @@ class LiveView:
             run, ghost = await task
         except InputError as error:
             with self._client:
-                self._said(sentence(error.message), True)
+                about = "obstacles: " if error.table == "obstacle" else ""  # of them all, whose words do not name them
+                self._said(sentence(about + error.message), True)
             return
         with self._client:
             step = run.steps[0]

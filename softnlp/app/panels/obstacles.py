@@ -190,11 +190,12 @@ class _Obstacles:
                 self._number(place, key, 0, label_of(key), f"{mark}.{key}", 1.0, unit_of(key))
 
     def _row_of(self, place: int, key: str, mark: str) -> None:
-        with ui.row().classes("w-full no-wrap gap-2"):
+        with ui.row().classes("w-full items-center no-wrap gap-2"):
+            unit = f" [{unit_of(key)}]" if unit_of(key) else ""
+            ui.label(f"{label_of(key)}{unit}").classes("text-xs w-12 shrink-0 leading-tight opacity-80")
             for index, axis in enumerate("xyz"):
-                unit = f" [{unit_of(key)}]" if unit_of(key) else ""
-                label = f"{label_of(key)} {axis}{unit}" if index == 0 else axis
-                self._number(place, key, index, label, f"{mark}.{key}.{index}", 1.0 if unit else 0.1)
+                self._number(place, key, index, axis, f"{mark}.{key}.{index}", 1.0 if unit else 0.1)
+                self._fields[place, key, index].props(f'aria-label="{label_of(key)} {axis}, obstacle {place + 1}"')
 
     def _number(self, place: int, key: str, index: int, label: str, mark: str, step: float, unit: str = "") -> None:
         field = number(label, mark, unit, "debounce=250 no-error-icon", step=step).classes("grow basis-0 min-w-0")
