@@ -9,7 +9,7 @@ import numpy as np
 
 from softnlp.app import controls
 from softnlp.app.asking import Progress, sentence
-from softnlp.app.parts import NumberTable, study_row
+from softnlp.app.parts import NumberTable, csv_text, study_row
 from softnlp.app.session import Session
 from softnlp.base.errors import InputError
 from softnlp.results.modes import SHOWN, modes_rows
@@ -35,8 +35,9 @@ def modes_part(session: Session) -> None:
             return
         row.say(" ".join(["About the pose of the sliders, small motions.", notes]).strip())
         header, rows = modes_rows(modes.found, SHOWN)
-        shown = ["mode", "f [Hz]", "damping ratio", "kind", *header[4:]]
-        table.show(shown, [[_number(cell) for cell in cells] for cells in rows], "modes.csv")
+        shown = ["no.", "f [Hz]", "damping", "kind", "tip moves x, y, z"]
+        cells = [[*map(_number, row[:4]), ", ".join(f"{float(x):.2g}" for x in row[4:])] for row in rows]
+        table.show(shown, cells, "modes.csv", csv=csv_text(header, rows))
 
     row = study_row("modes", "Find natural frequencies", asked, done)
     table = NumberTable("modes.table")

@@ -17,6 +17,7 @@ QUANTITIES = {
 }
 """What can be drawn: words and axis."""
 _ENERGIES = ("kinetic", "elastic", "gravity", "pressure_work", "load_work", "dissipated", "numerical")
+_FEW = 3  # sets of which a table shows the pressures
 _COUNTS = 1e-4  # of the largest energy: what is drawn
 
 
@@ -46,11 +47,14 @@ def curves(steps: Sequence[Step], quantity: str) -> dict[str, list[float]]:
 def table_rows(steps: Sequence[Step]) -> tuple[list[str], list[list[float | str | None]]]:
     """Return header and rows of a table: the time, the pressures in the chambers, where the tip is, what failed."""
     failed = any(not step.status.has_solution for step in steps)
-    pressures = [f"p{k + 1} [bar]" if k == 0 else f"p{k + 1}" for k in range(len(steps[0].pressure))] if steps else []
+    sets = (
+        len(steps[0].pressure) if steps and len(steps[0].pressure) <= _FEW else 0
+    )  # more are too wide: the CSV has them
+    pressures = [f"p{k + 1} [bar]" if k == 0 else f"p{k + 1}" for k in range(sets)]
     header = ["t [s]", *pressures, "tip x [mm]", "y", "z", *["status"] * failed]
     rows: list[list[float | str | None]] = []
     for step, place in zip(steps, _tips(steps) / MILLIMETRE, strict=True):
-        bars = [round(float(p) / BAR, 4) for p in step.pressure]
+        bars = [round(float(p) / BAR, 4) for p in step.pressure[:sets]]
         tip = [round(float(x), 3) + 0.0 if isfinite(x) else None for x in place]
         time = None if step.time is None else round(step.time, 6)
         rows.append([time, *bars, *tip, *[str(step.status)] * failed])
