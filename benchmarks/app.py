@@ -117,7 +117,7 @@ def presses(page: Any, count: int) -> list[float]:
     page.locator("[data-testid=pressure-slider-1] [tabindex='0']").first.focus()
     for k in range(count):
         page.keyboard.press("ArrowRight")
-        page.wait_for_function(f"window.times.length > {k}", timeout=20_000)
+        page.wait_for_function(f"window.times.length > {k}", timeout=120_000)
         page.wait_for_timeout(30)
     times: list[float] = page.evaluate("window.times")
     return times

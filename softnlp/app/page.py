@@ -26,7 +26,6 @@ from softnlp.app.part import LIST, Part, place_of
 from softnlp.app.report import report_menu
 from softnlp.app.session import Session, Stage
 from softnlp.app.tabs.blocked import blocked_tab
-from softnlp.app.tabs.identify import identify_tab
 from softnlp.app.tabs.inverse import inverse_tab
 from softnlp.app.tabs.scenario import scenario_tab
 from softnlp.app.tabs.sequence import sequence_tab
@@ -36,8 +35,14 @@ from softnlp.app.view import RobotView
 from softnlp.statics.step import Run
 
 
+def _identify(stage: Stage) -> None:
+    from softnlp.app.tabs.identify import identify_tab  # these five when they are opened: the page is there sooner
+
+    identify_tab(stage)
+
+
 def _design(stage: Stage) -> None:
-    from softnlp.app.tabs.design import design_tab  # these four when they are opened: the page is there sooner
+    from softnlp.app.tabs.design import design_tab
 
     design_tab(stage)
 
@@ -66,7 +71,7 @@ STUDIES: dict[str, tuple[str, str | None, Callable[[Stage], None]]] = {
     "workspace": ("Workspace", "workspace", workspace_tab),
     "inverse": ("Inverse", "inverse", inverse_tab),
     "time": ("Time", "dynamic", _time),
-    "identify": ("Identification", "identify", identify_tab),
+    "identify": ("Identification", "identify", _identify),
     "design": ("Design", "design", _design),
     "compare": ("Compare", None, _compare),
     "sensitivity": ("Sensitivity", None, _sensitivity),
