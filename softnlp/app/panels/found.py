@@ -13,7 +13,7 @@ from softnlp.base.columns import OUTPUTS
 from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE
 from softnlp.statics.step import Run, Step
 
-CONTACTS = ("obstacle", "F [N]", "x", "y", "z", "at s/L", "gap [mm]")
+CONTACTS = ("obstacle", "F [N]", "x", "y", "z", "at s/L", OUTPUTS["gap"].axis)
 _TIP, _STRETCH, _BEND = (OUTPUTS[name] for name in ("tip_position", "stretch", "bending_angle"))
 SEGMENTS = ("no.", f"tip x [{_TIP.unit}]", "y", "z", _STRETCH.label, f"bending [{_BEND.unit.sign}]")
 

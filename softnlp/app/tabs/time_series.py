@@ -7,11 +7,12 @@ from math import isfinite, nan
 
 import numpy as np
 
+from softnlp.base.columns import MM
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.statics.step import Step
 
 QUANTITIES = {
-    "tip": ("Where the tip moves", "tip moved by [mm]"),
+    "tip": ("Where the tip moves", f"tip moved by [{MM}]"),
     "pressure": ("Pressures in the chambers and at the regulators", "pressure [bar]"),
     "energy": ("Energies and works", "energy [mJ]"),
 }
@@ -51,7 +52,7 @@ def table_rows(steps: Sequence[Step]) -> tuple[list[str], list[list[float | str 
         len(steps[0].pressure) if steps and len(steps[0].pressure) <= _FEW else 0
     )  # more are too wide: the CSV has them
     pressures = [f"p{k + 1} [bar]" if k == 0 else f"p{k + 1}" for k in range(sets)]
-    header = ["t [s]", *pressures, "tip x [mm]", "y", "z", *["status"] * failed]
+    header = ["t [s]", *pressures, f"tip x [{MM}]", "y", "z", *["status"] * failed]
     rows: list[list[float | str | None]] = []
     for step, place in zip(steps, _tips(steps) / MILLIMETRE, strict=True):
         bars = [round(float(p) / BAR, 4) for p in step.pressure[:sets]]
