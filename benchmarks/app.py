@@ -2,7 +2,8 @@
 
 Times the start of `softnlp gui` until its page answers, and from a key press on a slider until the 3-D view has
 drawn the new shape, as the browser sees both: the press travels to the server, the pose is solved, the frame travels
-back and is drawn. Beside it stands the same way without solving: a frame that is drawn again.
+back and is drawn. Beside it stand the same way without solving (a frame that is drawn again) and the processor time
+that the server spends on a press and on its start, which other work on the machine changes little.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import time
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from shutil import which
 from statistics import median, quantiles
 from typing import Any
@@ -33,10 +35,15 @@ FLAGS = (
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 )
-CASES = {
-    "no load": {},
-    "tip force and gravity": {"tip_load.force_N.0": "0.05", "tip_load.force_N.1": "0.02"},
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+CASES: dict[str, tuple[str, dict[str, str]]] = {
+    "no load": ("", {}),
+    "tip force and gravity": ("", {"tip_load.force_N.0": "0.05", "tip_load.force_N.1": "0.02"}),
+    "two segments": ("two_segments.toml", {}),
+    "energy section": ("D25L60_energy.toml", {}),
+    "obstacle": ("contact/sphere.toml", {}),
 }
+"""Scenario, the first robot for "", and fields of the page that are filled."""
 # Notes when a key goes down and when the view has drawn the next frame.
 WATCH = """
 () => {
@@ -63,9 +70,25 @@ def free_port() -> int:
         return port
 
 
+def processor_time(process: subprocess.Popen[bytes]) -> float:
+    """Return the processor time of a process so far [s]; nan where the system does not tell."""
+    try:
+        user, system = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+    except OSError:
+        return float("nan")
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+
+
 @contextmanager
 def served(*arguments: str, port: int | None = None) -> Iterator[tuple[str, float]]:
     """Start the app; yield its address and how long it took until the page answered [s]."""
+    with server(*arguments, port=port) as (address, seconds, _):
+        yield address, seconds
+
+
+@contextmanager
+def server(*arguments: str, port: int | None = None) -> Iterator[tuple[str, float, subprocess.Popen[bytes]]]:
+    """Start the app; yield its address, how long it took until the page answered [s], and its process."""
     port = port or free_port()
     began = time.perf_counter()
     command = [sys.executable, "-m", "softnlp", "gui", *arguments, "--no-browser", "--port", str(port)]
@@ -82,7 +105,7 @@ def served(*arguments: str, port: int | None = None) -> Iterator[tuple[str, floa
                 time.sleep(0.02)
         else:
             raise RuntimeError(f"softnlp gui ended with status {process.returncode}")
-        yield address, time.perf_counter() - began
+        yield address, time.perf_counter() - began, process
     finally:
         process.terminate()
         process.wait(10)
@@ -94,7 +117,7 @@ def presses(page: Any, count: int) -> list[float]:
     page.locator("[data-testid=pressure-slider-1] [tabindex='0']").first.focus()
     for k in range(count):
         page.keyboard.press("ArrowRight")
-        page.wait_for_function(f"window.times.length > {k}", timeout=20_000)
+        page.wait_for_function(f"window.times.length > {k}", timeout=120_000)
         page.wait_for_timeout(30)
     times: list[float] = page.evaluate("window.times")
     return times
@@ -118,33 +141,44 @@ def main() -> None:
     browser_path = chromium()
     if browser_path is None:
         sys.exit("no Chromium found; install one to measure")
-    starts = []
+    starts, spent = [], []
     for _ in range(chosen.starts):
-        with served() as (_, seconds):
+        with server() as (_, seconds, process):
             starts.append(seconds)
-    print(f"softnlp gui until the page answers: median {median(starts):.2f} s of {len(starts)}")
-    with tempfile.TemporaryDirectory() as profile, served() as (address, _), sync_playwright() as play:
+            spent.append(processor_time(process))
+    print(f"softnlp gui until the page answers: median {median(starts):.2f} s of {len(starts)}, "
+          f"of which {median(spent):.2f} s of processor time")  # fmt: skip
+    with tempfile.TemporaryDirectory() as profile, sync_playwright() as play:
         browser = play.chromium.launch_persistent_context(
             profile, executable_path=browser_path, args=list(FLAGS), viewport={"width": 1280, "height": 800}
         )
-        for name, fields in CASES.items():
-            page = browser.new_page()
-            page.goto(address)
-            page.wait_for_selector("[data-frame]", state="attached", timeout=60_000)
-            page.fill("input[data-testid=pressure-number-1]", "0.3")
-            if fields:
-                page.click("[data-testid=panel-loads] .q-item")
-                page.wait_for_timeout(500)
-            for field, value in fields.items():
-                page.fill(f"input[data-testid='{field}']", value)
-            page.wait_for_timeout(2500)
-            times = presses(page, chosen.presses)
-            frame = median(drawn_only(page, 20))
+        for name, (scenario, fields) in CASES.items():
+            with server(*([str(SCENARIOS / scenario)] if scenario else [])) as (address, _, process):
+                page = browser.new_page()
+                _filled(page, address, fields)
+                before = processor_time(process)
+                times = presses(page, chosen.presses)
+                each = 1e3 * (processor_time(process) - before) / len(times)
+                frame = median(drawn_only(page, 20))
+                page.close()
             ninth = quantiles(times, n=10)[-1]
             print(f"{name}: slider to redrawn shape, median {median(times):.0f} ms, nine in ten within {ninth:.0f} ms; "
-                  f"two frames of the browser alone {frame:.0f} ms")  # fmt: skip
-            page.close()
+                  f"{each:.0f} ms of the server's processor; two frames of the browser alone {frame:.0f} ms",
+                  flush=True)  # fmt: skip
         browser.close()
+
+
+def _filled(page: Any, address: str, fields: dict[str, str]) -> None:
+    """Open the app and fill fields of the loads."""
+    page.goto(address)
+    page.wait_for_selector("[data-frame]", state="attached", timeout=60_000)
+    page.fill("input[data-testid=pressure-number-1]", "0.3")
+    if fields:
+        page.click("[data-testid=panel-loads] .q-item")
+        page.wait_for_timeout(500)
+    for field, value in fields.items():
+        page.fill(f"input[data-testid='{field}']", value)
+    page.wait_for_timeout(2500)
 
 
 if __name__ == "__main__":

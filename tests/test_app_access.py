@@ -16,8 +16,9 @@ pytestmark = [
     pytest.mark.thorough,
     pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine"),
 ]
-TABS = ("kinematics", "blocked", "workspace", "inverse", "identify", "design", "compare", "sensitivity", "scenario")
-PANELS = ("material", "loads", "coefficients", "solver")
+TABS = ("kinematics", "blocked", "workspace", "inverse", "time", "identify", "design", "compare", "sensitivity")
+TABS += ("scenario",)
+PANELS = ("segments", "material", "loads", "obstacles", "coefficients", "solver")
 AXE = """async whole => {
   const asked = {runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa']};
   if (!whole) asked.rules = {'color-contrast': {enabled: false}};  // takes long; test_app_studies.py looks at it too
@@ -56,6 +57,16 @@ BOXES = """() => {
 }"""
 
 
+def _with_segments_and_an_obstacle(tab: Watched) -> None:
+    """Let the panels show what they have for several segments, for a dimension that varies and for obstacles."""
+    tab.press("segment.duplicate")
+    tab.page.wait_for_selector("[data-testid='segment.lines']")
+    for kind in ("sphere", "trocar"):
+        tab.choose("obstacle.new", kind)
+        tab.press("obstacle.add")
+    tab.page.wait_for_selector("[data-testid='obstacle.2.length_mm']")
+
+
 def _visit(tab: Watched, name: str) -> None:
     tab.page.locator(f"[data-testid=tab-{name}]").scroll_into_view_if_needed()
     tab.press(f"tab-{name}")
@@ -76,6 +87,7 @@ def test_axe_finds_nothing_on_any_tab(tab: Watched, dark: bool, whole: bool) -> 
         tab.press("dark")
     for panel in PANELS:
         tab.open_panel(panel)
+    _with_segments_and_an_obstacle(tab)
     for name in TABS:
         _visit(tab, name)
         assert tab.page.evaluate(AXE, whole) == [], name
@@ -87,16 +99,20 @@ def test_axe_finds_nothing_on_any_tab(tab: Watched, dark: bool, whole: bool) -> 
 
 @pytest.mark.parametrize(
     ("width", "names"),
-    [(390, TABS[:1] + TABS[5:6]), pytest.param(820, TABS, marks=pytest.mark.slow)]
+    [(390, ("kinematics", "time")), pytest.param(820, TABS, marks=pytest.mark.slow)]
     + [pytest.param(width, TABS, marks=pytest.mark.slow) for width in (390, 1280, 1600)],
 )
 def test_nothing_is_cut_off_or_hard_to_press(tab: Watched, width: int, names: tuple[str, ...], pictures: Path) -> None:
     tab.page.set_viewport_size({"width": width, "height": 900})
+    for panel in ("segments", "obstacles"):
+        tab.open_panel(panel)
+    _with_segments_and_an_obstacle(tab)
     for name in names:
         _visit(tab, name)
         tab.page.screenshot(path=pictures / f"app_{name}_{width}.png")
         assert tab.evaluate(BOXES) == [], (width, name)
     if width < 1024:  # the robot is on top
+        tab.evaluate("document.querySelector('.softnlp-page').scrollTo(0, 0)")
         view = tab.page.locator("[data-testid=view]").bounding_box()
         panel = tab.page.locator("[data-testid=panel-pressures]").bounding_box()
         assert view["width"] >= width - 1

@@ -17,8 +17,9 @@ from nicegui.testing import User
 
 from softnlp import Coefficients, forward, material, robot
 from softnlp.app.parts import Chart
-from softnlp.app.session import LARGEST_FILE, Stage
+from softnlp.app.session import Stage
 from softnlp.app.tabs.identify import LETTERS, bounds_of, first_free, identify_tab, with_bound, with_free
+from softnlp.app.taken import LARGEST_FILE
 from softnlp.base.units import DEGREE, MILLIMETRE
 from softnlp.scenario.read import scenario_from_text
 from softnlp.studies.identified import COEFFICIENTS

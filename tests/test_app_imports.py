@@ -29,8 +29,8 @@ from softnlp.app.imports import (
     told,
     traces,
 )
-from softnlp.app.session import LARGEST_FILE
 from softnlp.app.tabs.identify import identify_tab
+from softnlp.app.taken import LARGEST_FILE
 from softnlp.base.errors import InputError
 from softnlp.laboratory.importing import KINDS
 from softnlp.laboratory.recipe import read_recipe, recipe_text

@@ -21,7 +21,8 @@ from softnlp.app.controls import button
 from softnlp.app.files import save, saved
 from softnlp.app.panels.equations import loads_panel
 from softnlp.app.panels.results import certificate_words, step_lines
-from softnlp.app.session import LARGEST_FILE, Session, Stage
+from softnlp.app.session import Session, Stage
+from softnlp.app.taken import LARGEST_FILE
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR
 from softnlp.results import to_json
@@ -135,14 +136,6 @@ def test_a_formula_with_code_in_it_is_refused(session: Session) -> None:
 def test_a_shipped_scenario_opens_with_its_files(session: Session, file: Path) -> None:
     if "study" not in file.read_text():
         pytest.skip("a material file")
-    if file.parent.name == "contact":
-        with pytest.raises(InputError, match=r"this page takes no \[\[obstacle\]\] so far"):
-            session.open_path(file)
-        return
-    if file.stem in ("two_segments", "cone"):
-        with pytest.raises(InputError, match="this page takes a robot of one uniform segment so far"):
-            session.open_path(file)
-        return
     session.open_path(file)
     assert session.problem is None
     asked = session.asked()

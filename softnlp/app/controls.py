@@ -11,7 +11,7 @@ from nicegui import ElementFilter, ui
 from nicegui.elements.mixins.value_element import ValueElement
 from pydantic.fields import FieldInfo
 
-from softnlp.app.session import Session
+from softnlp.app.inputs import Inputs
 from softnlp.base.errors import InputError, SoftnlpError
 from softnlp.scenario.check import SCHEMAS
 
@@ -77,7 +77,7 @@ def problem_label(name: str) -> ui.label:
     return named(ui.label("").classes("text-sm text-negative break-words"), name)
 
 
-def problem_of(session: Session, *tables: str) -> str:
+def problem_of(session: Inputs, *tables: str) -> str:
     """Return what is wrong with one of some tables, in words, "" for nothing."""
     problem = session.problem
     return plain_words(problem) if problem is not None and problem.table in tables else ""
@@ -112,15 +112,16 @@ def is_number(value: Any) -> bool:
 def known(table: str, key: str) -> FieldInfo:
     """Return what the schema of scenarios says of a key."""
     kinds = (schema.model_fields[table].annotation for schema in SCHEMAS.values() if table in schema.model_fields)
-    models = (kind for annotation in kinds for kind in _parts(annotation) if hasattr(kind, "model_fields"))
+    models = (kind for annotation in kinds for kind in annotation_parts(annotation) if hasattr(kind, "model_fields"))
     info: FieldInfo = next(model.model_fields[key] for model in models if key in model.model_fields)
     return info
 
 
-def _parts(annotation: Any) -> Iterator[Any]:
+def annotation_parts(annotation: Any) -> Iterator[Any]:
+    """Yield a type and all that it is made of."""
     yield annotation
     for part in get_args(annotation):
-        yield from _parts(part)
+        yield from annotation_parts(part)
 
 
 def unit_of(key: str) -> str:
@@ -129,7 +130,7 @@ def unit_of(key: str) -> str:
 
 
 def number_field(
-    session: Session,
+    session: Inputs,
     table: str,
     key: str,
     label: str,
@@ -145,7 +146,7 @@ def number_field(
     key, by default what the schema says. test : a name of its own in the browser.
     """
     field_info = known(table, key)
-    whole = int in _parts(field_info.annotation)
+    whole = int in annotation_parts(field_info.annotation)
 
     def shown() -> Any:
         value = session.document.get(table, key)
@@ -168,7 +169,7 @@ def number_field(
 
 
 def choice_field(
-    session: Session,
+    session: Inputs,
     table: str,
     key: str,
     label: str,
@@ -194,7 +195,7 @@ def choice_field(
 
 
 def vector_field(
-    session: Session,
+    session: Inputs,
     table: str,
     key: str,
     labels: Sequence[str],
@@ -231,7 +232,7 @@ def vector_field(
 
 
 def _follow(
-    session: Session,
+    session: Inputs,
     table: str,
     key: str,
     fields: Sequence[ValueElement[Any]],
@@ -251,7 +252,7 @@ def _follow(
     session.on_scenario(refresh)
 
 
-def tell_problem(session: Session, field: ui.element, table: str, *keys: str) -> None:
+def tell_problem(session: Inputs, field: ui.element, table: str, *keys: str) -> None:
     """Put what is wrong with a key beside its field, or take it away."""
     problem = session.problem
     about = problem is not None and problem.table == table and (problem.key or "").split(".")[0] in keys

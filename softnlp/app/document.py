@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from typing import Any
 
@@ -10,6 +10,8 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable, Table
 
+from softnlp.app.rows import Row, in_line, inner_tables, put_rows, rows_of
+from softnlp.app.time_rows import STEP, timed
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.reading import one_line
@@ -37,6 +39,7 @@ sequence_bar = [[0.8, 0.0, 0.0]]
 _NEEDED: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "workspace": {"workspace": {"levels": 8, "to_bar": 1.2}},
     "inverse": {"target": {"tip_position_mm": [[-20.0, 0.0, 62.0]]}, "bounds": {"pressure_bar": [0.0, 1.5]}},
+    "dynamic": {"dynamic": {"duration_s": 0.6, "damping_s": 0.004, "lag_s": 0.03}},
     "design": {
         "choices": {"robot": {"chamber_diameter_mm": {"from": 3.0, "to": 5.0}}},
         "actuation": {"sets": [1], "pressure_bar": 0.8},
@@ -81,6 +84,18 @@ class Document:
         found = self._tables.get(name)
         return dict(found.unwrap()) if isinstance(found, Table | InlineTable) else {}
 
+    def rows(self, name: str) -> list[Row]:
+        """Return a list of tables, [[name]], as plain Python; empty where there is none."""
+        return rows_of(self._tables, name)
+
+    def replace_rows(self, name: str, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Put rows in place of a list of tables, or take it out for none. Comments of what stays stay."""
+        put_rows(self._tables, name, rows)
+
+    def holds(self, name: str) -> bool:
+        """Whether there is a table or a list of tables of a name."""
+        return name in self._tables
+
     def own(self) -> dict[str, Any]:
         """Return as plain Python what a person has put into the document, of every study."""
         every: dict[str, Any] = self._tables.unwrap()
@@ -97,6 +112,8 @@ class Document:
             values = self.table(name)
             found += [values["file"]] if isinstance(values.get("file"), str) else []
             found += [f for f in values.get("files", []) if isinstance(f, str)]
+            inner = inner_tables(self.rows(name))
+            found += [part["file"] for part in inner if isinstance(part.get("file"), str)]
         return found
 
     def rename_files(self, rename: Callable[[str], str]) -> None:
@@ -107,6 +124,12 @@ class Document:
                 self.set(name, "file", rename(values["file"]))
             if isinstance(values.get("files"), list):
                 self.set(name, "files", [rename(f) if isinstance(f, str) else f for f in values["files"]])
+            rows = self.rows(name)
+            for part in inner_tables(rows):
+                if isinstance(part.get("file"), str):
+                    part["file"] = rename(part["file"])
+            if rows:
+                self.replace_rows(name, rows)
 
     def set(self, table: str, key: str, value: Any) -> None:
         """Set a key, or remove it for None; a table that this leaves empty is removed too."""
@@ -154,7 +177,7 @@ class Document:
                 wanted.remove(name)
             for name, values in _NEEDED.get(study, {}).items():
                 if name not in wanted and not (name == "workspace" and "pressure" in wanted):
-                    wanted[name] = _new_table(values)
+                    wanted[name] = _new_table(self._offer(name, values))
             own = wanted.get("workspace")
             unused: list[str] = []
             if study == "workspace" and isinstance(own, Mapping) and ("levels" in own or "samples" in own):
@@ -165,16 +188,38 @@ class Document:
                 unused += [*UNUSED_BY_TENSILE, "solver"]  # whose grid means nothing there
             for name in unused:
                 wanted.pop(name, None)
+            self._time(study, wanted)
         if wanted.get("study") != study:
             wanted["study"] = study
         return tomlkit.dumps(wanted)
 
+    def _offer(self, name: str, values: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Return a table to begin with; the energy section takes lists of dimensions and no ranges."""
+        if name != "choices" or self.get("corrections", "conventions") != "energy":
+            return values
+        return {"robot": {key: [range_["from"], range_["to"]] for key, range_ in values["robot"].items()}}
+
+    def _time(self, study: str, wanted: Any) -> None:
+        """Give the pressures of a file of a study times, or take them away."""
+        before = wanted["pressure"].unwrap() if isinstance(wanted.get("pressure"), Table | InlineTable) else {}
+        after = {key: value for key, value in before.items() if key != "t_s"}
+        if study == "dynamic":
+            duration = (
+                wanted["dynamic"].unwrap().get("duration_s") if isinstance(wanted.get("dynamic"), Table) else None
+            )
+            long = float(duration) if isinstance(duration, int | float) and duration > 0 else 1.0
+            after = timed(before, long, self.sets() or 1, step=STEP in self.offered)
+        if after != before:
+            wanted["pressure"] = _new_table(after)
+
     def start(self, study: str) -> None:
         """Turn to a study, and add the tables that it cannot do without."""
         self.study = study
+        if study == "dynamic" and study not in self._tables:
+            self.offered.add(STEP)
         for name, values in _NEEDED.get(study, {}).items():
             if name not in self._tables:
-                self._tables[name] = _new_table(values)
+                self._tables[name] = _new_table(self._offer(name, values))
                 self.offered.add(name)
         schema = SCHEMAS.get(study)
         if schema is not None and "pressure" in schema.model_fields and "pressure" not in self._tables:
@@ -182,13 +227,17 @@ class Document:
             self.fit_pressures()
             self.offered.add("pressure")
 
+    def sets(self) -> int | None:
+        """Return how many chamber sets the robot has, of all segments together; None where that makes no sense."""
+        robots = [row.get("robot") for row in self.rows("segment")] or [self.table("robot")]
+        counts = [sets_of(robot) if isinstance(robot, Mapping) else None for robot in robots]
+        total = sum(count or 0 for count in counts)
+        return total if all(counts) and total <= MOST_SETS * len(counts) else None
+
     def fit_pressures(self) -> None:
         """Give each row of pressures as many columns as the robot has sets: zeros are added, columns left out."""
-        rows = self.get("pressure", "sequence_bar")
-        name = self.get("robot", "name")
-        library = ROBOTS.get(name) if isinstance(name, str) else None
-        sets = self.get("robot", "chamber_sets") or (None if library is None else library.chamber_sets)
-        if not isinstance(sets, int) or isinstance(sets, bool) or not 1 <= sets <= MOST_SETS:
+        rows, sets = self.get("pressure", "sequence_bar"), self.sets()
+        if sets is None:
             return
         rows = rows if isinstance(rows, list) and all(isinstance(row, list) for row in rows) else []
         if any(len(row) != sets for row in rows):
@@ -200,22 +249,21 @@ class Document:
                 self.set("pressure", "ramp", ramp | {"sets": kept or [1]})
 
 
+def sets_of(robot: Mapping[str, Any]) -> int | None:
+    """Return the chamber sets of a table [robot], None where that is no possible number."""
+    name = robot.get("name")
+    library = ROBOTS.get(name) if isinstance(name, str) else None
+    sets = robot.get("chamber_sets") or (None if library is None else library.chamber_sets)
+    return sets if isinstance(sets, int) and not isinstance(sets, bool) and 1 <= sets <= MOST_SETS else None
+
+
 def _new_table(values: Mapping[str, Any]) -> Table:
     """Return a table as a person would write it: inner tables by dotted keys, innermost ones in a line."""
     table = tomlkit.table()
     for name, value in values.items():
         if isinstance(value, Mapping) and name in _DOTTED:
             for key, inner in value.items():
-                table.append(tomlkit.key([name, key]), _in_line(inner))
+                table.append(tomlkit.key([name, key]), in_line(inner))
         else:
-            table[name] = _in_line(value)
+            table[name] = in_line(value)
     return table
-
-
-def _in_line(value: Any) -> Any:
-    if not isinstance(value, Mapping):
-        return value
-    line = tomlkit.inline_table()
-    for key, inner in value.items():
-        line.append(key, getattr(inner, "unwrap", lambda inner=inner: inner)())
-    return line

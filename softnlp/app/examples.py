@@ -14,12 +14,8 @@ from softnlp.scenario.examples import shipped_scenarios
 
 @cache
 def examples() -> dict[str, str]:
-    """Return the title of every example that the page shows, by name: those of one segment."""
-    return {
-        name: str(table.get("title") or name)
-        for name, (_, table) in shipped_scenarios().items()
-        if "segment" not in table
-    }
+    """Return the title of every example, by name."""
+    return {name: str(table.get("title") or name) for name, (_, table) in shipped_scenarios().items()}
 
 
 def open_example(session: Session, name: str) -> bool:
@@ -53,6 +49,7 @@ _EMPTY = {
     "blocked-force": ("blocked/D25L60_curve", "The robot pushes against a wall; its force is found."),
     "workspace": ("workspace/D25L60_grid", "Every pressure of a grid; the tips become a cloud in the view."),
     "inverse": ("inverse/circle", "Say where the tip shall be; the pressures that put it there are found."),
+    "dynamic": ("dynamic/D25L60_step", "Pressures change over time, and the robot swings; its motion is found."),
     "identify": ("identify/measured_angles", "Drop what was measured; the constants that fit it are found."),
     "design": ("design/D25L60_dimensions", "Say what may be chosen and required; the best design is found."),
 }

@@ -14,10 +14,12 @@ from softnlp.app.controls import dismiss_refusals, plain_words, refuse
 from softnlp.app.document import Document
 from softnlp.app.examples import example_choice
 from softnlp.app.parts import DROP, while_open
-from softnlp.app.session import LARGEST_FILE, Session
+from softnlp.app.session import Session
+from softnlp.app.taken import LARGEST_FILE
 from softnlp.base.errors import InputError, SoftnlpError
 from softnlp.model.robot import Robot
-from softnlp.results import Body
+from softnlp.model.segments import SegmentedRobot, require_one_segment
+from softnlp.results import body_of_pose
 from softnlp.statics.step import Pose
 
 
@@ -138,12 +140,17 @@ def mesh_bytes(robot: Robot, pose: Pose | None, file: Path) -> bytes:
     Raises
     ------
     InputError
-        Where the extra mesh is not installed, or the body passes through itself so that it cannot be made solid.
+        Where the extra mesh is not installed, where the body passes through itself so that it cannot be made solid, and
+        for a mould of several segments.
     """
     from softnlp.figures.mesh import body_solid, mould_body, write_solids
+    from softnlp.figures.mesh.solid import segment_solids
 
     if pose is None:
-        solid = mould_body(robot)
+        require_one_segment(robot, "a mould")
+        solids = [mould_body(robot)]
+    elif isinstance(robot, SegmentedRobot):
+        solids = [*segment_solids(robot, body_of_pose(pose))]
     else:
-        solid = body_solid(robot, Body(pose.shape.position, pose.shape.rotation, pose.radii))
-    return write_solids([solid], robot, file).read_bytes()
+        solids = [body_solid(robot, body_of_pose(pose))]
+    return write_solids(solids, robot, file).read_bytes()

@@ -96,11 +96,30 @@ def _tables(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[str
             continue
         if name == "pressure":
             yield "pressures of the file"
+        elif _are_rows(old) and _are_rows(new):
+            yield from _rows(name, old or [], new or [])
         elif not isinstance(old or {}, Mapping) or not isinstance(new or {}, Mapping):
             yield f"{_words(name)} {_value(old)} → {_value(new)}"
         else:
             whole = _whole_robot if name == "robot" else dict
             yield from _table(name, dict(_flat(whole(old or _NOTHING))), dict(_flat(whole(new or _NOTHING))))
+
+
+def _are_rows(value: Any) -> bool:
+    """Whether a value is a list of tables, or none."""
+    return value is None or (isinstance(value, list) and all(isinstance(row, Mapping) for row in value))
+
+
+def _rows(name: str, old: Sequence[Mapping[str, Any]], new: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield what differs in a list of tables: rows that came and went, else what changed in each."""
+    if len(old) == len(new):
+        for k, (before, after) in enumerate(zip(old, new, strict=True)):
+            yield from _table(f"{name} {k + 1}", dict(_flat(before)), dict(_flat(after)))
+        return
+    short, long = sorted((old, new), key=len)
+    places = [k for k, row in enumerate(long) if row not in short][: len(long) - len(short)]
+    for k in places or range(len(short), len(long)):
+        yield f"{name} {k + 1} {'added' if len(new) > len(old) else 'taken away'}"
 
 
 def _whole_robot(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softnlp.app.parts import line
-from softnlp.app.session import checked_content, plain_name
+from softnlp.app.taken import checked_content, plain_name
 from softnlp.base.columns import BAR_, MM, N, S
 from softnlp.base.errors import InputError
 from softnlp.base.reading import LONGEST_NAME, one_line

@@ -11,13 +11,15 @@ from nicegui import background_tasks, ui
 from numpy.typing import NDArray
 
 from softnlp.app.asking import bars, sentence
-from softnlp.app.session import Session, Stage
+from softnlp.app.inputs import Inputs
+from softnlp.app.session import Stage
 from softnlp.app.theme import Redraw
 from softnlp.app.view import frame_of
 from softnlp.base.errors import InputError
 from softnlp.base.status import Status
 from softnlp.model.quantities import quantities
-from softnlp.results import Body
+from softnlp.results import body_of_pose
+from softnlp.scenario.data import run_of
 from softnlp.scenario.read import Scenario
 from softnlp.statics.branch import branch_function, stretch_on_branch
 from softnlp.statics.step import Pose, Run, Step
@@ -27,6 +29,7 @@ Array = NDArray[np.float64]
 
 
 _PATIENCE_S = 0.6  # of a person, before the page says that it works
+_AMONG_OBSTACLES_S = 0.15  # where a pose always takes long
 _SOLVING = "Solving …"
 _NUMBERS_AFTER_S = 0.04
 
@@ -73,7 +76,8 @@ class LiveView:
             return
         solve = session.live.blocked if scenario.study == "blocked-force" else session.live.pose
         task = asyncio.create_task(asyncio.to_thread(solve, scenario, pressure))
-        if not (await asyncio.wait({task}, timeout=_PATIENCE_S))[0]:
+        patience = _PATIENCE_S if not scenario.obstacles else _AMONG_OBSTACLES_S
+        if not (await asyncio.wait({task}, timeout=patience))[0]:
             with self._client:
                 self._say(_SOLVING, True)
             await asyncio.wait({task})
@@ -83,7 +87,8 @@ class LiveView:
             run, ghost = await task
         except InputError as error:
             with self._client:
-                self._said(sentence(error.message), True)
+                about = "obstacles: " if error.table == "obstacle" else ""  # of them all, whose words do not name them
+                self._said(sentence(about + error.message), True)
             return
         with self._client:
             step = run.steps[0]
@@ -104,25 +109,38 @@ class LiveView:
         self._words, self._stale = words, stale
         self._say(words, stale)
 
+    def play(self, scenario: Scenario, step: Step) -> None:
+        """Show a step of a motion in place of the pose of the controls, until these change."""
+        if step.pose is None:
+            return
+        self._draw(scenario, step.pressure, step, step.pose, None)
+        self._run = run_of(scenario, [step])
+        self._tell()
+
     def _show(self, scenario: Scenario, pressure: Array, step: Step, pose: Pose, ghost: Pose | None) -> None:
         if self._last is None or not np.array_equal(self._last[1], pressure) or self._last[0] is not scenario:
             self._said("")
         if self._last is not None and vars(self._last[0].robot) != vars(scenario.robot):
             self._stage.view.clear_trail()  # of another robot
-        self._last, loads, contact = (scenario, pressure), scenario.loads, step.contact
+        self._last = (scenario, pressure)
+        self._draw(scenario, pressure, step, pose, ghost)
+
+    def _draw(self, scenario: Scenario, pressure: Array, step: Step, pose: Pose, ghost: Pose | None) -> None:
+        loads, contact = scenario.loads, step.contact
         stands = contact is not None and contact.normal.any()  # else the chambers alone are held
         self._stage.view.show(
             frame_of(
                 scenario.robot,
-                _body(pose),
+                body_of_pose(pose),
                 pressure,
-                ghost=None if ghost is None else _body(ghost),
+                ghost=None if ghost is None else body_of_pose(ghost),
                 tip_force=loads.tip_force,
                 tip_moment=loads.tip_moment,
                 gravity=loads.gravity,
                 wall=Wall(contact.wall_point, contact.normal) if contact is not None and stands else None,
                 wall_force=0.0 if contact is None else contact.force,
                 tip_cap=0.0 if contact is None else contact.tip_cap,
+                contacts=step.contacts,
             )
         )
 
@@ -134,7 +152,7 @@ class LiveView:
 class PoseStretch:
     """Gives the stretch of a session's pose; what is compiled is kept while robot and law are of the same kind."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Inputs) -> None:
         self._session = session
         self._kind: Hashable = None
         self._branch: ca.Function | None = None
@@ -150,7 +168,3 @@ class PoseStretch:
         nominal = {name: q.nominal for name, q in quantities(model).items()} | {"pressure": pressure}
         point = stretch_on_branch(self._branch, np.concatenate([np.ravel(v) for v in nominal.values()]), pressure)
         return point.stretch if point.status is Status.SOLVED else None
-
-
-def _body(pose: Pose) -> Body:
-    return Body(pose.shape.position, pose.shape.rotation, pose.radii)

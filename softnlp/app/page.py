@@ -11,17 +11,21 @@ from softnlp.app.asking import sentence
 from softnlp.app.controls import button
 from softnlp.app.files import mesh_menu, open_dialog, save
 from softnlp.app.live_view import LiveView
+from softnlp.app.notes import tab_note
 from softnlp.app.panels.equations import coefficients_panel, loads_panel, solver_panel
+from softnlp.app.panels.found import FoundTables
 from softnlp.app.panels.material import material_panel
+from softnlp.app.panels.obstacles import draw_obstacles, obstacles_panel
 from softnlp.app.panels.past import Past
 from softnlp.app.panels.pins import PinsPanel
 from softnlp.app.panels.pressure import pressure_panel
 from softnlp.app.panels.results import ResultsPanel
 from softnlp.app.panels.robot import robot_panel
+from softnlp.app.panels.segments import segments_panel
+from softnlp.app.part import LIST, Part, place_of
 from softnlp.app.report import report_menu
 from softnlp.app.session import Session, Stage
 from softnlp.app.tabs.blocked import blocked_tab
-from softnlp.app.tabs.identify import identify_tab
 from softnlp.app.tabs.inverse import inverse_tab
 from softnlp.app.tabs.scenario import scenario_tab
 from softnlp.app.tabs.sequence import sequence_tab
@@ -31,8 +35,14 @@ from softnlp.app.view import RobotView
 from softnlp.statics.step import Run
 
 
+def _identify(stage: Stage) -> None:
+    from softnlp.app.tabs.identify import identify_tab  # these five when they are opened: the page is there sooner
+
+    identify_tab(stage)
+
+
 def _design(stage: Stage) -> None:
-    from softnlp.app.tabs.design import design_tab  # these three when they are opened: the page is there sooner
+    from softnlp.app.tabs.design import design_tab
 
     design_tab(stage)
 
@@ -49,12 +59,19 @@ def _sensitivity(stage: Stage) -> None:
     sensitivity_tab(stage)
 
 
+def _time(stage: Stage) -> None:
+    from softnlp.app.tabs.time import time_tab
+
+    time_tab(stage)
+
+
 STUDIES: dict[str, tuple[str, str | None, Callable[[Stage], None]]] = {
     "kinematics": ("Kinematics", "forward", sequence_tab),
     "blocked": ("Blocked force", "blocked-force", blocked_tab),
     "workspace": ("Workspace", "workspace", workspace_tab),
     "inverse": ("Inverse", "inverse", inverse_tab),
-    "identify": ("Identification", "identify", identify_tab),
+    "time": ("Time", "dynamic", _time),
+    "identify": ("Identification", "identify", _identify),
     "design": ("Design", "design", _design),
     "compare": ("Compare", None, _compare),
     "sensitivity": ("Sensitivity", None, _sensitivity),
@@ -75,6 +92,8 @@ _PANELS = {
     "stiffening": "coefficients",
     "corrections": "coefficients",
     "solver": "solver",
+    "obstacle": "obstacles",
+    LIST: "segments",
 }
 """The panel on the left that says what is wrong with a table."""
 
@@ -110,6 +129,7 @@ def build_page(session: Session, pins: str = "", is_dark: bool = False) -> None:
         with ui.element("div").classes(f"softnlp-results border-l {_COLUMN} {_LINE}"):
             with ui.element("div").classes("w-full softnlp-shown") as shown:
                 results = ResultsPanel()
+                tables = FoundTables()
             pinned = PinsPanel(stage, lambda: results.run, pins)
             ui.separator()
             _studies(stage, tabs, chosen)
@@ -127,18 +147,23 @@ def build_page(session: Session, pins: str = "", is_dark: bool = False) -> None:
 
     def found(run: Run) -> None:
         results.show(run)
+        tables.show(run)
         pinned.show(run)
 
     live = LiveView(stage, found, say)
+    stage.plays.append(live.play)
     with exports:
         report_menu(stage, lambda: results.run, lambda: pinned.pins)
         mesh_menu(session, lambda: None if results.run is None else results.run.steps[0].pose)
 
+    draw_obstacles(stage)
+
     def read_again() -> None:
         if session.is_stale or message.text.startswith(_GREY):
             say("")
-        if session.is_stale and session.problem is not None and session.problem.table in _PANELS:
-            panels[_PANELS[session.problem.table]].set_value(True)  # where it is said
+        panel = _panel_of(session)
+        if session.is_stale and panel is not None:
+            panels[panel].set_value(True)  # where it is said
         opened = _TAB_OF.get(session.document.study, SCENARIO)
         if tabs.value != opened and tabs.value != SCENARIO:
             tabs.set_value(opened)
@@ -151,10 +176,19 @@ def build_page(session: Session, pins: str = "", is_dark: bool = False) -> None:
 def stale_words(session: Session) -> str:
     """Return what to say of a picture that is not of what is on the screen: where it is told, or else what is wrong."""
     problem = session.problem
-    table = "" if problem is None else problem.table or ""
-    if problem is None or table in _PANELS:
+    if problem is None or _panel_of(session) is not None:
         return f"{_GREY} See the field marked red."
     return f"{_GREY} {sentence(problem.message)}"
+
+
+def _panel_of(session: Session) -> str | None:
+    """Return the panel on the left that says what is wrong, None for another place; of obstacle.2 that of obstacles."""
+    problem = session.problem
+    if problem is None:
+        return None
+    place = place_of(problem)
+    table = problem.table if place is None else place[1]
+    return None if table is None else _PANELS.get(table.split(".")[0])
 
 
 def awaits_data(session: Session) -> bool:
@@ -184,19 +218,22 @@ def _files(session: Session, dark: ui.dark_mode) -> ui.menu:
 def _panels(session: Session) -> dict[str, ui.expansion]:
     """Build what describes the robot, its silicone, its loads and the equations; return the panels by name."""
     panels = {}
+    part = Part(session)
     for name, label, opened, build in (
-        ("pressures", "Pressures", True, pressure_panel),
-        ("robot", "Robot", True, robot_panel),
-        ("material", "Silicone", False, material_panel),
-        ("loads", "Gravity and tip load", False, loads_panel),
-        ("coefficients", "Coefficients", False, coefficients_panel),
-        ("solver", "Solver", False, solver_panel),
+        ("pressures", "Pressures", True, partial(pressure_panel, session)),
+        ("segments", "Segments", bool(session.rows(LIST)), partial(segments_panel, part)),
+        ("robot", "Robot", True, partial(robot_panel, part)),
+        ("material", "Silicone", False, partial(material_panel, part)),
+        ("loads", "Gravity and tip load", False, partial(loads_panel, session)),
+        ("obstacles", "Obstacles", bool(session.rows("obstacle")), partial(obstacles_panel, session)),
+        ("coefficients", "Coefficients", False, partial(coefficients_panel, session)),
+        ("solver", "Solver", False, partial(solver_panel, session)),
     ):
         panel = ui.expansion(label, value=opened).classes("w-full softnlp-panel")
         panel.props(f"dense header-class=font-semibold data-testid=panel-{name}")
         with panel:
             inside = ui.column().classes("w-full gap-2 pb-3")
-        _when_open(panel, inside, partial(build, session))
+        _when_open(panel, inside, build)
         panels[name] = panel
     return panels
 
@@ -246,6 +283,7 @@ def _studies(stage: Stage, tabs: ui.tabs, chosen: str) -> None:
         if name not in built:
             built.add(name)
             with slots[name]:
+                tab_note(stage.session, study, name)
                 build(stage)
 
     panels.on_value_change(opened)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from softnlp.app.asking import Progress, Stopped
 from softnlp.app.controls import HINT, button, named, plain_words
-from softnlp.app.session import LARGEST_FILE
+from softnlp.app.taken import LARGEST_FILE
 from softnlp.app.theme import darkness, figure_config, figure_layout, figure_text, on_dark
 from softnlp.base.errors import InputError, SoftnlpError
 from softnlp.base.units import BAR

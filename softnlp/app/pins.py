@@ -5,20 +5,21 @@ from __future__ import annotations
 import json
 from base64 import b64decode
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from softnlp.app.history import State, changes
 from softnlp.app.panels.results import Line, step_lines
-from softnlp.app.view.frame import Tube, packed, robot_message, tube_message, tube_of
+from softnlp.app.view.frame import Tube, packed, pieces_message, tube_message, tube_of
 from softnlp.base.errors import InputError
 from softnlp.base.palette import COLOURS
 from softnlp.base.units import BAR
-from softnlp.model.inputs import robot_of_table, robot_table
+from softnlp.model.inputs import robot_of_segments, robot_of_table, robot_table, segment_tables
 from softnlp.model.robot import Robot
-from softnlp.results import Body
+from softnlp.model.segments import SegmentedRobot
+from softnlp.results import body_of_pose
 from softnlp.results.document import csv_text
 from softnlp.statics.step import Run, SectionRadii
 
@@ -55,7 +56,7 @@ class Pin:
     def message(self) -> dict[str, Any]:
         """Return it as the view draws it."""
         look = {"colour": self.colour, "label": self.letter}
-        return {"robot": robot_message(self.robot), "tube": tube_message(self.tube), **look}
+        return {"robot": pieces_message(self.robot), "tube": tube_message(self.tube), **look}
 
     def differs(self, now: State) -> str:
         """Return in words what is different on the screen now."""
@@ -77,7 +78,7 @@ def pin_of(run: Run, state: State, name: str, taken: Sequence[Pin]) -> Pin:
         raise InputError(f"{MOST_PINS} states are pinned; take one away first")
     if pose is None:
         raise InputError("there is no solved pose to pin")
-    tube = tube_of(Body(pose.shape.position, pose.shape.rotation, pose.radii))
+    tube = tube_of(body_of_pose(pose))
     lines = step_lines(run)
     numbers = (*lines.numbers, *lines.chambers)
     return Pin(name or _LETTERS[free[0]], free[0], run.robot, tube, numbers, state)
@@ -126,31 +127,41 @@ def recalled(text: str) -> list[Pin]:
 
 
 def _stored(pin: Pin) -> dict[str, Any]:
-    axis = np.column_stack([pin.tube.position, pin.tube.quaternion])
-    radii = pin.tube.radii
     return {
         "name": pin.name,
         "place": pin.place,
-        "robot": robot_table(pin.robot),
-        "axis": packed(axis, np.float32),
-        "radii": [radii.outer, radii.lumen, radii.chamber_circle, radii.chamber, radii.bore],
+        "robot": segment_tables(pin.robot) if isinstance(pin.robot, SegmentedRobot) else robot_table(pin.robot),
+        "segmented": isinstance(pin.robot, SegmentedRobot),
+        "tube": _stored_tube(pin.tube),
         "numbers": [[line.key, line.label, line.text, line.unit, line.value] for line in pin.numbers],
         "state": {**vars(pin.state)},
     }
 
 
+def _stored_tube(tube: Tube) -> dict[str, Any]:
+    axis = np.column_stack([tube.position, tube.quaternion])
+    radii = [np.asarray(getattr(tube.radii, field.name)).tolist() for field in fields(tube.radii)]
+    return {"axis": packed(axis, np.float32), "radii": radii, "parts": [_stored_tube(part) for part in tube.parts]}
+
+
 def _recalled(table: Mapping[str, Any]) -> Pin:
-    axis = np.frombuffer(b64decode(table["axis"]), "<f4").astype(float).reshape(-1, 7)
     state = dict(table["state"])
     state["pressure"] = tuple(map(float, state["pressure"]))
     place, numbers = int(table["place"]), table["numbers"]
     if not 0 <= place < MOST_PINS:
         raise ValueError(place)
+    robot = robot_of_segments(table["robot"]) if table["segmented"] else robot_of_table(table["robot"])
     return Pin(
         str(table["name"])[:40],
         place,
-        robot_of_table(table["robot"]),
-        Tube(axis[:, :3], axis[:, 3:], SectionRadii(*map(float, table["radii"]))),
+        robot,
+        _recalled_tube(table["tube"]),
         tuple(Line(str(key), str(label), str(text), str(unit), value) for key, label, text, unit, value in numbers),
         State(**state),
     )
+
+
+def _recalled_tube(table: Mapping[str, Any]) -> Tube:
+    axis = np.frombuffer(b64decode(table["axis"]), "<f4").astype(float).reshape(-1, 7)
+    radii: Any = [np.asarray(one, float) if isinstance(one, list) else float(one) for one in table["radii"]]
+    return Tube(axis[:, :3], axis[:, 3:], SectionRadii(*radii), tuple(map(_recalled_tube, table["parts"])))

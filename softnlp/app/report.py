@@ -6,6 +6,8 @@ import asyncio
 import json
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
+from typing import TYPE_CHECKING
 
 from nicegui import ui
 
@@ -17,9 +19,13 @@ from softnlp.app.session import Stage
 from softnlp.base.errors import InputError, SoftnlpError
 from softnlp.figures.section import section_figure
 from softnlp.model.inputs import versions
+from softnlp.model.segments import segments_of
 from softnlp.results import to_json
 from softnlp.results.report_page import Section, report_page
 from softnlp.statics.step import Run
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 NAME = "softnlp_report.html"
 
@@ -38,7 +44,11 @@ async def report_text(stage: Stage, run: Run, pins: Sequence[Pin]) -> str:
     figures: dict[str, bytes] = {}
     with suppress(TimeoutError, RuntimeError):  # a page without a browser has no picture
         figures["The robot"] = await stage.view.picture()
-    makers = {"Section": lambda: section_figure(run.robot)}
+    parts = segments_of(run.robot)
+    makers: dict[str, Callable[[], Figure]] = {
+        f"Section of segment {k + 1}" if len(parts) > 1 else "Section": partial(section_figure, own)
+        for k, (own, _) in enumerate(parts)
+    }
     for title, drawn in stage.figures.items():
         makers |= {f"{title}: {name.replace('_', ' ')}" if name else title: make for name, make in drawn.items()}
     for caption, make in makers.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from base64 import b64decode, b64encode
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
@@ -16,24 +16,22 @@ from numpy.typing import NDArray
 from softnlp.app.document import START, Document
 from softnlp.app.history import State
 from softnlp.app.live import LivePoses
-from softnlp.base.errors import InputError, located
-from softnlp.base.reading import IMPORTED, LARGEST_TOML, one_line, read_bytes, read_text, shown
+from softnlp.app.taken import checked_content, plain_name
+from softnlp.base.errors import InputError
+from softnlp.base.reading import LARGEST_TOML, one_line, read_bytes, read_text, shown
 from softnlp.base.units import BAR
-from softnlp.model.segments import require_one_segment
 from softnlp.scenario.check import SCHEMAS
-from softnlp.scenario.data import require_no_obstacles
 from softnlp.scenario.read import Scenario, load_scenario, placed, scenario_from_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from softnlp.app.view import RobotView
+    from softnlp.statics.step import Step
 
 Array = NDArray[np.float64]
 Listener = Callable[[], None]
 
-LARGEST_FILE = 5_000_000
-"""Bytes of a file that is taken in."""
 _POSES = {"forward", "blocked-force"}  # studies of which the page shows the pose
 _MOST_KEPT = 2_000_000  # characters of files; a browser keeps some five million for a tab
 
@@ -41,27 +39,6 @@ _MOST_KEPT = 2_000_000  # characters of files; a browser keeps some five million
 def _fields(study: str) -> tuple[str, ...]:
     """Return the keys and tables that a scenario of a study may have."""
     return tuple(SCHEMAS[study].model_fields) if study in SCHEMAS else ()
-
-
-def plain_name(name: str) -> str:
-    """Return the name of a file without its folders; raises `InputError` where nothing is left."""
-    plain = PurePath(name.replace("\\", "/")).name
-    if not plain or plain.startswith("."):
-        raise InputError(f"expected a file with a name, got {shown(name)}")
-    return plain
-
-
-def checked_content(name: str, content: bytes) -> bytes:
-    """Return the content of a file; raises `InputError` for one too large, and for a recipe of an import.
-
-    That one names further files. A page reads what was dropped, and not what else the machine of its server has.
-    """
-    if name.endswith(IMPORTED):
-        raise InputError(f"{shown(name)} names further files; take the CSV of the import, or import those files here")
-    if len(content) > LARGEST_FILE:
-        size = len(content) / 1e6
-        raise InputError(f"{shown(name)} has {size:.0f} MB; expected a table of at most {LARGEST_FILE / 1e6:.0f} MB")
-    return content
 
 
 class Session:
@@ -136,17 +113,11 @@ class Session:
                     raise InputError(f"names the file {shown(file)}; open both together", key="file")
                 content = given[file] if file in given else (self.folder / file).read_bytes()
                 (Path(folder) / file).write_bytes(content)
-            found = scenario_from_text(document.text(), Path(folder) / name)
-            require_one_segment(found.robot, "this page")
-            require_no_obstacles(found, "this page")
-            return found
+            return scenario_from_text(document.text(), Path(folder) / name)
 
     def open_path(self, path: Path) -> None:
         """Show the scenario of a file, with the files that it names; raises `InputError` where one cannot be read."""
-        asked = load_scenario(path)  # says the same of a broken file as the commands
-        with located(source=one_line(str(path))):
-            require_one_segment(asked.robot, "this page")
-            require_no_obstacles(asked, "this page")
+        load_scenario(path)  # says the same of a broken file as the commands
         document = Document(read_text(path, LARGEST_TOML))
         files = {}
         for file in document.files():
@@ -178,6 +149,21 @@ class Session:
     def table(self, name: str) -> dict[str, Any]:
         """Return a table of the scenario as plain Python; empty where there is none."""
         return self.document.table(name)
+
+    def rows(self, name: str) -> list[dict[str, Any]]:
+        """Return a list of tables of the scenario, [[name]], as plain Python; empty where there is none."""
+        return self.document.rows(name)
+
+    def put_rows(self, name: str, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Put rows in place of a list of tables where they say something else."""
+        if [dict(row) for row in rows] != self.rows(name):
+            self._use_for(name)
+            self.document.replace_rows(name, rows)
+            self.reread()
+
+    def takes(self, name: str) -> bool:
+        """Whether the study on the screen has a table or a list of tables of a name."""
+        return name in _fields(self.document.study)
 
     def put(self, table: str, values: Mapping[str, object]) -> None:
         """Put these keys in place of a whole table's where they say something else."""
@@ -256,8 +242,8 @@ class Session:
     def text(self) -> str:
         """Return the scenario file of what is on the screen, of `study`."""
         document = Document(self.document.text(self.study))
-        if self.follows_file or not document.table("pressure"):
-            return document.text()
+        if self.follows_file or not document.table("pressure") or self.study == "dynamic":
+            return document.text()  # over time the pose shown is but one of many
         document.replace("pressure", {"sequence_bar": [[float(f"{p / BAR:.12g}") for p in self.pressure]]})
         return document.text()
 
@@ -270,7 +256,7 @@ class Session:
     def left_out(self) -> list[str]:
         """Return the tables of the opened file's study that the file of `text` does not have."""
         written = Document(self.text())
-        return [name for name in _fields(self.opened_study) if self.table(name) and not written.table(name)]
+        return [n for n in _fields(self.opened_study) if self.document.holds(n) and not written.holds(n)]
 
     def kept(self) -> str:
         """Return all that is on the screen as text, for `recall`."""
@@ -384,8 +370,10 @@ class Stage:
     """What panels and tabs of one page share.
 
     session, view : its scenario and its 3-D view. figures : what draws what tabs have found, by title, for reports.
+    plays : what shows a step of a motion in place of the pose of the controls.
     """
 
     session: Session
     view: RobotView
     figures: dict[str, Mapping[str, Callable[[], Figure]]] = field(default_factory=dict)
+    plays: list[Callable[[Scenario, Step], None]] = field(default_factory=list)

@@ -14,7 +14,7 @@ import tomlkit
 from numpy.typing import NDArray
 from tomlkit.items import InlineTable
 
-from softnlp.app.document import Document
+from softnlp.app.inputs import Tables
 from softnlp.app.parts import marks
 from softnlp.app.theme import figure_config, figure_layout, figure_text
 from softnlp.base.errors import InputError
@@ -85,7 +85,7 @@ def form_of(table: Mapping[str, Any]) -> Form:
 
 
 def material_state(
-    document: Document, entries: Mapping[str, MaterialEntry], folder: Path, problem: InputError | None = None
+    document: Tables, entries: Mapping[str, MaterialEntry], folder: Path, problem: InputError | None = None
 ) -> MaterialState:
     """Read the silicone of a document; nothing is raised.
 
@@ -105,7 +105,7 @@ def material_state(
     return MaterialState(form_of(table), material, others, said)
 
 
-def known_silicones(document: Document, folder: Path) -> Mapping[str, MaterialEntry]:
+def known_silicones(document: Tables, folder: Path) -> Mapping[str, MaterialEntry]:
     """Return the silicones of the document's materials file where it names one that can be read, else the library's."""
     file = document.get("material", "file")
     if isinstance(file, str):

@@ -79,8 +79,10 @@ const name = () => {
     around?.removeAttribute("tabindex");
     around?.removeAttribute("role");
   }
-  for (const editor of document.querySelectorAll(".cm-content:not([aria-label])"))
+  for (const editor of document.querySelectorAll(".cm-content:not([aria-label])")) {
     editor.setAttribute("aria-label", "Scenario file");
+    editor.tabIndex = 0;
+  }
 };
 const later = new MutationObserver(() => { waiting ??= setTimeout(name, 150); });
 later.observe(document.body, {childList: true, subtree: true});

@@ -27,7 +27,7 @@ from softnlp.results.dataset import netcdf_bytes
 from softnlp.results.document import json_text, require_run
 from softnlp.results.path import PATH_FILE, path_text
 from softnlp.results.table import table_text
-from softnlp.statics.step import ObstacleContact, Run, SectionRadii
+from softnlp.statics.step import ObstacleContact, Pose, Run, SectionRadii
 from softnlp.studies.fields import (
     AIMED,
     BLOCKED_FORCE,
@@ -78,6 +78,13 @@ def chain_body(position: Array, rotation: Array, radii: Mapping[str, Array], seg
     numbers = range(1, int(segment.max(initial=0)) + 1)
     parts = [Body(position[own], rotation[own], of(own)) for own in (segment == k for k in numbers)]
     return Body(position, rotation, of(slice(None)), tuple(parts))
+
+
+def body_of_pose(pose: Pose) -> Body:
+    """Return the body of a solved pose."""
+    if pose.outline is None:
+        return Body(pose.shape.position, pose.shape.rotation, pose.radii)
+    return chain_body(pose.shape.position, pose.shape.rotation, vars(pose.outline), pose.segment)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,9 +187,7 @@ def view_of_run(run: Run) -> RunView:
         pose, contact = solved_pose(run.steps[k]), run.steps[k].contact
         if prefix and pose is not None:
             pose = None if contact is None else contact.free
-        if pose is None or pose.outline is None:
-            return None if pose is None else Body(pose.shape.position, pose.shape.rotation, pose.radii)
-        return chain_body(pose.shape.position, pose.shape.rotation, vars(pose.outline), pose.segment)
+        return None if pose is None else body_of_pose(pose)
 
     known = {output.name for output in deviation_outputs(run)}
     return _view(

@@ -18,7 +18,8 @@ _OF_WALL = (
     "weight_position_per_mm",
     "weight_sensitivity",
 )
-_FREE = ("k_e", "k_b", "k_a", "k_i", "phi", "k_c")
+NOT_OF_ENERGY = ("k_e", "k_b", "k_a", "k_i", "phi", "k_c")
+"""The constants of an identification that the energy section does not have."""
 _VARIED = ("stiffening.", "corrections.", "contact.chamber_reaction")
 
 
@@ -52,7 +53,7 @@ def misplaced(data: Mapping[str, Any]) -> Iterator[InputError]:
     if contact.get("closure", "none") != "none":
         yield InputError(f"{contact['closure']!r} is {NOT_USED}, which takes 'none'", table="contact", key="closure")
     for key in _listed(data, "measurements", "free"):
-        if key in _FREE:
+        if key in NOT_OF_ENERGY:
             yield InputError(f"{key!r} is {NOT_USED}; c_m is its only coefficient", table="measurements", key="free")
     for key in _varied(data):
         if key.startswith(_VARIED) and key != f"corrections.{FACTOR}":

@@ -6,7 +6,8 @@ from functools import partial
 
 from nicegui import ui
 
-from softnlp.app.controls import HINT, button, choice_field, dashed, number_field, vector_field
+from softnlp.app.controls import HINT, button, choice_field, dashed, number_field, select, vector_field
+from softnlp.app.conventions import Aside, is_energy, turn
 from softnlp.app.session import Session
 from softnlp.model.conventions import COEFFICIENT_SETS
 from softnlp.model.gravity import DIRECTIONS, gravity_named, gravity_words
@@ -55,26 +56,41 @@ def loads_panel(session: Session) -> None:
 
 
 def coefficients_panel(session: Session) -> None:
-    """Build the controls of [stiffening] and [corrections]: coefficients, and how ambiguous equations are read."""
-    sets = list(COEFFICIENT_SETS)
-    choice_field(session, "stiffening", "set", "Set of coefficients", sets, test="stiffening-set")
+    """Build the controls of [stiffening] and [corrections]: coefficients, and how ambiguous equations are read.
+
+    The energy section has one coefficient of its own and none of the others.
+    """
+    aside = Aside()
+    names = {name: _CONVENTIONS[name] for name in ALL_CONVENTIONS}
+    conventions = select(names, "corrections.conventions", "Conventions", test="conventions")
+    conventions.on_value_change(lambda event: turn(session, event.value, aside) if event.value is not None else None)
 
     def of_set(name: str) -> float | None:
         chosen = COEFFICIENT_SETS.get(session.document.get("stiffening", "set", "reproduction"))
         return None if chosen is None else float(getattr(chosen, name))
 
-    for table, key, label, step in _COEFFICIENTS:
-        standard = partial(of_set, key)
-        number_field(session, table, key, label, default=standard, step=step, test=f"{table}-{key}").props("clearable")
-    with ui.row().classes("w-full no-wrap gap-2"):
-        button("No stiffening", None, "no-stiffening", partial(switch_off, session)).tooltip("k_e = k_b = 0")
-        button("Back to the set", None, "coefficients-back", partial(back_to_set, session))
-    conventions = {name: _CONVENTIONS[name] for name in ALL_CONVENTIONS}
-    choice_field(session, "corrections", "conventions", "Conventions", conventions, test="conventions")
-    factor = "c_m, factor of the stress (energy section alone)"
-    number_field(session, "corrections", "modulus_factor", factor, step=0.01, test="corrections-modulus_factor").props(
-        "clearable"
-    )
+    with ui.column().classes("w-full gap-2") as paper:
+        sets = list(COEFFICIENT_SETS)
+        choice_field(session, "stiffening", "set", "Set of coefficients", sets, test="stiffening-set")
+        for table, key, label, step in _COEFFICIENTS:
+            standard = partial(of_set, key)
+            field = number_field(session, table, key, label, default=standard, step=step, test=f"{table}-{key}")
+            field.props("clearable")
+        with ui.row().classes("w-full no-wrap gap-2"):
+            button("No stiffening", None, "no-stiffening", partial(switch_off, session)).tooltip("k_e = k_b = 0")
+            button("Back to the set", None, "coefficients-back", partial(back_to_set, session))
+    factor = "c_m, factor of the stress"
+    own = number_field(session, "corrections", "modulus_factor", factor, step=0.01, test="corrections-modulus_factor")
+    own.props("clearable")
+
+    def refresh() -> None:
+        energy = is_energy(session.document)
+        value = session.document.get("corrections", "conventions", "reproduction")
+        conventions.set_value(value if value in names else None)
+        paper.set_visibility(not energy)
+        own.set_visibility(energy)
+
+    session.follow(refresh)
 
 
 def switch_off(session: Session) -> None:

@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 from nicegui import ui
 
 from softnlp.app import controls, silicone
+from softnlp.app.inputs import Inputs
 from softnlp.app.live_view import PoseStretch
-from softnlp.app.session import Session
 from softnlp.app.theme import Redraw, darkness, on_dark
 from softnlp.model.formula import MAX_LENGTH
 from softnlp.model.laws import LAWS
@@ -23,7 +23,7 @@ _LONGEST_NAME = 40
 _MOST_ROWS = 30
 
 
-def material_panel(session: Session) -> None:
+def material_panel(session: Inputs) -> None:
     """Build the panel in the current slot."""
     _MaterialPanel(session)
 
@@ -31,7 +31,7 @@ def material_panel(session: Session) -> None:
 class _MaterialPanel:
     """The controls of one page; forms that a person left are kept, so that nothing typed is lost."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Inputs) -> None:
         self.session = session
         self.dark = darkness()
         self.stretch = PoseStretch(session)

@@ -296,6 +296,8 @@ def ended_words(run: Run) -> str:
     step = run.steps[0]
     if not step.status.has_solution or step.residual is None:
         return certificate_words(run)
+    if step.time is not None and step.moving is not None:
+        return f"At t = {step.time:.4g} s of the motion."
     if step.status.value != "solved":
         return "No contact: the robot does not reach the wall."
     return "Solved, with warnings." if step.warnings else "Solved."

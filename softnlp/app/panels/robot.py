@@ -12,11 +12,10 @@ from nicegui import ui
 
 from softnlp.app.asking import sentence
 from softnlp.app.controls import BOX, button, dashed, number_field, say_beside, select, tell_problem, typed
-from softnlp.app.document import Document
+from softnlp.app.inputs import Inputs, Tables
 from softnlp.app.live_view import PoseStretch
 from softnlp.app.mending import mending_words, range_words
 from softnlp.app.section_svg import section_svg
-from softnlp.app.session import Session
 from softnlp.app.theme import Redraw
 from softnlp.base.errors import InputError, RobotError
 from softnlp.base.ranges import SIZE
@@ -78,7 +77,7 @@ _RESTING = 1.0 + 1e-9  # below it a section looks as made
 _RED, _ORANGE = "text-xs text-red-700 dark:text-red-300", "text-xs text-orange-800 dark:text-orange-300"
 
 
-def robot_panel(session: Session) -> None:
+def robot_panel(session: Inputs) -> None:
     """Build the panel in the current slot."""
     _RobotPanel(session)
 
@@ -86,7 +85,7 @@ def robot_panel(session: Session) -> None:
 class _RobotPanel:
     """The controls of one page, and what was last said beside them."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Inputs) -> None:
         self.session = session
         self.stretch = PoseStretch(session)
         self.before: dict[str, Any] = {}
@@ -296,7 +295,7 @@ class RobotState:
         return messages
 
 
-def robot_state(document: Document) -> RobotState:
+def robot_state(document: Tables) -> RobotState:
     """Read the robot of a document; nothing is raised."""
     table = document.table("robot")
     allow = table.get("allow")

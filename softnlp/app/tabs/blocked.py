@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from softnlp.app import controls
 from softnlp.app.asking import Progress, bars, run_steps, said, scenario_with
+from softnlp.app.conventions import ENERGY, is_energy
 from softnlp.app.examples import empty_state
 from softnlp.app.parts import Chart, NumberTable, line, study_row
 from softnlp.app.session import Session, Stage
@@ -19,6 +20,7 @@ from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.units import BAR
 from softnlp.figures.style import colour
+from softnlp.model.contact_settings import NO_CLOSURE
 from softnlp.statics.step import Run, Step
 
 Table = dict[str, Any]
@@ -34,6 +36,7 @@ CLOSURES: Mapping[str, str] = {
     "rigid": "chambers keep their free length, an upper bound: forces come out 3 to 5 times high",
     "weighted": "the paper's least squares, to compare with it: the force depends on the weights",
 }
+OF_ENERGY: Mapping[str, str] = {NO_CLOSURE: "the energy alone closes the equations, without a coefficient of the wall"}
 _WEIGHTS = {
     "weight_force_per_N": "Weight of force, W_n [1/N]",
     "weight_moment_per_Nmm": "Weight of moment, W_m [1/(N mm)]",
@@ -62,12 +65,11 @@ def _contact_fields(session: Session) -> None:
         return session.table("contact")
 
     def closure() -> str:
-        return str(table().get("closure", "compliant"))
+        return closure_of(session)
 
     controls.heading("Contact")
     mode = controls.toggle({"blocked": "Blocked by a wall", "constrained": "Chambers held"}, "contact.mode")
-    options = {key: f"{key.capitalize()}: {use}" for key, use in CLOSURES.items()}
-    select = controls.select(options, "contact.closure", "Closure")
+    select = controls.select([], "contact.closure", "Closure")
     good_for = ui.label("").classes(f"{controls.HINT} -mt-2")
     reaction = controls.number_field(
         session,
@@ -96,10 +98,12 @@ def _contact_fields(session: Session) -> None:
     def refresh() -> None:
         held = table().get("mode", "blocked") == "constrained"
         mode.set_value("constrained" if held else "blocked")
-        offered = {key: words for key, words in options.items() if not (held and key == "free")}
+        known = closures_of(session)
+        offered = {k: f"{k.capitalize()}: {use}" for k, use in known.items() if not (held and k == "free")}
         select.set_options(offered, value=closure() if closure() in offered else None)
-        select.props(f'display-value="{closure().capitalize()}"' if closure() in CLOSURES else 'display-value=""')
-        good_for.set_text(CLOSURES.get(closure(), ""))
+        select.props(f'display-value="{closure().capitalize()}"' if closure() in known else 'display-value=""')
+        good_for.set_text(known.get(closure(), ""))
+        mode.set_visibility(held or known is CLOSURES)  # the energy section holds no chambers
         placed = "wall_point_mm" in table() or "wall_normal" in table()
         anywhere.set_value(placed)
         for element, shown in (
@@ -127,7 +131,7 @@ def _contact_fields(session: Session) -> None:
         session.put("contact", new)
 
     def choose_closure(closure: str | None) -> None:
-        if closure is not None:
+        if closure is not None and closure != closure_of(session):
             session.put("contact", with_closure(table(), closure))
 
     def choose_wall(placed: bool) -> None:
@@ -181,7 +185,8 @@ class _Curves:
         asked = scenario_with(self._session, STUDY, tables)
         held = contact.get("mode") == "constrained"
         steps: list[Step] = []
-        self._last = f"{contact.get('closure', 'compliant')}{', held' if held else ''}, {asked.robot.name}", steps
+        closed = ENERGY if is_energy(self._session.document) else contact.get("closure", "compliant")
+        self._last = f"{closed}{', held' if held else ''}, {asked.robot.name}", steps
         return lambda progress: run_steps(asked, progress, steps.append)
 
     def _draw(self) -> None:
@@ -246,6 +251,17 @@ def _target(session: Session) -> None:
     row = study_row("blocked.find", "Find the pressure", asked, finish)
     use = controls.button("Use this pressure", "tune", "blocked.use", lambda: session.set_pressure(found[0].pressure))
     use.set_visibility(False)
+
+
+def closures_of(session: Session) -> Mapping[str, str]:
+    """Return the closures that the conventions on the screen have, with what they are good for."""
+    return OF_ENERGY if is_energy(session.document) else CLOSURES
+
+
+def closure_of(session: Session) -> str:
+    """Return the closure of the scenario."""
+    standard = NO_CLOSURE if is_energy(session.document) else "compliant"
+    return str(session.table("contact").get("closure", standard))
 
 
 def with_closure(table: Table, closure: str) -> Table:

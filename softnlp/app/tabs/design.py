@@ -10,6 +10,7 @@ from typing import Any
 from nicegui import ui
 
 from softnlp.app import controls, wanted
+from softnlp.app.conventions import is_energy
 from softnlp.app.examples import empty_state
 from softnlp.app.panels.robot import effective
 from softnlp.app.session import Session, Stage
@@ -136,7 +137,9 @@ class _Choices(_Rows):
         """Return a range about what the robot has, or the first names of the library."""
         robot, material = self.session.table("robot"), self.session.table("material")
         sizes = {d.file_key: effective(robot, d) for d in DIMENSIONS}
-        return wanted.first_values(key, sizes, material)
+        value = wanted.first_values(key, sizes, material)
+        both = wanted.ends(value)  # a range, which the energy section does not search so far
+        return [*both] if both is not None and is_energy(self.session.document) else value
 
     def build(self, key: str, value: Any) -> None:
         """Build both ends of a range, a list of numbers, or names to tick."""
@@ -154,7 +157,7 @@ class _Choices(_Rows):
                             partial(self._typed_end, key, side))  # fmt: skip
         else:
             self._list(key)
-        if key in wanted.SIZES:
+        if key in wanted.SIZES and not (is_energy(self.session.document) and wanted.ends(value) is None):
             words = "list" if wanted.ends(value) is not None else "range"
             icon = "format_list_numbered" if words == "list" else "swap_horiz"
             other = controls.button(

@@ -12,6 +12,7 @@ from nicegui import ui
 
 from softnlp.app import controls
 from softnlp.app.asking import Progress
+from softnlp.app.conventions import is_energy
 from softnlp.app.examples import empty_state
 from softnlp.app.parts import Chart, NumberTable, csv_drop, downloads, marks, study_row
 from softnlp.app.session import Session, Stage
@@ -25,6 +26,7 @@ from softnlp.figures.style import colour
 from softnlp.model.conventions import Coefficients
 from softnlp.model.materials import Material
 from softnlp.results.identify_document import identified_text, robot_table_text, scenario_tables
+from softnlp.scenario.energy import NOT_OF_ENERGY
 from softnlp.scenario.identify import run_robots
 from softnlp.scenario.read import Scenario
 from softnlp.studies.identified import COEFFICIENTS, Identified, file_name, free_constants
@@ -147,7 +149,7 @@ class _Measurements:
         table, material = self._table(), self._material()
         self._file.set_text(from_files(table))
         self._more.set_visibility(bool(table))
-        choices = free_choices(material)
+        choices = free_choices(material, is_energy(self._session.document))
         self._free.set_options(choices, value=[name for name in self._freed() if name in choices])
         if material is not None:
             self._show_bounds(bounds_of(table, material))
@@ -193,7 +195,7 @@ class _Measurements:
         with of_table(""):
             header = read_columns(session.folder, session.keep(name, content)).header
         others = {key: value for key, value in table.items() if key != "files"}
-        others["free"] = table.get("free") or first_free(header)
+        others["free"] = table.get("free") or (["c_m"] if is_energy(session.document) else first_free(header))
 
         def refused(problem: InputError) -> bool:
             return (problem.table or "").split(".")[0] in ("measurements", "robots")
@@ -269,10 +271,11 @@ class _Identification:
         ui.notify("The scenario has these constants now", position="bottom-right", timeout=2000)
 
 
-def free_choices(material: Material | None) -> dict[str, str]:
-    """Return the constants that may be free, by name, with what they are."""
+def free_choices(material: Material | None, energy: bool = False) -> dict[str, str]:
+    """Return the constants that may be free, by name, with what they are. energy : by the energy section."""
     own = () if material is None else material.law.constants
-    return {**LETTERS, **{c.name: f"{c.name} of {material.law.name}" for c in own if material is not None}}
+    letters = {name: words for name, words in LETTERS.items() if (name in NOT_OF_ENERGY) != energy}
+    return {**letters, **{c.name: f"{c.name} of {material.law.name}" for c in own if material is not None}}
 
 
 def first_free(header: Sequence[str]) -> list[str]:

@@ -27,7 +27,8 @@ from softnlp.app.imports import (
     traces,
 )
 from softnlp.app.parts import Chart, NumberTable, RunRow, while_open
-from softnlp.app.session import LARGEST_FILE, Session
+from softnlp.app.session import Session
+from softnlp.app.taken import LARGEST_FILE
 from softnlp.base.errors import InputError, SoftnlpError
 from softnlp.base.reading import IMPORTED
 from softnlp.laboratory.recipe import recipe_text

@@ -15,8 +15,10 @@ from softnlp.app.session import Stage
 from softnlp.base.errors import InputError
 from softnlp.figures.sensitivity import sensitivity_figure
 from softnlp.model.quantities import Model
+from softnlp.model.segments import SegmentedRobot, require_one_segment
 from softnlp.results.document import document_text
 from softnlp.results.sensitivity import sensitivity_document, table_rows
+from softnlp.scenario.data import require_no_obstacles
 from softnlp.studies.report import SensitivityReport, named_tolerances, sensitivity_report, tolerance_keys
 
 _FIRST = {"length_mm": "0.2", "pressure_bar": "1 %"}
@@ -49,7 +51,9 @@ class _Sensitivity:
 
     def _known(self) -> list[str]:
         scenario = self._session.scenario
-        return [] if scenario is None else list(tolerance_keys(Model(scenario.robot, scenario.material)))
+        if scenario is None or isinstance(scenario.robot, SegmentedRobot):
+            return []
+        return list(tolerance_keys(Model(scenario.robot, scenario.material)))
 
     def _build(self) -> None:
         """Build a row for each tolerance."""
@@ -81,6 +85,8 @@ class _Sensitivity:
         scenario, pressure = self._session.scenario, self._session.pressure.copy()
         if scenario is None or self._session.problem is not None:
             raise self._session.problem or InputError("expected a robot that can be made")
+        require_one_segment(scenario.robot, "a sensitivity")
+        require_no_obstacles(scenario, "a sensitivity")
         samples = self._samples.value
         if samples is None or samples < 0 or samples == 1:
             raise InputError("Draws: expected 0, or at least 2")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from softnlp.app.asking import Progress, Stopped, bars, few_enough, scenario_with
 from softnlp.app.controls import button, heading, named, number, number_field, select, toggle
+from softnlp.app.conventions import is_energy
 from softnlp.app.examples import empty_state
 from softnlp.app.parts import NumberTable, number_text, study_row
 from softnlp.app.session import Session, Stage
@@ -22,6 +23,7 @@ from softnlp.base.errors import InputError, reworded
 from softnlp.base.processes import processors
 from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.figures.space import shown
+from softnlp.model.contact_settings import NO_CLOSURE
 from softnlp.scenario.read import Scenario
 from softnlp.scenario.workspace import plan_of, run_sweep
 from softnlp.sweep.read import Workspace, column_names, export_csv, load_workspace, read_column
@@ -93,7 +95,7 @@ def _source(session: Session) -> None:
             document.sweeps_wall = wanted
             session.use()
             if wanted and not document.table("contact"):
-                document.replace("contact", {"closure": "compliant"})
+                document.replace("contact", {"closure": NO_CLOSURE if is_energy(document) else "compliant"})
             session.reread()
 
     def refresh() -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -19,13 +19,14 @@ from softnlp.figures.mesh import display_mesh, resampled
 from softnlp.figures.mesh.display import STATIONS
 from softnlp.model.gravity import is_hanging
 from softnlp.model.robot import Robot
+from softnlp.model.segments import segments_of
 from softnlp.results import Body
-from softnlp.statics.step import SectionRadii
+from softnlp.statics.step import ObstacleContact, SectionRadii
 from softnlp.statics.wall import Wall
 
 Array = NDArray[np.float64]
 
-Layout = tuple[int, tuple[float, ...]]
+Layout = tuple[tuple[int, tuple[float, ...]], ...]
 
 ARROW = 0.3  # length of every arrow, of L_0; its label says how much
 _ROUND = 1.7  # least size of a moment's arrow, of the radius of the body that it goes round
@@ -36,19 +37,27 @@ _NOTHING = (0.0, 0.0, 0.0)
 class Tube:
     """A body at `STATIONS` stations, lengths in mm.
 
-    position : (K, 3). quaternion : (K, 4) as x, y, z, w, unit. radii : of the section, in mm.
+    position : (K, 3). quaternion : (K, 4) as x, y, z, w, unit. radii : of the section, (K,) each where they are not the
+    same along it. parts : of several segments each by itself, without the connectors between them.
     """
 
     position: Array
     quaternion: Array
     radii: SectionRadii
+    parts: tuple[Tube, ...] = ()
+
+    @property
+    def pieces(self) -> tuple[Tube, ...]:
+        """Its segments, itself where there is one."""
+        return self.parts or (self,)
 
 
 @dataclass(frozen=True, eq=False)
 class Arrow:
     """A load.
 
-    kind : "force", "moment", "wall" or "gravity". start, vector : (3,) [mm]; a moment's arrow turns about its vector.
+    kind : "force", "moment", "wall", "gravity", or "contact 1" of the first obstacle. start, vector : (3,) [mm]; a
+    moment's arrow turns about its vector.
     label : with its size and unit.
     inwards : whether it ends where it acts, so that there is room for the label at its start.
     """
@@ -91,6 +100,7 @@ def frame_of(
     wall: Wall | None = None,
     wall_force: float = 0.0,
     tip_cap: float = 0.0,
+    contacts: Sequence[ObstacleContact] = (),
 ) -> Frame:
     """Return the frame of a shape.
 
@@ -101,6 +111,7 @@ def frame_of(
     tip_force, tip_moment, gravity : as in `softnlp.model.rod.Loads`, world frame [N], [N m], [m/s^2].
     wall : a plane, drawn where the tip is nearest to it. wall_force : how hard it pushes the tip [N].
     tip_cap : L_t, from the tip to where it touches [m].
+    contacts : what obstacles do to the body.
 
     Raises
     ------
@@ -117,7 +128,7 @@ def frame_of(
         tube_of(body),
         bar,
         None if ghost is None else tube_of(ghost),
-        _arrows(robot, body, (tip_force, tip_moment, gravity), contact, push),
+        (*_arrows(robot, body, (tip_force, tip_moment, gravity), contact, push), *_pushes(robot, body, contacts)),
         None if wall is None else ((contact - wall.gap(contact) * wall.normal) / MILLIMETRE, wall.normal),
         tip_cap / MILLIMETRE,
         is_hanging(gravity),
@@ -127,9 +138,12 @@ def frame_of(
 def tube_of(body: Body) -> Tube:
     """Return a body at the stations of the view."""
     at = resampled(body, STATIONS)
-    r = at.radii
-    scaled = (x / MILLIMETRE for x in (r.outer, r.lumen, r.chamber_circle, r.chamber, r.bore))
-    return Tube(at.position / MILLIMETRE, quaternions(at.rotation), SectionRadii(*scaled))
+    chord = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(body.position, axis=0), axis=1)))
+    even = np.linspace(0.0, chord[-1], STATIONS)
+    radii: dict[str, Any] = {field.name: getattr(body.radii, field.name) / MILLIMETRE for field in fields(body.radii)}
+    along = {name: np.interp(even, chord, value) if np.ndim(value) else value for name, value in radii.items()}
+    parts = tuple(tube_of(part) for part in body.parts)
+    return Tube(at.position / MILLIMETRE, quaternions(at.rotation), SectionRadii(**along), parts)
 
 
 def _arrows(
@@ -151,11 +165,30 @@ def _arrows(
         ("wall", push, 1.0, "wall {:.3g} N", contact, True),
     ):
         if vector.any():
-            length = max(ARROW * robot.length, _ROUND * body.radii.outer if kind == "moment" else 0.0)
+            length = max(ARROW * robot.length, _ROUND * float(np.max(body.radii.outer)) if kind == "moment" else 0.0)
             step = length / MILLIMETRE * _unit(vector)
             start = at / MILLIMETRE - (step if inwards else 0)
             found.append(Arrow(kind, start, step, text.format(np.linalg.norm(vector) / unit), inwards))
     return tuple(found)
+
+
+def _pushes(robot: Robot, body: Body, contacts: Sequence[ObstacleContact]) -> list[Arrow]:
+    """Return an arrow for what each obstacle pushes with, which ends on the body where it pushes on the mean."""
+    chord = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(body.position, axis=0), axis=1)))
+    radius = float(np.max(body.radii.outer))
+    found = []
+    for k, contact in enumerate(contacts):
+        size = float(np.linalg.norm(contact.force))
+        if contact.start is None or size == 0:
+            continue
+        weight = np.linalg.norm(contact.forces, axis=1)
+        along = float(weight @ contact.arc / weight.sum()) * chord[-1]
+        axis = np.array([np.interp(along, chord, component) for component in body.position.T])
+        way = contact.force / size
+        step = ARROW * robot.length / MILLIMETRE * way
+        start = (axis - radius * way) / MILLIMETRE - step
+        found.append(Arrow(f"contact {k + 1}", start, step, f"{size:.3g} N", True))
+    return found
 
 
 def _unit(vector: Array) -> Array:
@@ -173,11 +206,18 @@ def quaternions(rotation: Array) -> Array:
 
 def layout_of(robot: Robot) -> Layout:
     """Return what the triangles depend on: sets and chamber angles. Other dimensions come with each frame."""
-    return robot.chambers_per_set, tuple(float(theta) for theta in robot.chamber_angles())
+    return tuple(
+        (own.chambers_per_set, tuple(float(theta) for theta in own.chamber_angles())) for own, _ in segments_of(robot)
+    )
 
 
-def robot_message(robot: Robot) -> dict[str, Any]:
-    """Return the triangles of a robot and what belongs to its sets."""
+def pieces_message(robot: Robot) -> dict[str, Any]:
+    """Return the triangles of each segment of a robot, base first."""
+    return {"pieces": [robot_message(own, before) for own, before in segments_of(robot)], "palette": list(COLOURS)}
+
+
+def robot_message(robot: Robot, before: int = 0) -> dict[str, Any]:
+    """Return the triangles of a robot and what belongs to its sets. before : sets of the segments below it."""
     mesh = display_mesh(robot)
     wide = len(mesh.station) > np.iinfo(np.uint16).max
     index = np.uint32 if wide else np.uint16
@@ -199,7 +239,8 @@ def robot_message(robot: Robot) -> dict[str, Any]:
             }
             for part in mesh.parts
         ],
-        "sets": [{"colour": colour(k), "angle": float(np.angle(z))} for k, z in enumerate(middle)],
+        "sets": [{"colour": colour(before + k), "angle": float(np.angle(z))} for k, z in enumerate(middle)],
+        "before": before,
         "palette": list(COLOURS),
     }
 
@@ -265,9 +306,14 @@ def tube_message(tube: Tube) -> dict[str, Any]:
     r = tube.radii
     return {
         "axis": packed(np.column_stack([tube.position, tube.quaternion]), np.float32),
-        "circle": round(r.chamber_circle, 5),
-        "radii": [round(x, 5) for x in (r.outer, r.lumen, r.bore)],
+        "circle": _short(r.chamber_circle),
+        "radii": [_short(x) for x in (r.outer, r.lumen, r.bore)],
+        "parts": [tube_message(part) for part in tube.parts],
     }
+
+
+def _short(radius: Any) -> Any:
+    return np.round(radius, 5).tolist() if np.ndim(radius) else round(float(radius), 5)
 
 
 def _rounded(vector: NDArray[np.float64], digits: int = 3) -> list[float]:

@@ -3,7 +3,8 @@ import { Stage } from "softnlp-view";
 
 export default {
   template: `<div class="softnlp-view" role="application" aria-roledescription="3-D view" tabindex="0"
-    aria-label="The robot. Arrow keys turn the view, plus and minus zoom, Home goes back to the first view." @keydown="key" style="position:relative;overflow:hidden;min-height:12rem;touch-action:none"></div>`,
+    aria-label="The robot. Arrow keys turn the view, plus and minus zoom, Home goes back to the first view. O chooses an obstacle, Shift and the arrow keys move it." @keydown="key" style="position:relative;overflow:hidden;min-height:12rem;touch-action:none">
+    <span role="status" style="position:absolute;width:1px;height:1px;overflow:hidden;clip-path:inset(50%)"></span></div>`,
 
   mounted() {
     try {
@@ -28,8 +29,21 @@ export default {
 
   methods: {
     key(event) {
+      const words = !event.ctrlKey && !event.metaKey && !event.altKey && this.moves(event);
+      if (words) {
+        event.preventDefault();
+        this.$el.querySelector("[role=status]").textContent = words;
+        return;
+      }
       if (event.ctrlKey || event.metaKey || event.altKey || !this.stage?.key(event.key)) return;
       event.preventDefault();
+    },
+    moves({ key, shiftKey }) {
+      if (key === "o" || key === "O") return this.stage?.nudge("next");
+      return shiftKey && key.startsWith("Arrow") && this.stage?.nudge(key);
+    },
+    obstacles(message) {
+      this.stage?.setObstacles(message?.obstacles ?? []);
     },
     robot(message) {
       this.stage?.setRobot(message);

@@ -11,7 +11,7 @@ from nicegui.element import Element
 from nicegui.events import GenericEventArguments
 from numpy.typing import NDArray
 
-from softnlp.app.view.frame import Frame, Layout, cloud_message, frame_message, layout_of, robot_message
+from softnlp.app.view.frame import Frame, Layout, cloud_message, frame_message, layout_of, pieces_message
 from softnlp.base.units import BAR
 
 Point = tuple[float, float, float]
@@ -36,6 +36,8 @@ class RobotView(Element, component="robot_view.js", esm={"softnlp-view": "js"}):
         self._marks: dict[str, Any] = {}
         self._pickers: list[Callable[[GenericEventArguments], Any]] = []
         self.on("ready", self._begin)
+        self._movers: list[Callable[[int, Point, bool], Any]] = []
+        self.on("moved", self._moved)
         self.on("pick", self._picked)  # now: a listener that comes later has the browser make the view anew
 
     def show(self, frame: Frame) -> int:
@@ -76,6 +78,14 @@ class RobotView(Element, component="robot_view.js", esm={"softnlp-view": "js"}):
         """Show other bodies as ghosts with a letter at the tip, each a message of its robot, tube, colour and label."""
         self._mark("pins", {"pins": list(messages)})
 
+    def obstacles(self, messages: Sequence[dict[str, Any]]) -> None:
+        """Show obstacles, each a message of `obstacle_message`."""
+        self._mark("obstacles", {"obstacles": list(messages)})
+
+    def on_moved(self, handler: Callable[[int, Point, bool], Any]) -> None:
+        """Call a handler as an obstacle is dragged or moved by keys: number from 0, how far [mm], if that is all."""
+        self._movers.append(handler)
+
     def on_pick(self, handler: Callable[[Point], Any]) -> None:
         """Call a handler with (x, y, z) [mm] when the view is clicked, not dragged.
 
@@ -109,6 +119,10 @@ class RobotView(Element, component="robot_view.js", esm={"softnlp-view": "js"}):
         """Have the browser save the picture under a name."""
         self._call("download", name)
 
+    def _moved(self, event: GenericEventArguments) -> None:
+        for tell in self._movers:
+            tell(int(event.args["number"]), _vector(event, "by"), bool(event.args["done"]))
+
     def _picked(self, event: GenericEventArguments) -> None:
         for tell in self._pickers:
             tell(event)
@@ -128,7 +142,7 @@ class RobotView(Element, component="robot_view.js", esm={"softnlp-view": "js"}):
             return
         layout = layout_of(frame.robot)
         if layout != self._layout:
-            self._call("robot", robot_message(frame.robot))
+            self._call("robot", pieces_message(frame.robot))
             self._layout = layout
         self._call("show", frame_message(frame, self._number, self._full_bar))
 

@@ -52,10 +52,94 @@ export function readRobot(message) {
   };
   const Index = message.wide ? Uint32Array : Uint16Array;
   const parts = message.parts.map((part) => ({ ...part, faces: unpack(part.faces, Index) }));
-  return { mesh, parts, sets: message.sets };
+  return { mesh, parts, sets: message.sets, before: message.before ?? 0 };
 }
 
-export class Body {
+// A tube with its parts, of several segments, each with its own axis.
+export function readTube(message) {
+  if (message === null) return null;
+  return { ...message, axis: unpack(message.axis, Float32Array), parts: (message.parts ?? []).map(readTube) };
+}
+
+// The tube of one piece of a body: its part, or the whole of a body of one.
+const pieceOf = (tube, k) => (tube === null ? null : (tube.parts[k] ?? tube));
+
+// Bodies one behind the other, each a robot of its own; what joins them is drawn as rods.
+class Pieces {
+  constructor(made) {
+    this.pieces = made;
+    this.group = new THREE.Group();
+    for (const piece of made) this.group.add(piece.group);
+  }
+
+  paint(theme) {
+    for (const piece of this.pieces) piece.paint(theme);
+  }
+
+  dispose() {
+    this.group.removeFromParent();
+    for (const piece of this.pieces) piece.dispose();
+  }
+}
+
+export class Bodies extends Pieces {
+  constructor(robots, theme) {
+    super(robots.map((robot) => new Body(robot, theme)));
+    this.rods = robots.map(() => new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 24), new THREE.MeshPhongMaterial()));
+    this.group.add(...this.rods);
+    this.paint(theme);
+  }
+
+  update(tube, level) {
+    this.pieces.forEach((piece, k) => {
+      const { before, sets } = piece.robot;
+      piece.update(pieceOf(tube, k), level.slice(before, before + sets.length));
+    });
+    this.rods.forEach((rod, k) => this.join(rod, tube, k));
+  }
+
+  // A connector, from the end of a part to the next one, or to the tip.
+  join(rod, tube, k) {
+    const part = tube.parts[k];
+    rod.visible = part !== undefined;
+    if (!rod.visible) return;
+    const from = new THREE.Vector3(...part.axis.subarray(-7, -4));
+    const end = tube.parts[k + 1];
+    const to = new THREE.Vector3(...(end ? end.axis.subarray(0, 3) : tube.axis.subarray(-7, -4)));
+    const way = to.clone().sub(from);
+    const outer = part.radii[0];
+    const radius = 0.35 * (typeof outer === "number" ? outer : outer[outer.length - 1]);
+    rod.visible = way.length() > 1e-3;
+    rod.position.copy(from).addScaledVector(way, 0.5);
+    rod.scale.set(radius, way.length(), radius);
+    rod.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), way.normalize());
+  }
+
+  paint(theme) {
+    super.paint(theme);
+    for (const rod of this.rods ?? []) rod.material.color.set(theme.plate);
+  }
+
+  dispose() {
+    super.dispose();
+    for (const rod of this.rods) {
+      rod.geometry.dispose();
+      rod.material.dispose();
+    }
+  }
+}
+
+export class Ghosts extends Pieces {
+  constructor(robots, theme, colour = null) {
+    super(robots.map((robot) => new Ghost(robot, theme, colour)));
+  }
+
+  update(tube) {
+    this.pieces.forEach((piece, k) => piece.update(pieceOf(tube, k)));
+  }
+}
+
+class Body {
   constructor(robot, theme) {
     this.robot = robot;
     this.group = new THREE.Group();
@@ -133,7 +217,7 @@ export class Body {
 }
 
 // Another shape: the outer surface of a robot alone, faint. colour: its own, or that of the theme.
-export class Ghost {
+class Ghost {
   constructor(robot, theme, colour = null) {
     this.robot = robot;
     this.colour = colour;

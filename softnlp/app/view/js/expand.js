@@ -1,14 +1,16 @@
 // From an axis to vertices: p + R (c r_cp + a r) in millimetres, the line that softnlp/mesh/display.py is written around.
 
-// mesh: station, centre, around, radius, normal as unpacked. tube: { axis (p, q at each station), circle, radii }.
+// mesh: station, centre, around, radius, normal as unpacked. tube: { axis (p, q at each station), circle, radii }, of which
+// the last two are numbers, or one for each station.
 export function expand(mesh, tube, position, normal) {
   const { station, centre, around, radius } = mesh;
   const frames = stationFrames(tube.axis);
-  const circle = tube.circle;
+  const along = (values, at) => (typeof values === "number" ? values : values[at]);
   const scale = 1 / 127;
   for (let v = 0, i = 0, j = 0; v < station.length; v++, i += 3, j += 2) {
     const f = 12 * station[v];
-    const r = tube.radii[radius[v]];
+    const r = along(tube.radii[radius[v]], station[v]);
+    const circle = along(tube.circle, station[v]);
     const x = centre[j] * circle + around[j] * r;
     const y = centre[j + 1] * circle + around[j + 1] * r;
     for (let k = 0; k < 3; k++) position[i + k] = frames[f + k] + frames[f + 3 + k] * x + frames[f + 6 + k] * y;

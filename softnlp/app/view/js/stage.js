@@ -1,13 +1,13 @@
 // The scene, its camera, and when it is drawn: once for each change, on the browser's next animation frame.
 import { OrbitControls, THREE } from "nicegui-scene";
 import { Arrows, TipFrame } from "./arrows.js";
-import { Body, Ghost, readRobot } from "./body.js";
+import { Bodies, Ghosts, readRobot, readTube } from "./body.js";
 import { stationFrames } from "./expand.js";
 import { Label, spread } from "./label.js";
 import { Marks } from "./marks.js";
+import { Obstacles } from "./obstacles.js";
 import { Surroundings } from "./surroundings.js";
 import { followTheme } from "./theme.js";
-import { unpack } from "./unpack.js";
 
 const FIELD = 28; // of view [deg]
 const AZIMUTH = -60;
@@ -28,10 +28,6 @@ function drawnInSoftware() {
   const name = known ? gl.getParameter(known.UNMASKED_RENDERER_WEBGL) : "";
   gl?.getExtension("WEBGL_lose_context")?.loseContext();
   return /swiftshader|llvmpipe|software|basic render/i.test(name);
-}
-
-function readTube(message) {
-  return message === null ? null : { ...message, axis: unpack(message.axis, Float32Array) };
 }
 
 export class Stage {
@@ -57,7 +53,9 @@ export class Stage {
     this.tipFrame = new TipFrame(this.labels);
     this.tipFrame.group.visible = false;
     this.marks = new Marks(() => this.request());
+    this.obstacles = new Obstacles(this.labels, (moved) => this.emit("moved", moved));
     this.scene.add(this.surroundings.group, this.arrows.group, this.tipFrame.group, this.marks.group);
+    this.scene.add(this.obstacles.group);
     this.followed = followTheme((theme) => this.paint(theme));
     this.paint(this.followed.theme);
     this.listen(canvas);
@@ -79,10 +77,11 @@ export class Stage {
   setRobot(message) {
     this.body?.dispose();
     this.ghost?.dispose();
-    this.robot = readRobot(message);
+    const pieces = message.pieces.map(readRobot);
+    this.robot = pieces[0];
     this.palette = message.palette;
-    this.body = new Body(this.robot, this.theme);
-    this.ghost = new Ghost(this.robot, this.theme);
+    this.body = new Bodies(pieces, this.theme);
+    this.ghost = new Ghosts(pieces, this.theme);
     this.scene.add(this.body.group, this.ghost.group);
   }
 
@@ -95,7 +94,7 @@ export class Stage {
     }
     this.pins = messages.map((message) => {
       const tube = readTube(message.tube);
-      const ghost = new Ghost(readRobot(message.robot), this.theme, message.colour);
+      const ghost = new Ghosts(message.robot.pieces.map(readRobot), this.theme, message.colour);
       ghost.update(tube);
       const label = new Label({ size: 15, weight: 700, inFront: true, rank: 1 });
       label.write(message.label, this.theme.ink, this.theme.halo);
@@ -107,6 +106,30 @@ export class Stage {
     });
     this.rescale();
     this.request();
+  }
+
+  setObstacles(message) {
+    this.obstacles.set(message, this.theme);
+    this.rescale();
+    this.request();
+  }
+
+  // Choose an obstacle, or move the chosen one in the plane of the picture [mm]; what is chosen in words, false for none.
+  nudge(name) {
+    if (name === "next") {
+      const words = this.obstacles.next();
+      this.obstacles.paint(this.theme);
+      this.request();
+      return words;
+    }
+    const turns = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+    const { chosen } = this.obstacles;
+    if (turns[name] === undefined || chosen < 0) return false;
+    const across = new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, 0);
+    const up = new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, 1);
+    const by = across.multiplyScalar(turns[name][0]).addScaledVector(up, turns[name][1]);
+    this.emit("moved", { number: chosen, by: by.toArray(), done: true });
+    return this.obstacles.made[chosen].name;
   }
 
   // Only kept here: of several that come before the next animation frame the last is drawn, and the tip of each.
@@ -196,6 +219,7 @@ export class Stage {
       label.write(text, theme.ink, theme.halo);
     }
     this.marks.paint(theme);
+    this.obstacles.paint(theme);
     if (this.frame !== undefined) this.next ??= this.frame;
     this.request();
   }
@@ -257,28 +281,49 @@ export class Stage {
     let start = null;
     canvas.addEventListener("pointerdown", (event) => {
       start = event.button === 0 ? [event.clientX, event.clientY] : null;
+      if (start === null || !this.obstacles.take(this.caster(event), this.camera)) return;
+      this.controls.enabled = false;
+      canvas.setPointerCapture(event.pointerId);
+      this.obstacles.paint(this.theme);
+      this.request();
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      if (this.obstacles.drag === null) return;
+      const far = Math.hypot(event.clientX - start[0], event.clientY - start[1]) > CLICK;
+      if (!far && !this.obstacles.drag.moved) return;
+      this.obstacles.pull(this.caster(event));
+      this.request();
+    });
+    canvas.addEventListener("pointercancel", () => {
+      this.obstacles.drop();
+      this.controls.enabled = true;
     });
     canvas.addEventListener("pointerup", (event) => {
+      this.controls.enabled = true;
+      if (this.obstacles.drop()) return;
       if (start === null || Math.hypot(event.clientX - start[0], event.clientY - start[1]) > CLICK) return;
-      const box = canvas.getBoundingClientRect();
-      const picked = this.pick(
-        (2 * (event.clientX - box.left)) / box.width - 1,
-        1 - (2 * (event.clientY - box.top)) / box.height,
-      );
+      const picked = this.pick(this.caster(event));
       if (picked !== null) this.emit("pick", picked);
     });
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     canvas.addEventListener("webglcontextrestored", () => this.request());
   }
 
-  // Screen coordinates from -1 to 1 to a point on the plane through the robot that faces the viewer, and the line of sight.
-  pick(x, y) {
+  // The line of sight through a pointer.
+  caster(event) {
+    const box = this.renderer.domElement.getBoundingClientRect();
+    const at = [(2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height];
+    const caster = new THREE.Raycaster();
+    caster.setFromCamera(new THREE.Vector2(...at), this.camera);
+    return caster;
+  }
+
+  // A line of sight to a point on the plane through the robot that faces the viewer, and the line of sight.
+  pick(caster) {
     const towards = this.camera.getWorldDirection(new THREE.Vector3());
     const steep = Math.abs(towards.z) > Math.sin(radians(STEEP));
     const normal = steep ? new THREE.Vector3(0, 0, 1) : new THREE.Vector3(towards.x, towards.y, 0).normalize();
     const through = new THREE.Vector3(0, 0, steep ? (this.tip?.[2] ?? 0) : 0);
-    const caster = new THREE.Raycaster();
-    caster.setFromCamera(new THREE.Vector2(x, y), this.camera);
     const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(normal, through);
     const point = caster.ray.intersectPlane(plane, new THREE.Vector3());
     if (point === null) return null;
@@ -296,6 +341,7 @@ export class Stage {
     this.body?.dispose();
     this.ghost?.dispose();
     this.setPins([]);
+    this.obstacles.clear();
     for (const label of this.labels) label.dispose();
     this.renderer.dispose();
     this.renderer.forceContextLoss(); // a browser has few of them

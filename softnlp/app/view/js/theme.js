@@ -10,6 +10,8 @@ export const LIGHT = {
   rim: "#6d6a64",
   idle: "#f2f2f2",
   ghost: "#8d95a1",
+  obstacle: "#2f7fb8",
+  chosen: "#b4530a",
   halo: "rgba(246,247,249,0.85)",
 };
 export const DARK = {
@@ -23,6 +25,8 @@ export const DARK = {
   rim: "#f1ede4",
   idle: "#3a3f46",
   ghost: "#98a2af",
+  obstacle: "#56b4e9",
+  chosen: "#f0a35e",
   halo: "rgba(20,23,27,0.85)",
 };
 
