@@ -16,7 +16,18 @@ pytestmark = [
     pytest.mark.thorough,
     pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine"),
 ]
-TABS = ("kinematics", "blocked", "workspace", "inverse", "identify", "design", "compare", "sensitivity", "scenario")
+TABS = (
+    "kinematics",
+    "blocked",
+    "workspace",
+    "inverse",
+    "identify",
+    "design",
+    "compare",
+    "sensitivity",
+    "mould",
+    "scenario",
+)
 PANELS = ("material", "loads", "coefficients", "solver")
 AXE = """async whole => {
   const asked = {runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa']};

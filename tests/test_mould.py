@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 from io import BytesIO
 from math import hypot, pi
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,10 +22,10 @@ from softnlp.model.body import LinesName, Segment
 from softnlp.model.materials import material
 from softnlp.model.robot import ROBOTS, Robot, robot
 from softnlp.model.segments import segmented_robot
-from softnlp.mould import Moulds, MouldTable, bill, checks_of, moulds
+from softnlp.mould import Moulds, MouldTable, Part, SegmentMould, bill, checks_of, moulds
 from softnlp.mould.checks import failed, overlap, surface_distance, thinnest
 from softnlp.mould.picture import Drawn, camera, picture
-from softnlp.mould.plates import vent_angles
+from softnlp.mould.plates import tie_places, vent_angles
 from softnlp.mould.shape import shapes_of
 from softnlp.mould.sizes import settled
 from softnlp.mould.solids import bounds, box, cylinder
@@ -124,17 +126,127 @@ def test_a_core_that_is_caught_is_found() -> None:
     assert (straight ^ core.thread).volume() > 0.01
 
 
+def read_back(part: Part, suffix: str = "stl") -> Any:
+    content = stl(part) if suffix == "stl" else three_mf(part)
+    return trimesh.load(BytesIO(content), file_type=suffix, force="mesh")
+
+
 @pytest.mark.parametrize("suffix", ["stl", "3mf"])
-def test_files_are_read_back_in_millimetres(suffix: str) -> None:
+def test_files_of_D25L60_are_read_back_in_millimetres(suffix: str) -> None:
+    """Every part with the settings of the package; sizes that the robot has are written out here."""
     pytest.importorskip("lxml" if suffix == "3mf" else "trimesh")
-    for part in made("D25L40").parts:
-        content = stl(part) if suffix == "stl" else three_mf(part)
-        read = trimesh.load(BytesIO(content), file_type=suffix, force="mesh")
+    found = made("D25L60", thread_pitch_mm=1.0)
+    sides = {
+        "lumen-rod": (9.0, 9.0, None),  # the lumen's diameter
+        "liner-rod": (4.5, 4.5, None),  # of the bores
+        "shell-1": (68.0, None, None),  # L_0 and 4 mm at either end, lying
+        "shell-2": (68.0, None, None),
+        "cap-tip": (31.0, 31.0, 18.0),  # D_r and 3 mm around it; floor 3, cap 5, guide 10
+    }
+    for part in found.parts:
+        read = read_back(part, suffix)
+        for got, wanted in zip(read.extents, sides.get(part.name, (None,) * 3), strict=True):
+            assert wanted is None or got == pytest.approx(wanted, abs=6e-3), part.name
         low, high = bounds(part.printed)
         assert np.allclose(read.extents, high - low, atol=1e-3), part.name
         assert read.is_volume
         assert read.volume == pytest.approx(part.solid.volume(), rel=1e-4)
         assert read.bounds[0, 2] == pytest.approx(0, abs=1e-6)
+
+
+def radii(part: Part, low: float, high: float, axis: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
+    """Return the distances of a read part's corners between two heights, assembled, from an upright axis [mm]."""
+    read = read_back(replace(part, down=(0.0, 0.0, -1.0)))  # standing as it is assembled
+    (x, y, _), lowest = bounds(part.solid).mean(axis=0), bounds(part.solid)[0, 2]
+    at = np.add(read.vertices, (x, y, lowest))
+    chosen = at[(at[:, 2] > low) & (at[:, 2] < high)]
+    return np.hypot(chosen[:, 0] - axis[0], chosen[:, 1] - axis[1])
+
+
+@pytest.mark.parametrize("c", [0.05, 0.1, 0.2])
+def test_clearances_are_in_the_written_files(c: float) -> None:
+    """Between lumen rod and base plate, plate and shell, tie rods' plates and shell: c in radius, in the STL."""
+    found = chosen("D25L40", clearance_mm=c)
+    parts = {part.name: part for part in found.parts}
+    foot = radii(parts["lumen-rod"], -9.0, -0.5).max()
+    plate = radii(parts["base-1"], -0.01, 0.01)
+    assert plate.min() - foot == pytest.approx(c, abs=2e-3)
+    recess = radii(parts["shell-1"], -4.01, -3.99)
+    assert recess.min() - plate.max() == pytest.approx(c, abs=6e-3)
+
+
+def test_draft_is_in_the_written_files() -> None:
+    """Keys widen upwards by their draft on both sides, where there is room; without draft they do not."""
+    for draft in (0.0, 0.3):
+        key = next(part for part in chosen("D25L40", draft_deg=draft).parts if part.name == "core-key")
+        at = read_back(replace(key, down=(0.0, 0.0, -1.0))).vertices
+        height = np.ptp(at[:, 2])
+        low, high = (np.ptp(at[np.abs(at[:, 2] - z) < 0.01][:, 1]) for z in (0.0, height))
+        assert high - low == pytest.approx(2 * height * np.tan(np.radians(draft)), abs=2e-3)
+
+
+def test_shrinkage_is_in_the_written_files() -> None:
+    """Rods, shells and what they enclose are larger by 1/(1 - 0.02); clearances, walls and screws are not."""
+    plain, larger = chosen("D25L40"), chosen("D25L40", shrinkage_percent=2.0)
+    one, other = ({part.name: read_back(part).extents for part in m.parts} for m in (plain, larger))
+    assert other["lumen-rod"][0] / one["lumen-rod"][0] == pytest.approx(1 / 0.98, rel=1e-4)
+    assert other["liner-rod"][0] / one["liner-rod"][0] == pytest.approx(1 / 0.98, rel=1e-4)
+    assert other["shell-1"][0] - one["shell-1"][0] == pytest.approx(40 / 0.98 - 40, abs=1e-3)
+    volumes = [m.segments[0].cast.volume() for m in (plain, larger)]
+    assert volumes[1] / volumes[0] == pytest.approx(0.98**-3, rel=1e-4)
+
+
+def side(k: int) -> Callable[[SegmentMould, Part], float]:
+    return lambda mould, part: float(read_back(part).extents[k])
+
+
+def volume(mould: SegmentMould, part: Part) -> float:
+    return part.solid.volume()
+
+
+def tube_pin(mould: SegmentMould, part: Part) -> float:
+    theta = float(robot("D25L40").chamber_angles()[0])
+    return radii(part, 3.9, 4.1, (8.5 * np.cos(theta), 8.5 * np.sin(theta))).min()
+
+
+def tie_hole(mould: SegmentMould, part: Part) -> float:
+    return radii(part, -20.0, 0.0, tie_places(mould.sizes)[0]).min()
+
+
+def lumen_foot(mould: SegmentMould, part: Part) -> float:
+    return radii(part, -9.0, -0.5).max()
+
+
+EFFECTS: list[tuple[str, float, str, Callable[[SegmentMould, Part], float], float | None]] = [
+    ("wall_mm", 4.0, "shell-1", side(2), 1.0),
+    ("flange_mm", 15.0, "shell-1", side(1), 6.0),
+    ("plate_mm", 7.0, "base-1", side(2), 2.0),
+    ("cap_mm", 6.5, "cap-tip", side(2), 1.5),
+    ("tube_mm", 1.4, "cap-base", tube_pin, -0.3),
+    ("screw_mm", 4.0, "base-1", tie_hole, 0.5),
+    ("shoulder_mm", 0.5, "lumen-rod", lumen_foot, -0.3),
+    ("gate_mm", 3.0, "shell-1", volume, None),
+    ("vent_mm", 1.6, "top-1", volume, None),
+    ("flange_thickness_mm", 6.0, "shell-1", volume, None),
+    ("thread_diameter_mm", 0.3, "core-side-a", volume, None),
+    ("thread_pitch_mm", 5.0, "core-side-a", volume, None),
+    ("groove_depth_mm", 0.15, "core-side-a", volume, None),
+]
+"""A key, another value, the part and what of it changes, and by how much where that is known."""
+
+
+@pytest.mark.parametrize(("key", "value", "name", "measure", "more"), EFFECTS)
+def test_every_size_does_what_it_says(
+    key: str, value: float, name: str, measure: Callable[[SegmentMould, Part], float], more: float | None
+) -> None:
+    before, after = (
+        measure(m.segments[0], next(part for part in m.parts if part.name == name))
+        for m in (made("D25L40"), chosen("D25L40", **{key: value}))
+    )
+    if more is None:
+        assert abs(after - before) > 1e-3
+    else:
+        assert after - before == pytest.approx(more, abs=6e-3)
 
 
 def test_the_assembly_is_one_coloured_glb() -> None:
@@ -157,6 +269,13 @@ REFUSED = [
     ("D25L40", {"bed_mm": [50.0, 50.0, 50.0]}, "bed_mm", "do not fit"),
     ("D25L40", {"wall_mm": 0.5}, "wall_mm", "less than minimum_wall_mm"),
     ("D25L40", {"flange_mm": 4.0}, "flange_mm", "no room for screws"),
+    ("D25L40", {"plate_mm": 0.2}, "plate_mm", "less than minimum_wall_mm"),
+    ("D25L40", {"flange_thickness_mm": 0.3}, "flange_thickness_mm", "less than minimum_wall_mm"),
+    ("D25L40", {"thread_pitch_mm": 25.0}, "thread_pitch_mm", "leaves no turn"),
+    ("D25L40", {"thread_pitch_mm": 0.1, "groove_depth_mm": 0.0}, "thread_pitch_mm", "not more than the thread's"),
+    ("D25L40", {"tube_mm": 6.0}, "tube_mm", "wider than the bores"),
+    ("D25L40", {"plate_mm": 300.0}, "bed_mm", "do not fit"),
+    ("D25L40", {"clearance_mm": 3.0}, "shoulder_mm", "thinner than nothing"),
 ]
 
 
@@ -315,6 +434,75 @@ def test_a_finished_design_is_made(tmp_path: Path, capsys: pytest.CaptureFixture
     (tmp_path / "best.toml").write_text(SCENARIO + "gate_mm = 5.0\n")
     assert main(["mould", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
     assert "best.toml: [mould] gate_mm" in capsys.readouterr().err
+
+
+DESIGN = """title = "length"
+study = "design"
+[robot]
+name = "laparoscope-3"
+[material]
+name = "Ecoflex 00-50"
+model = "mooney-rivlin"
+[choices]
+robot.length_mm = [40.0, 45.0]
+[actuation]
+sets = [1]
+pressure_bar = 0.3
+[requirements]
+{limit}
+[objective]
+maximise = "bending_angle_deg"
+[mould]
+thread_pitch_mm = 8.0
+"""
+
+
+def design_file(folder: Path, limit: str = "") -> Path:
+    path = folder / "length.toml"
+    path.write_text(DESIGN.format(limit=limit))
+    return path
+
+
+def shell_height(folder: Path, name: str) -> float:
+    return float(trimesh.load(folder / f"{name}-shell-1.stl").extents[0])
+
+
+@pytest.mark.thorough
+def test_the_best_of_a_design_study_s_folder_is_made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The longer of two robots bends more: the study says so, and the moulds of its folder are of that one."""
+    study, out = tmp_path / "study", tmp_path / "out"
+    assert main(["design", str(design_file(tmp_path)), "--out", str(study)]) == 0
+    best = json.loads((study / "design.json").read_text())["best"]
+    assert best["robot"]["length_mm"] == 45.0
+    assert main(["mould", str(study), "--out", str(out)]) == 0
+    assert shell_height(out, "study") == pytest.approx(45.0 + 8.0, abs=1e-3)
+    kept = json.loads((out / "study-bill.json").read_text())
+    assert kept["settings"]["thread_pitch_mm"] == 8.0  # the design's own [mould]
+    assert "45 mm" in kept["title"]
+    assert "laparoscope-3" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_design_is_found_and_made_in_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, out = design_file(tmp_path, "tip_x_mm = { at_least = -100.0 }"), tmp_path / "out"
+    assert main(["mould", str(path), "--design", "--out", str(out)]) == 0
+    assert shell_height(out, "length") == pytest.approx(45.0 + 8.0, abs=1e-3)
+    assert "checks hold" in capsys.readouterr().out
+
+
+def test_a_design_without_a_feasible_candidate_writes_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, out = design_file(tmp_path, "bending_angle_deg = { at_least = 179.0 }"), tmp_path / "out"
+    assert main(["mould", str(path), "--design", "--out", str(out)]) == 3
+    assert "no feasible candidate" in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_design_asks_for_a_design_study(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["mould", str(scenario_file(tmp_path)), "--design", "--out", str(tmp_path / "out")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "study: --design takes 'design', got 'forward'" in line
 
 
 EVERY = {**{name: partial(robot, name) for name in ROBOTS}, "taper": taper, "two segments": two_segments}

@@ -32,7 +32,7 @@ from softnlp.statics.step import Run
 
 
 def _design(stage: Stage) -> None:
-    from softnlp.app.tabs.design import design_tab  # these three when they are opened: the page is there sooner
+    from softnlp.app.tabs.design import design_tab  # these four when they are opened: the page is there sooner
 
     design_tab(stage)
 
@@ -49,6 +49,12 @@ def _sensitivity(stage: Stage) -> None:
     sensitivity_tab(stage)
 
 
+def _mould(stage: Stage) -> None:
+    from softnlp.app.tabs.mould import mould_tab
+
+    mould_tab(stage)
+
+
 STUDIES: dict[str, tuple[str, str | None, Callable[[Stage], None]]] = {
     "kinematics": ("Kinematics", "forward", sequence_tab),
     "blocked": ("Blocked force", "blocked-force", blocked_tab),
@@ -58,6 +64,7 @@ STUDIES: dict[str, tuple[str, str | None, Callable[[Stage], None]]] = {
     "design": ("Design", "design", _design),
     "compare": ("Compare", None, _compare),
     "sensitivity": ("Sensitivity", None, _sensitivity),
+    "mould": ("Mould", None, _mould),
 }
 """The tabs: label, study of the scenario while it is open (None: any), and what builds it."""
 _TAB_OF = {study: name for name, (_, study, _) in STUDIES.items() if study is not None}
@@ -106,7 +113,7 @@ def build_page(session: Session, pins: str = "", is_dark: bool = False) -> None:
             _view_buttons(view)
             message = ui.label().classes(_MESSAGE).props("data-testid=message role=status").mark("message")
             message.set_visibility(False)
-        stage = Stage(session, view)
+        stage = Stage(session, view, open_tab=tabs.set_value)
         with ui.element("div").classes(f"softnlp-results border-l {_COLUMN} {_LINE}"):
             with ui.element("div").classes("w-full softnlp-shown") as shown:
                 results = ResultsPanel()
@@ -134,13 +141,18 @@ def build_page(session: Session, pins: str = "", is_dark: bool = False) -> None:
         report_menu(stage, lambda: results.run, lambda: pinned.pins)
         mesh_menu(session, lambda: None if results.run is None else results.run.steps[0].pose)
 
+    looked = session.document.study
+
     def read_again() -> None:
+        nonlocal looked
+        is_other, looked = session.document.study != looked, session.document.study
         if session.is_stale or message.text.startswith(_GREY):
             say("")
         if session.is_stale and session.problem is not None and session.problem.table in _PANELS:
             panels[_PANELS[session.problem.table]].set_value(True)  # where it is said
         opened = _TAB_OF.get(session.document.study, SCENARIO)
-        if tabs.value != opened and tabs.value != SCENARIO:
+        of_every_study = STUDIES.get(str(tabs.value), ("", None))[1] is None
+        if tabs.value != opened and tabs.value != SCENARIO and (is_other or not of_every_study):
             tabs.set_value(opened)
 
     session.on_scenario(read_again)
@@ -247,6 +259,8 @@ def _studies(stage: Stage, tabs: ui.tabs, chosen: str) -> None:
             built.add(name)
             with slots[name]:
                 build(stage)
+        for tell in tuple(stage.turned):
+            tell(name)
 
     panels.on_value_change(opened)
     opened()

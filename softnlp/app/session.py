@@ -384,8 +384,13 @@ class Stage:
     """What panels and tabs of one page share.
 
     session, view : its scenario and its 3-D view. figures : what draws what tabs have found, by title, for reports.
+    open_tab : turns to a tab by its name. turned : called with the name of each tab that is opened. asked : tabs that
+    another one asks to begin once they are open.
     """
 
     session: Session
     view: RobotView
     figures: dict[str, Mapping[str, Callable[[], Figure]]] = field(default_factory=dict)
+    open_tab: Callable[[str], object] = str
+    turned: list[Callable[[str], None]] = field(default_factory=list)
+    asked: set[str] = field(default_factory=set)

@@ -149,6 +149,19 @@ class Moulds:
         return [*own, *self.connectors]
 
 
+def sizes_of(robot: Robot, settings: Settings) -> list[Sizes]:
+    """Return the sizes of the moulds of each segment; raises `InputError` for what cannot be moulded."""
+    shapes = shapes_of(robot, settings.shrinkage_percent)
+    found = []
+    for k, shape in enumerate(shapes):
+        try:
+            found.append(settled(shape, settings))
+        except InputError as error:
+            where = f"segment {k + 1}: " if len(shapes) > 1 else ""
+            raise InputError(f"{where}{error.message}", table=error.table, key=error.key) from None
+    return found
+
+
 def moulds(robot: Robot, settings: Settings | None = None) -> Moulds:
     """Return the moulds of a robot.
 
@@ -159,14 +172,7 @@ def moulds(robot: Robot, settings: Settings | None = None) -> Moulds:
     """
     require(MIDDLE)
     chosen = settings or Settings()
-    sizes = []
-    shapes = shapes_of(robot, chosen.shrinkage_percent)
-    for k, shape in enumerate(shapes):
-        try:
-            sizes.append(settled(shape, chosen))
-        except InputError as error:
-            where = f"segment {k + 1}: " if len(shapes) > 1 else ""
-            raise InputError(f"{where}{error.message}", table=error.table, key=error.key) from None
+    sizes = sizes_of(robot, chosen)
     joints, notes = list[Part](), [one.note for one in sizes if one.note]
     joined = set[int]()
     if isinstance(robot, SegmentedRobot):
