@@ -23,13 +23,16 @@ from softnlp.model.materials import material
 from softnlp.model.robot import ROBOTS, Robot, robot
 from softnlp.model.segments import segmented_robot
 from softnlp.mould import Moulds, MouldTable, Part, SegmentMould, bill, checks_of, moulds
+from softnlp.mould.bill import pours
 from softnlp.mould.checks import failed, overlap, surface_distance, thinnest
+from softnlp.mould.page import steps
 from softnlp.mould.picture import Drawn, camera, picture
 from softnlp.mould.plates import tie_places, vent_angles
 from softnlp.mould.shape import shapes_of
 from softnlp.mould.sizes import settled
 from softnlp.mould.solids import bounds, box, cylinder
 from softnlp.mould.write import glb, stl, three_mf
+from softnlp.scenario.describe import keys_of
 
 trimesh = pytest.importorskip("trimesh")
 
@@ -269,6 +272,10 @@ REFUSED = [
     ("D25L40", {"bed_mm": [50.0, 50.0, 50.0]}, "bed_mm", "do not fit"),
     ("D25L40", {"wall_mm": 0.5}, "wall_mm", "less than minimum_wall_mm"),
     ("D25L40", {"flange_mm": 4.0}, "flange_mm", "no room for screws"),
+    ("D25L40", {"thread_diameter_mm": 1.2}, "thread_diameter_mm", "bare in the bore of chamber 1: there are 0.5 mm"),
+    ("D25L40", {"gate_mm": 0.05}, "gate_mm", "less than minimum_wall_mm"),
+    ("D25L40", {"vent_mm": 20.0}, "vent_mm", "expected vents of 0.3 to 4 mm"),
+    ("D25L40", {"cap_mm": 0.05}, "cap_mm", "less than minimum_wall_mm"),
     ("D25L40", {"plate_mm": 0.2}, "plate_mm", "less than minimum_wall_mm"),
     ("D25L40", {"flange_thickness_mm": 0.3}, "flange_thickness_mm", "less than minimum_wall_mm"),
     ("D25L40", {"thread_pitch_mm": 25.0}, "thread_pitch_mm", "leaves no turn"),
@@ -369,6 +376,64 @@ def test_vents_are_between_chambers() -> None:
     shape = shapes_of(robot("D25L40"))[0]
     for angle in vent_angles(shape):
         assert min(abs(np.angle(np.exp(1j * (angle - hole.angle)))) for hole in shape.holes) > np.radians(20)
+
+
+def test_amounts_of_silicone_are_those_of_the_robot() -> None:
+    """Computed from the robot's own numbers: areas times length, a thread of which half is outside its circle."""
+    r, mould = robot("D25L40"), made("D25L40").segments[0]
+    L, outer, lumen = (1e3 * x for x in (r.length, r.outer_diameter, r.lumen_diameter))
+    rco, bore = 1e3 * r.chamber_radius, 1e3 * r.bore_radius
+    liner = pi * (rco**2 - bore**2) * L
+    assert [mould.sizes.shape.liner(hole) for hole in mould.sizes.shape.holes] == pytest.approx([liner] * 6)
+    turns = (L - COARSE) / COARSE  # half a pitch is left at either end
+    thread = 6 * turns * hypot(2 * pi * rco, COARSE) * 0.1**2 * 1.5 * 3**0.5  # a hexagon of 0.2 mm across
+    amounts = pours(mould)
+    gate, vents = (s.volume() for s in mould.sprues[0])
+    assert gate == pytest.approx(pi * 2.0**2 * (mould.sizes.flange + 1.0 - outer / 2), rel=0.1)  # to beyond the flange
+    ring = mould.sprues[1][1].volume()
+    total = pi / 4 * (outer**2 - lumen**2) * L - 6 * pi * bore**2 * L
+    poured = amounts["first pour, body"] + amounts["second pour, liners"]
+    assert poured - gate - vents - ring == pytest.approx(total - thread, rel=1e-3)
+    # keys are lower than the thread's circle, so a little of what liners are is cast before
+    body = pi / 4 * (outer**2 - lumen**2) * L - 6 * pi * rco**2 * L - thread / 2
+    assert 0 < amounts["first pour, body"] - gate - vents - body < 0.1 * 6 * liner
+    assert amounts["tip cap"] == pytest.approx(5.0 * pi / 4 * (outer**2 - lumen**2))
+
+
+def test_the_page_of_steps_has_amounts_and_ends_in_order() -> None:
+    mould = made("D25L40").segments[0]
+    text = {step.title: " ".join(step.text) for step in steps(mould, " Sets.")}
+    assert list(text) == [
+        *("Print the parts", "Wind the thread on 6 cores", "Put the first mould together", "First pour: the body"),
+        *("Draw the cores", "Second pour: the liners", "Take out the body", "The body as cast"),
+        *("The base cap", "The tip cap"),
+    ]
+    assert "16 cm in 9 turns" in text["Wind the thread on 6 cores"]
+    amount = pours(mould)["first pour, body"] / 1000
+    assert f"Mix and degas {1.2 * amount:.1f} ml of silicone; the mould takes {amount:.1f} ml" in str(text)
+    assert "each chamber 0.31 ml, about 13 mm high" in text["Second pour: the liners"]  # a third of 40 mm
+    assert "Prepare 2.6 ml of a harder silicone and pour 2.1 ml" in text["The tip cap"]
+    assert "the gate lies between chambers 2 and 3" in text["Take out the body"]
+    assert "in a drill" in text["Wind the thread on 6 cores"]
+
+
+def test_sockets_of_liner_rods_let_silicone_out() -> None:
+    """Below the rod there is a way to the open, which the rod itself closes."""
+    mould = made("D25L40").segments[0]
+    sizes, hole = mould.sizes, mould.sizes.shape.holes[0]
+    x, y = float(hole.circle[0]) * np.cos(hole.angle), float(hole.circle[0]) * np.sin(hole.angle)
+    way = cylinder(0.4, -sizes.stand - 1.0, -sizes.socket + 1.0, x, y)
+    assert (way ^ mould.plates["base-2"].solid).volume() < 1e-9
+    assert (way ^ mould.plates["base-1"].solid).volume() > 0.3
+    assert mould.cast.volume() > 0  # closed nevertheless
+
+
+def test_the_page_of_moulds_has_every_key() -> None:
+    text = (Path(__file__).parents[1] / "docs" / "mould.md").read_text()
+    for key in keys_of(MouldTable):
+        (row,) = (line for line in text.splitlines() if line.startswith(f"| `{key.name}` |"))
+        _, _, unit, default, *_ = (cell.strip().strip("`") for cell in row.split("|"))
+        assert (unit, default) == (key.unit, key.default), key.name
 
 
 SCENARIO = """study = "forward"
