@@ -24,7 +24,7 @@ from softnlp.model.robot import ROBOTS, Robot, robot
 from softnlp.model.segments import segmented_robot
 from softnlp.mould import Moulds, MouldTable, Part, SegmentMould, bill, checks_of, moulds
 from softnlp.mould.bill import pours
-from softnlp.mould.checks import failed, overlap, surface_distance, thinnest
+from softnlp.mould.checks import failed, first_balance, overlap, surface_distance, thinnest
 from softnlp.mould.page import steps
 from softnlp.mould.picture import Drawn, camera, picture
 from softnlp.mould.plates import tie_places, vent_angles
@@ -82,6 +82,14 @@ def test_the_void_is_the_body_of_the_model(name: str) -> None:
     r = ROBOTS[name]
     area = pi / 4 * (r.outer_diameter**2 - r.lumen_diameter**2 - r.chambers * r.chamber_diameter**2)
     assert made(name).segments[0].cast.volume() == pytest.approx(area * r.length / MILLIMETRE**3, rel=1e-3)
+
+
+def test_a_thread_on_a_smooth_core_is_no_silicone() -> None:
+    """It touches nothing there, and is taken out of the first pour nevertheless."""
+    mould = chosen("D10L40", groove_depth_mm=0.0).segments[0]
+    thread = sum(one.volume() for one in mould.threads)
+    assert thread > 2e-3 * mould.first.volume()
+    assert abs(first_balance(mould)) < 3e-4
 
 
 def test_the_paper_s_two_kinds_of_cores() -> None:
