@@ -23,6 +23,7 @@ class NotedView:
         self.colours_shown: Any = None
         self.targets_shown: Any = None
         self.pins_shown: Any = []
+        self.parts_shown: Any = None
         self.handlers: list[Callable[..., None]] = []
 
     def points(self, xyz_mm: Any, colours: Any = None) -> None:
@@ -31,6 +32,12 @@ class NotedView:
 
     def pins(self, messages: Any) -> None:
         self.pins_shown = messages
+
+    def parts(self, message: Any) -> None:
+        self.parts_shown = message
+
+    def explode(self, share: float) -> None:
+        self.parts_shown["apart"] = share
 
     async def picture(self) -> bytes:
         raise RuntimeError("there is no browser")

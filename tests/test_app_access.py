@@ -17,7 +17,7 @@ pytestmark = [
     pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine"),
 ]
 TABS = ("kinematics", "blocked", "workspace", "inverse", "time", "identify", "design", "compare", "sensitivity")
-TABS += ("scenario",)
+TABS += ("mould", "scenario")
 PANELS = ("segments", "material", "loads", "obstacles", "coefficients", "solver")
 AXE = """async whole => {
   const asked = {runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa']};

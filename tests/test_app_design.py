@@ -83,6 +83,11 @@ async def _visit() -> None:
         assert session.scenario is not None
         assert session.scenario.robot.chambers == 3
         assert session.pressure == pytest.approx([0.6 * BAR, 0.0, 0.0])
+        # and its moulds are asked for
+        session.change("robot", "length_mm", 70.0)
+        user.find(marker="design.make").click()
+        assert stage.asked == {"mould"}
+        assert session.scenario.robot.length == pytest.approx(0.06)
         # what cannot be asked is said
         enter(user, "requirements.stretch.at_least", 2.0)
         await ran(user, "design", "[requirements]")

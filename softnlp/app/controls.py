@@ -20,7 +20,7 @@ BOX = "dense outlined hide-bottom-space"
 SMALL = "dense flat no-caps size=sm"
 USE = "dense outline no-caps size=sm"
 HINT = "text-xs opacity-70"
-_SUFFIXES = {"_mm": "mm", "_bar": "bar", "_deg": "°", "_kg_m3": "kg/m³"}
+_SUFFIXES = {"_mm": "mm", "_bar": "bar", "_deg": "°", "_kg_m3": "kg/m³", "_percent": "%"}
 
 
 def named(element: E, name: str, test: str = "") -> E:
@@ -173,15 +173,15 @@ def choice_field(
     table: str,
     key: str,
     label: str,
-    options: Sequence[str] | Mapping[str, str],
+    options: Sequence[str] | Mapping[Any, str],
     *,
-    default: str | None = None,
+    default: Any = None,
     test: str = "",
 ) -> ui.select:
     """Show one of some words of the scenario; the default, by default the schema's, is not written into the file."""
     standard = known(table, key).default if default is None else default
 
-    def shown() -> str | None:
+    def shown() -> Any:
         value = session.document.get(table, key, standard)
         return value if value in list(options) else None
 

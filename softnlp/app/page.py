@@ -36,7 +36,7 @@ from softnlp.statics.step import Run
 
 
 def _identify(stage: Stage) -> None:
-    from softnlp.app.tabs.identify import identify_tab  # these five when they are opened: the page is there sooner
+    from softnlp.app.tabs.identify import identify_tab  # these when they are opened: the page is there sooner
 
     identify_tab(stage)
 
@@ -65,6 +65,12 @@ def _time(stage: Stage) -> None:
     time_tab(stage)
 
 
+def _mould(stage: Stage) -> None:
+    from softnlp.app.tabs.mould import mould_tab
+
+    mould_tab(stage)
+
+
 STUDIES: dict[str, tuple[str, str | None, Callable[[Stage], None]]] = {
     "kinematics": ("Kinematics", "forward", sequence_tab),
     "blocked": ("Blocked force", "blocked-force", blocked_tab),
@@ -75,6 +81,7 @@ STUDIES: dict[str, tuple[str, str | None, Callable[[Stage], None]]] = {
     "design": ("Design", "design", _design),
     "compare": ("Compare", None, _compare),
     "sensitivity": ("Sensitivity", None, _sensitivity),
+    "mould": ("Mould", None, _mould),
 }
 """The tabs: label, study of the scenario while it is open (None: any), and what builds it."""
 _TAB_OF = {study: name for name, (_, study, _) in STUDIES.items() if study is not None}
@@ -125,7 +132,7 @@ def build_page(session: Session, pins: str = "", is_dark: bool = False) -> None:
             _view_buttons(view)
             message = ui.label().classes(_MESSAGE).props("data-testid=message role=status").mark("message")
             message.set_visibility(False)
-        stage = Stage(session, view)
+        stage = Stage(session, view, open_tab=tabs.set_value)
         with ui.element("div").classes(f"softnlp-results border-l {_COLUMN} {_LINE}"):
             with ui.element("div").classes("w-full softnlp-shown") as shown:
                 results = ResultsPanel()
@@ -157,15 +164,19 @@ def build_page(session: Session, pins: str = "", is_dark: bool = False) -> None:
         mesh_menu(session, lambda: None if results.run is None else results.run.steps[0].pose)
 
     draw_obstacles(stage)
+    looked = session.document.study
 
     def read_again() -> None:
+        nonlocal looked
+        is_other, looked = session.document.study != looked, session.document.study
         if session.is_stale or message.text.startswith(_GREY):
             say("")
         panel = _panel_of(session)
         if session.is_stale and panel is not None:
             panels[panel].set_value(True)  # where it is said
         opened = _TAB_OF.get(session.document.study, SCENARIO)
-        if tabs.value != opened and tabs.value != SCENARIO:
+        of_every_study = STUDIES.get(str(tabs.value), ("", None))[1] is None
+        if tabs.value != opened and tabs.value != SCENARIO and (is_other or not of_every_study):
             tabs.set_value(opened)
 
     session.on_scenario(read_again)
@@ -285,6 +296,8 @@ def _studies(stage: Stage, tabs: ui.tabs, chosen: str) -> None:
             with slots[name]:
                 tab_note(stage.session, study, name)
                 build(stage)
+        for tell in tuple(stage.turned):
+            tell(name)
 
     panels.on_value_change(opened)
     opened()

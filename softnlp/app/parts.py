@@ -37,6 +37,7 @@ class RunRow:
 
     def __init__(self, marker: str, label: str, begin: Callable[[], Awaitable[None]]) -> None:
         """Build the row; `begin` is called by the button, and calls `do`."""
+        self.begin = begin
         self.progress = Progress()
         self.running = False
         self._watch: Callable[[], None] | None = None

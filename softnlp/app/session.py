@@ -371,9 +371,14 @@ class Stage:
 
     session, view : its scenario and its 3-D view. figures : what draws what tabs have found, by title, for reports.
     plays : what shows a step of a motion in place of the pose of the controls.
+    open_tab : turns to a tab by its name. turned : called with the name of each tab that is opened. asked : tabs that
+    another one asks to begin once they are open.
     """
 
     session: Session
     view: RobotView
     figures: dict[str, Mapping[str, Callable[[], Figure]]] = field(default_factory=dict)
     plays: list[Callable[[Scenario, Step], None]] = field(default_factory=list)
+    open_tab: Callable[[str], object] = str
+    turned: list[Callable[[str], None]] = field(default_factory=list)
+    asked: set[str] = field(default_factory=set)

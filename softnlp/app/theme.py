@@ -66,7 +66,7 @@ _QUIET = """window.addEventListener("unhandledrejection", event => {
 });"""
 
 
-# What the libraries leave without a name for those who hear the page: its language, files to choose, the editor.
+# What the libraries leave without a name or out of reach of the keyboard: language, files to choose, tables, editor.
 _NAMED = """document.documentElement.lang = "en";
 let waiting = null;
 const name = () => {
@@ -79,6 +79,8 @@ const name = () => {
     around?.removeAttribute("tabindex");
     around?.removeAttribute("role");
   }
+  for (const rows of document.querySelectorAll(".q-table__middle:not([tabindex])"))
+    rows.tabIndex = 0;  // what scrolls is reached by the keyboard
   for (const editor of document.querySelectorAll(".cm-content:not([aria-label])")) {
     editor.setAttribute("aria-label", "Scenario file");
     editor.tabIndex = 0;

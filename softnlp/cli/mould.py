@@ -92,7 +92,7 @@ def _write(asked: Scenario, name: str, folder: Path) -> None:
     for warning in asked.warnings:
         complain(f"warning: {warning}")
     made = moulds(asked.robot, asked.mould)
-    files, checks = mould_files(made, name, asked.title, float(asked.material.density))
+    files, checks = mould_files(made, name, asked.title, float(asked.material.density), asked.material.name)
     make_folder(folder)
     for file, content in files.items():
         write_whole(folder / file, content)

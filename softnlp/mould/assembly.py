@@ -62,12 +62,6 @@ class SegmentMould:
         return [turned(core.thread, turn) for core in self.cores for turn in core.turns]
 
     @cached_property
-    def wound(self) -> list[Manifold]:
-        """Each core with its thread, in one."""
-        whole = [(core, union([*(part.solid for part in core.parts), core.thread])) for core in self.cores]
-        return [turned(solid, turn) for core, solid in whole for turn in core.turns]
-
-    @cached_property
     def sprues(self) -> tuple[list[Manifold], list[Manifold]]:
         """What fills gate, vents and channel outside the body in either step, and reaches a little into the moulds."""
         sizes = self.sizes
@@ -82,8 +76,12 @@ class SegmentMould:
 
     @cached_property
     def first(self) -> Manifold:
-        """The silicone of the first pour."""
-        return self._flooded([*self._around(1), *self.wound], self.sprues[0])
+        """The silicone of the first pour.
+
+        Threads are taken out of what was flooded: around a smooth core they touch nothing, and would be voids of voids.
+        """
+        cores = [one for core in self.cores for part in core.parts for one in part.every]
+        return without(self._flooded([*self._around(1), *cores], self.sprues[0]), self.threads)
 
     def _around(self, number: int) -> list[Manifold]:
         base, top = (self.plates[f"{kind}-{number}"].solid for kind in ("base", "top"))
@@ -149,6 +147,19 @@ class Moulds:
         return [*own, *self.connectors]
 
 
+def sizes_of(robot: Robot, settings: Settings) -> list[Sizes]:
+    """Return the sizes of the moulds of each segment; raises `InputError` for what cannot be moulded."""
+    shapes = shapes_of(robot, settings.shrinkage_percent)
+    found = []
+    for k, shape in enumerate(shapes):
+        try:
+            found.append(settled(shape, settings))
+        except InputError as error:
+            where = f"segment {k + 1}: " if len(shapes) > 1 else ""
+            raise InputError(f"{where}{error.message}", table=error.table, key=error.key) from None
+    return found
+
+
 def moulds(robot: Robot, settings: Settings | None = None) -> Moulds:
     """Return the moulds of a robot.
 
@@ -159,14 +170,7 @@ def moulds(robot: Robot, settings: Settings | None = None) -> Moulds:
     """
     require(MIDDLE)
     chosen = settings or Settings()
-    sizes = []
-    shapes = shapes_of(robot, chosen.shrinkage_percent)
-    for k, shape in enumerate(shapes):
-        try:
-            sizes.append(settled(shape, chosen))
-        except InputError as error:
-            where = f"segment {k + 1}: " if len(shapes) > 1 else ""
-            raise InputError(f"{where}{error.message}", table=error.table, key=error.key) from None
+    sizes = sizes_of(robot, chosen)
     joints, notes = list[Part](), [one.note for one in sizes if one.note]
     joined = set[int]()
     if isinstance(robot, SegmentedRobot):

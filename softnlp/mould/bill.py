@@ -33,7 +33,9 @@ def bill(moulds: Moulds, density: float = 1070.0) -> list[dict[str, Any]]:
         where = segment.prefix
         for name, volume in pours(segment).items():
             mass = volume / 1000 * density / 1000
-            found.append(_row("silicone", f"{where}{name}", 1, f"{mass * waste:.1f} g", volume / 1000, "ml", waste))
+            found.append(
+                _row("silicone", f"{where}{name}", 1, f"{mass * waste:.1f} g to prepare", volume / 1000, "ml", waste)
+            )
         n = len(segment.sizes.shape.holes)
         length = segment.sizes.thread_length() / 1000
         size = f"{moulds.settings.thread_diameter_mm:g} mm, pitch {moulds.settings.thread_pitch_mm:g} mm"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import import_module
 from io import BytesIO
@@ -30,6 +30,8 @@ VOLUME, DISTANCE, OVERLAP = 1e-3, 0.05, 0.01
 _FACING = -0.97  # of two normals: faces of one wall look away from each other within 14 degrees
 _RAYS, _ROUND_OFF = 700, 2e-3
 _SAME_FACETS = 12  # parts of a turn after which the facets of core and thread are where they were
+_EFFORT = {"overlap in step 1": 14.0, "volume of the void": 7.0, "volume of the first void": 45.0}
+_EFFORT_OF_PART, _EFFORT_OF_SEGMENT = 1.0, 105.0  # about the time that checks take, of which progress is told
 _OFFSETS = (0.002, 0.02, 0.11, 0.37, 0.83)  # of the length, by which parts are drawn
 
 
@@ -50,11 +52,23 @@ class Check:
         return "holds" if self.holds else "fails"
 
 
-def checks_of(moulds: Moulds) -> list[Check]:
-    """Return every check of a robot's moulds."""
-    found = [check for part in moulds.parts for check in _of_part(part, moulds)]
+def checks_of(
+    moulds: Moulds, told: Callable[[float, float, str], None] = lambda done, total, text: None
+) -> list[Check]:
+    """Return every check of a robot's moulds. told : called after each with what is done, of how much, and its name."""
+    found, done = list[Check](), 0.0
+    total = _EFFORT_OF_PART * len(moulds.parts) + _EFFORT_OF_SEGMENT * len(moulds.segments)
+    for part in moulds.parts:
+        found += _of_part(part, moulds)
+        done += _EFFORT_OF_PART
+        told(done, total, f"{part.name} measured")
     for segment in moulds.segments:
-        found += _of_segment(segment)
+        end = done + _EFFORT_OF_SEGMENT
+        for check in _of_segment(segment):
+            found.append(check)
+            done = min(done + _EFFORT.get(check.name, 2.0), end)
+            told(done, total, f"{check.name} measured")
+        done = end
     return found
 
 
@@ -266,6 +280,34 @@ def cap_void(sizes: Sizes, end: str, cup: Manifold) -> float:
     inside = cylinder(R, -sizes.settings.cap_mm - 1.0, 0.0, sides=192)
     rest = without(block, [cup, body]) ^ inside
     return float(sum(one.volume() for one in rest.decompose() if bounds(one)[1, 2] > -1e-6)) if r > 0 else 0.0
+
+
+_LIMITS = {
+    "closed solid": "Every part is a closed solid: {count} of {count}",
+    "thinnest wall": "The thinnest wall is {value:.2f} mm, of {part}; at least {least:g} mm",
+    "largest side": "Every part fits the bed: the longest side is {value:.1f} mm, of {part}",
+    "overlap in step 1": "In the first mould parts overlap by at most {value:.2g} mm³; at most {overlap:g} mm³",
+    "overlap in step 2": "In the second mould parts overlap by at most {value:.2g} mm³; at most {overlap:g} mm³",
+    "volume of the void": "What the moulds enclose has the body's volume to {size:.3f} %; within {volume:g} %",
+    "distance of the void": "Its surface is at most {value:.4f} mm from the body's; at most {distance:g} mm",
+    "volume of the first void": "Silicone, thread and cores fill the first mould to {size:.3f} %; within {volume:g} %",
+    "overlap when drawn": "Cores, rods, plates and shells come off: on their way they meet {value:.2g} mm³ at most; "
+    "at most {overlap:g} mm³",
+    "volume of the cap": "Cups hold the caps' volume to {size:.3f} %; within {volume:g} %",
+}
+
+
+def in_words(checks: list[Check], least: float) -> list[str]:
+    """Return a sentence for each kind of check, of the worst of it. least : the minimum wall [mm]."""
+    found = []
+    for name, words in _LIMITS.items():
+        own = [check for check in checks if check.name == name]
+        if own:
+            worst = min(own, key=lambda c: c.value) if "wall" in name else max(own, key=lambda c: abs(c.value))
+            limits = {"least": least, "overlap": OVERLAP, "volume": 100 * VOLUME, "distance": DISTANCE}
+            told = words.format(count=len(own), value=worst.value, size=abs(worst.value), part=worst.part, **limits)
+            found.append(f"{told}.")
+    return found
 
 
 def failed(checks: list[Check]) -> list[Check]:

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softnlp.model.inputs import package_version
+from softnlp.model.robot import Robot
+from softnlp.model.segments import SegmentedRobot
 from softnlp.mould.assembly import Moulds, SegmentMould
 from softnlp.mould.bill import pours, screws
 from softnlp.mould.checks import Check
@@ -20,18 +22,21 @@ from softnlp.mould.scenes import (
     body_scene,
     cap_scene,
     core_scene,
+    draw_scene,
     exploded,
     open_shell,
     part_scene,
     plate_scene,
     shell_scene,
+    sprue_scene,
 )
 
 _STYLE = """
 body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#1c2833}
 h1{font-size:1.6rem}h2{font-size:1.25rem;border-bottom:1px solid #ccd1d9;margin-top:2rem}h3{font-size:1.05rem}
 table{border-collapse:collapse;font-size:.85rem;display:block;overflow-x:auto}
-th,td{padding:.15rem .6rem;text-align:left;border-bottom:1px solid #e5e8ec}img{max-width:100%}
+th,td{padding:.15rem .6rem;text-align:left;border-bottom:1px solid #e5e8ec}
+td:nth-child(5),td:nth-child(6){white-space:nowrap}img{max-width:100%}
 .step{display:flex;gap:1.5rem;flex-wrap:wrap;align-items:flex-start}.step div{flex:1 1 20rem}
 @media print{.step{break-inside:avoid}}
 """
@@ -39,168 +44,231 @@ Image = NDArray[np.uint8]
 
 
 class Step(NamedTuple):
-    """One step. picture : draws it, None for none."""
+    """One step. pictures : draw it."""
 
     title: str
     text: list[str]
-    picture: Callable[[], Image] | None
+    pictures: tuple[Callable[[], Image], ...]
 
 
-def steps_page(title: str, moulds: Moulds, rows: list[dict[str, Any]], checks: list[Check]) -> str:
-    """Return the page. rows : of the bill."""
+def steps_page(title: str, moulds: Moulds, rows: list[dict[str, Any]], checks: list[Check], silicone: str = "") -> str:
+    """Return the page. rows : of the bill. silicone : its name, "" for none."""
     parts = [f"<h1>{escape(title)}: moulds</h1>", f"<p>softnlp {escape(package_version())}. Sizes are in mm.</p>"]
+    parts += [f"<p>The body is of {escape(silicone)}.</p>"] if silicone else []
     parts += [f"<p>{escape(note[0].upper() + note[1:])}.</p>" for note in moulds.notes]
-    parts += ["<h2>What is needed</h2>", _bill(rows)]
+    tape = ", tape" if any(segment.sizes.method == "three-part" for segment in moulds.segments) else ""
+    parts += ["<h2>What is needed</h2>", _bill(rows), f"<p>{_BESIDES.format(tape=tape)}</p>"]
+    robots = (
+        [one.robot for one in moulds.robot.segments] if isinstance(moulds.robot, SegmentedRobot) else [moulds.robot]
+    )
     for k, segment in enumerate(moulds.segments):
         if len(moulds.segments) > 1:
             parts.append(f"<h2>Segment {k + 1}</h2>")
-        for n, step in enumerate(steps(segment), start=1):
+        for n, step in enumerate(steps(segment, _sets(robots[k])), start=1):
             parts.append(_step(n, step))
     for part in moulds.connectors:
         words = [
             "Print it with the face to the lower segment down. Glue it between the two segments with the "
             "tubes in its holes."
         ]
-        parts.append(_step(None, Step(part.name.replace("-", " "), words, partial(part_scene, part))))
+        parts.append(_step(None, Step(part.name.replace("-", " "), words, (partial(part_scene, part),))))
     parts += ["<h2>What was measured</h2>", _checks(checks)]
     head = f'<meta charset="utf-8"><title>{escape(title)}: moulds</title><style>{_STYLE}</style>'
     body = "\n".join(parts)
     return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head><body>\n{body}\n</body></html>\n'
 
 
-def steps(mould: SegmentMould) -> Iterator[Step]:
-    """Yield the steps of a segment in order."""
-    sizes, settings = mould.sizes, mould.sizes.settings
-    three, amounts = sizes.method == "three-part", pours(mould)
-    waste = 1 + settings.waste_percent / 100
-    ml = {name: f"{volume * waste / 1000:.1f} ml" for name, volume in amounts.items()}
-    (_, clamps, clamp), (_, ties, tie), _ = screws(sizes)
+def steps(mould: SegmentMould, sets: str = "") -> Iterator[Step]:
+    """Yield the steps of a segment in order. sets : in words, which chambers belong together."""
+    yield _print(mould)
+    yield _wind(mould)
+    yield _assemble(mould)
+    yield _pour(mould)
+    yield _draw(mould)
+    yield _line(mould)
+    yield _take_out(mould, sets)
     yield Step(
-        "Print the parts",
-        [
-            "Each file lies as it is printed: shells on their backs, plates with the face to the silicone upwards, the "
-            "parts of cores on their flat sides, rods and pins upright. Fine layers (0.05 mm, resin) are "
-            "needed for the "
-            "grooves of the thread. Liner rods are plain: metal rods of the same diameter do better "
-            "where they are thin.",
-            "Clean sockets and holes. Try every rod in its plate. In base-2 and top-2, ream the last 2 mm at the "
-            "silicone to the liner rods, so that these are held without play. Wash off all resin: it stops silicone "
-            "from curing. Wipe or spray what touches silicone with a release agent.",
-        ],
-        lambda: shell_scene(mould),
+        "The body as cast",
+        ["Look through every chamber: no silicone may close it, no thread may lie bare."],
+        (lambda: body_scene(mould),),
     )
+    for end in mould.caps:
+        yield _cap(mould, end)
+
+
+def _ml(mould: SegmentMould, pour: str) -> tuple[str, str]:
+    """Return how much a pour takes, and how much is prepared for it, in words."""
+    volume = pours(mould)[pour] / 1000
+    return _amount(volume), _amount(volume * (1 + mould.sizes.settings.waste_percent / 100))
+
+
+def _amount(millilitres: float) -> str:
+    return f"{millilitres:.1f} ml" if millilitres >= 1 else f"{millilitres:.2f} ml"
+
+
+def _print(mould: SegmentMould) -> Step:
+    fine = "Fine layers (0.05 mm, resin) are needed for the grooves of the thread. " if mould.sizes.depth > 0 else ""
+    words = [
+        "Each file lies as it is printed: shells on their backs, plates with the face to the silicone upwards, the "
+        f"parts of cores on their flat sides, rods and pins upright. {fine}Liner rods are plain: metal rods of the "
+        "same diameter do better where they are thin.",
+        "Clean sockets and holes. Try every rod in its plate. In base-2 and top-2, ream the last 2 mm at the "
+        "silicone to the liner rods, so that these are held without play; the small holes below the sockets of "
+        "base-2 have to be open. Wash and cure resin well, as what is left of it stops silicone from curing. Wipe a "
+        "thin film of release agent on what touches silicone, cores as well, before any thread is on them.",
+    ]
+    return Step("Print the parts", words, (lambda: shell_scene(mould),))
+
+
+def _wind(mould: SegmentMould) -> Step:
+    sizes = mould.sizes
     hold = (
-        "Put key and sides together in the base plate and hold their upper ends with tape. "
-        if three
+        "Lay the two sides against the key, their lower ends flush, and hold both ends with a turn of tape. Turn the "
+        "core in a drill, or between two fingers. "
+        if sizes.method == "three-part"
         else "Hold the pin by its flats in a drill or between two fingers. "
     )
     lie = (
         "lies in the groove"
         if sizes.depth > 0
-        else f"keeps its pitch of {settings.thread_pitch_mm:g} mm by eye or by a lathe"
+        else f"keeps its pitch of {sizes.settings.thread_pitch_mm:g} mm by eye or by a lathe"
     )
-    yield Step(
-        f"Wind the thread on {len(sizes.shape.holes)} cores",
-        [
-            f"{hold}Knot the thread at the lower end of the groove and fix it with a drop of instant glue. Wind it "
-            f"upwards under light tension, clockwise seen from below, so that it {lie}; knot and fix it "
-            "at the upper end.",
-            f"Each core takes about {sizes.thread_length() / len(sizes.shape.holes):.0f} mm.",
-        ],
-        lambda: core_scene(mould, mould.cores[0]),
+    low, high = sizes.thread_ends
+    each = sizes.thread_length() / len(sizes.shape.holes)
+    take_off = " Take off the tape: the thread holds the three parts." if sizes.method == "three-part" else ""
+    words = [
+        f"{hold}Tie the thread round the core where the groove begins, {low:.3g} mm above the lower shoulder, and put "
+        "a drop of instant glue on the knot alone: thread that is glued to the core comes out with it. Wind it "
+        f"upwards under light tension, clockwise seen from below, so that it {lie}, up to {high:.3g} mm above the "
+        f"shoulder. Tie it there in the same way and cut it off.{take_off}",
+        f"Each core takes about {each / 10:.0f} cm in {(high - low) / sizes.settings.thread_pitch_mm:.0f} turns.",
+    ]
+    return Step(
+        f"Wind the thread on {len(sizes.shape.holes)} cores", words, (lambda: core_scene(mould, mould.cores[0]),)
     )
-    yield Step(
-        "Put the first mould together",
-        [
-            "Stand lumen rod and cores in base-1 until their shoulders bear on it. Close the shell "
-            "around its boss: the "
-            f"pins find their holes. Clamp it with {clamps} screws {clamp}. Lower top-1 over the upper ends until it "
-            f"bears on the shell; this holds all rods straight. Join the plates by {ties} tie rods {tie}.",
-        ],
-        lambda: exploded(mould, 1),
-    )
-    yield Step(
-        "First pour: the body",
-        [
-            f"Mix and degas {ml['first pour, body']} of silicone. Fill it slowly with a syringe through "
-            "the gate, which "
-            "is at the lower end in the joint of the shell and takes the syringe's tip. Air leaves by the vents in the "
-            "top plate. Stop when silicone stands in all of them, and leave the syringe in place or "
-            "close the gate with "
-            "clay until the silicone has cured.",
-        ],
-        lambda: open_shell(mould, 1, silicone=True),
-    )
-    if three:
-        draw = (
-            "Take off the top plate; shell and base plate stay. Draw each key upwards by its end. Press the two sides "
-            "together, off the thread, and draw them as well, one after the other."
+
+
+def _assemble(mould: SegmentMould) -> Step:
+    (_, clamps, clamp), (_, ties, tie), _ = screws(mould.sizes)
+    words = [
+        "Stand lumen rod and cores in base-1 until their shoulders bear on it. Close the shell around its boss: the "
+        f"pins find their holes. Clamp it with {clamps} screws {clamp}. Lower top-1 over the upper ends until it "
+        f"bears on the shell; this holds all rods straight. Join the plates by {ties} tie rods {tie}.",
+    ]
+    return Step("Put the first mould together", words, (lambda: exploded(mould, 1),))
+
+
+def _pour(mould: SegmentMould) -> Step:
+    takes, prepared = _ml(mould, "first pour, body")
+    words = [
+        f"Mix and degas {prepared} of silicone; the mould takes {takes}. Fill it slowly with a syringe through the "
+        "gate, which is at the lower end in the joint of the shell and takes the syringe's tip. Air leaves by the "
+        "vents in the top plate. Stop when silicone stands in all of them, and leave the syringe in place or close "
+        "the gate with clay until the silicone has cured.",
+    ]
+    return Step("First pour: the body", words, (lambda: open_shell(mould, 1, silicone=True),))
+
+
+def _draw(mould: SegmentMould) -> Step:
+    if mould.sizes.method == "three-part":
+        how = (
+            "Draw each key upwards by its end. Press the two sides together, off the thread, and draw them as well, "
+            "one after the other."
         )
-    elif sizes.depth > 0:
-        draw = (
-            "Take off the top plate; shell and base plate stay. Turn each pin by its flats, "
-            "anticlockwise seen from above: it "
-            "leaves its thread like a screw and rises by one pitch a turn."
+    elif mould.sizes.depth > 0:
+        how = (
+            "Turn each pin by its flats, anticlockwise seen from above: it leaves its thread like a screw and rises "
+            "by one pitch a turn."
         )
     else:
-        draw = "Take off the top plate; shell and base plate stay. Draw each pin straight upwards."
-    yield Step(
-        "Draw the cores",
-        [
-            f"{draw} The thread stays in the silicone. The lumen rod stays where it is. Cut off what "
-            "stands in the vents."
-        ],
-        None,
+        how = "Draw each pin straight upwards."
+    words = [
+        f"Take off tie rods and top plate; shell and base plate stay. {how} The thread stays in the silicone. The "
+        "lumen rod stays where it is. Cut off what stands in the vents.",
+        "Wash the chambers with isopropyl alcohol and let them dry: liners bond to clean silicone only.",
+    ]
+    return Step("Draw the cores", words, (lambda: draw_scene(mould),))
+
+
+def _line(mould: SegmentMould) -> Step:
+    takes, prepared = _ml(mould, "second pour, liners")
+    shape = mould.sizes.shape
+    shots = []
+    for core in mould.cores:
+        volume = shape.liner(core.hole)
+        height = f"{volume / (np.pi * float(core.hole.core[0]) ** 2):.0f} mm high"
+        which = "each chamber" if len(mould.cores) == 1 else f"chambers {', '.join(map(str, core.chambers))}"
+        shots.append(f"{which} {_amount(volume / 1000)}, about {height}")
+    words = [
+        "Take off base-1 and put base-2 on; the lumen rod stays in the body. Mix and degas "
+        f"{prepared} of silicone; chambers and ring take {takes}. With a syringe and a blunt needle that reaches the "
+        f"ground, put into {'; into '.join(shots)}. Push the liner rods in slowly, down to the ground of their "
+        "sockets: silicone rises past them to the top, and what was in the sockets leaves by the holes below. Wipe "
+        "it off.",
+        "Lower top-2 over the rods and join the plates. Fill up through one of the three holes until silicone stands "
+        "in the other two. Let it cure upright.",
+    ]
+    return Step("Second pour: the liners", words, (lambda: exploded(mould, 2), lambda: plate_scene(mould, 2)))
+
+
+def _take_out(mould: SegmentMould, sets: str) -> Step:
+    shape = mould.sizes.shape
+    ends = ("tip", "base") if shape.flipped else ("base", "tip")
+    around = sorted(shape.holes, key=lambda hole: (hole.angle - mould.sizes.lead) % (2 * np.pi))
+    last, first = around[-1].chamber, around[0].chamber
+    gate = f", and the gate lies between chambers {last} and {first}" if len(around) > 1 else ""
+    words = [
+        "Take off top-2. Turn each liner rod by its upper end until it is loose and draw it upwards. Take off base-2. "
+        "Turn and draw the lumen rod in the same way, by the end that stands out above; alcohol between rod and "
+        "silicone helps. Take out the screws and part the shell.",
+        f"The end that stood below is the robot's {ends[0]}, the upper one its {ends[1]}. Before you cut, mark "
+        f"chamber 1: seen from the tip, chambers are counted anticlockwise{gate}.{sets} Cut gate "
+        "and ring off flush with a sharp blade; they are red in the picture.",
+    ]
+    return Step("Take out the body", words, (lambda: sprue_scene(mould),))
+
+
+def _cap(mould: SegmentMould, end: str) -> Step:
+    takes, prepared = _ml(mould, f"{end} cap")
+    tubes = (
+        f" The pins leave holes of {2 * mould.sizes.tube_hole:.3g} mm for the tubes: glue one into each afterwards."
+        if end == "base"
+        else ""
     )
-    yield Step(
-        "Second pour: the liners",
-        [
-            "Take off base-1 and put base-2 on. Fill each chamber with silicone from its lower end "
-            "upwards, with a syringe and a blunt "
-            "needle, and push its liner rod in down to the socket: what it displaces rises. Lower top-2 "
-            "over the rods and "
-            "join the plates. Fill up through one of the three holes until silicone stands in the other two. "
-            f"{ml['second pour, liners']} are enough. After curing take off top-2, draw the rods, take off "
-            "base-2, and cut off the ring flush with the body's end.",
-        ],
-        lambda: exploded(mould, 2),
-    )
-    yield Step(
-        "Take out the body",
-        [
-            "Draw the lumen rod. Take out the screws, part the shell, and cut off the gate. The plates "
-            "and the ring look so:"
-        ],
-        lambda: plate_scene(mould, 2),
-    )
-    yield Step(
-        "The body as cast",
-        ["Look through every chamber: no silicone may close it, no thread may lie bare."],
-        lambda: body_scene(mould),
-    )
-    for end in mould.caps:
-        tubes = " The pins leave holes for the tubes: glue one into each afterwards." if end == "base" else ""
-        yield Step(
-            f"The {end} cap",
-            [
-                f"Pour {ml[f'{end} cap']} of a harder silicone into the cup, to {settings.cap_mm:g} mm "
-                "above its floor. "
-                f"When it begins to set, stand the body's {end} on it; the rim guides it, the pin is in "
-                "the lumen. Do not "
-                f"press: the chambers have to stay open.{tubes}",
-            ],
-            partial(cap_scene, mould, end),
-        )
+    words = [
+        f"Prepare {prepared} of a harder silicone and pour {takes} of it into the cup: it stands "
+        f"{mould.sizes.settings.cap_mm:g} mm above the floor. When it begins to set, stand the body's {end} on it; "
+        f"the rim guides it, the pin is in the lumen. Do not press: the chambers have to stay open. After curing "
+        f"draw the body out by hand.{tubes}",
+    ]
+    return Step(f"The {end} cap", words, (partial(cap_scene, mould, end),))
+
+
+def _sets(robot: Robot) -> str:
+    """Return in words which chambers get the same pressure."""
+    each: dict[int, list[str]] = {}
+    for chamber, number in enumerate(robot.set_of_chamber):
+        each.setdefault(number, []).append(str(chamber + 1))
+    words = "; ".join(f"set {k + 1} has {' and '.join(members)}" for k, members in sorted(each.items()))
+    return f" Of these chambers {words}."
+
+
+_BESIDES = (
+    "Besides: a syringe with a plain tip that holds the first pour, a blunt needle longer than the body, release agent "
+    "for silicone, isopropyl alcohol, instant glue, clay, a blade{tape}, and what degasses silicone."
+)
 
 
 def _step(number: int | None, step: Step) -> str:
     text = "".join(f"<p>{escape(line)}</p>" for line in step.text)
-    image = ""
-    if step.picture is not None:
-        data = base64.b64encode(png(step.picture())).decode("ascii")
-        image = f'<div><img alt="{escape(step.title)}" src="data:image/png;base64,{data}"></div>'
+    image = "".join(f"<div>{_image(step.title, draw())}</div>" for draw in step.pictures)
     head = escape(step.title if number is None else f"{number}. {step.title}")
     return f'<h3>{head}</h3><div class="step"><div>{text}</div>{image}</div>'
+
+
+def _image(title: str, drawn: Image) -> str:
+    data = base64.b64encode(png(drawn)).decode("ascii")
+    return f'<img alt="{escape(title)}" src="data:image/png;base64,{data}">'
 
 
 def _bill(rows: list[dict[str, Any]]) -> str:

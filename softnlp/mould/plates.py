@@ -1,7 +1,8 @@
 """Base and top plates: they close the body's ends and hold rods and cores at both ends, in either step.
 
 Shoulders of cores bear flat on a plate and close the socket's play. Second rods have none: at the silicone their hole
-is as wide as they are, to be reamed. Plates are printed with the face to the silicone upwards.
+is as wide as they are, to be reamed. They are pushed into silicone, which leaves their sockets by a hole below.
+Plates are printed with the face to the silicone upwards.
 """
 
 from __future__ import annotations
@@ -14,12 +15,13 @@ from softnlp.mould.parts import Part
 from softnlp.mould.shape import Shape
 from softnlp.mould.shell import plate_outline
 from softnlp.mould.sizes import CHANNEL, GAP, LAND, LIP, SEAT, Sizes
-from softnlp.mould.solids import COARSE, FINE, MIDDLE, box, cylinder, hull, loft, prism, turned, union, without
+from softnlp.mould.solids import FINE, MIDDLE, box, cylinder, hull, loft, prism, turned, union, without
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
 VENT_DEPTH, NOTCH, RISER = 0.4, 2.0, 1.1  # of vents; width of the notches beside the channel, radius of their holes
+WEEP = 0.6  # radius of the hole below a second rod, half the rod's where that is less [mm]
 _MOST_VENTS, _APART = 6, 25.0
 
 
@@ -34,8 +36,8 @@ def plates(sizes: Sizes, cores: list[Core]) -> dict[str, Part]:
     L, depth, c = sizes.shape.length, sizes.socket, sizes.settings.clearance_mm
     low, high = L, L + sizes.stand + 1.0
     lumen = [
-        cylinder(sizes.lumen_spigot(0) + c, -depth, 1.0),
-        cylinder(sizes.lumen_spigot(-1) + c, low - 1.0, high),
+        cylinder(sizes.lumen_spigot(0) + c, -depth, 1.0, sides=FINE),
+        cylinder(sizes.lumen_spigot(-1) + c, low - 1.0, high, sides=FINE),
     ]
     sockets: tuple[list[Manifold], ...] = ([], [], [], [])
     for core in cores:
@@ -43,11 +45,12 @@ def plates(sizes: Sizes, cores: list[Core]) -> dict[str, Part]:
         x, top = float(hole.circle[0]), float(hole.circle[-1])
         fitting = float(hole.bore[0]), float(hole.bore[-1])
         leant = lean(sizes, hole)
-        first = loft([-depth, 1.0], [sizes.spigot(hole, 0) + c] * 2, [x - depth * leant, x + leant], COARSE)
-        second = cylinder(sizes.spigot(hole, -1) + c, low - 1.0, high, top)
+        first = loft([-depth, 1.0], [sizes.spigot(hole, 0) + c] * 2, [x - depth * leant, x + leant], MIDDLE)
+        second = cylinder(sizes.spigot(hole, -1) + c, low - 1.0, high, top, sides=MIDDLE)
         below = [-depth, -LAND, -LAND, 0.0, 1.0]
         leaning = [x + leant * z for z in below]
-        rod = loft(below, [fitting[0] + c] * 2 + [fitting[0]] * 3, leaning, MIDDLE)
+        weep = cylinder(min(WEEP, fitting[0] / 2), -sizes.stand - 1.0, 1.0 - depth, x - depth * leant)
+        rod = loft(below, [fitting[0] + c] * 2 + [fitting[0]] * 3, leaning, MIDDLE) + weep
         over = low + CHANNEL + LAND
         guide = loft([low - 1.0, over, over, high], [fitting[1]] * 2 + [fitting[1] + c] * 2, top, MIDDLE)
         for kind, one in zip(sockets, (first, second, rod, guide), strict=True):

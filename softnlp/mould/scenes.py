@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 SILICONE = (0.93, 0.88, 0.80)
 LINER = (0.95, 0.72, 0.72)
+CUT = (0.85, 0.25, 0.20)
 
 
 def core_scene(mould: SegmentMould, core: Core) -> Image:
@@ -49,10 +50,16 @@ def exploded(mould: SegmentMould, number: int) -> Image:
         for turn in part.turns:
             turned_by = np.radians(turn)
             way = np.array([[np.cos(turned_by), -np.sin(turned_by)], [np.sin(turned_by), np.cos(turned_by)]])
-            x, y = way @ np.array(part.apart[:2])
-            lift = part.apart[2] * (1.0 if part.kind == "plate" else 0.55)
+            *aside, lift = apart_in_picture(part)
+            x, y = way @ np.array(aside)
             things.append(Drawn.of(turned(part.solid, turn).translate((x, y, lift)), COLOURS[part.kind]))
     return picture(things, 390, 580, _side(mould))
+
+
+def apart_in_picture(part: Part) -> tuple[float, float, float]:
+    """Return where a part goes in a picture that has no room for all the way out [mm]."""
+    x, y, lift = part.apart
+    return x, y, lift * (1.0 if part.kind == "plate" else 0.55)
 
 
 def _side(mould: SegmentMould) -> np.ndarray:
@@ -65,8 +72,33 @@ def open_shell(mould: SegmentMould, number: int, silicone: bool) -> Image:
     things = [Drawn.of(one, COLOURS[part.kind]) for part in parts for one in part.every]
     if silicone:
         things.append(Drawn.of(_half(mould, mould.cast), SILICONE if number == 1 else LINER))
+    return picture(things, 390, 480, _front(mould))
+
+
+def _front(mould: SegmentMould) -> np.ndarray:
+    """Return the view into a shell without its first part."""
     x, y, _ = mould.shells[0].down
-    return picture(things, 390, 480, camera(float(np.degrees(np.arctan2(y, x))) + 108.0, 20.0))
+    return camera(float(np.degrees(np.arctan2(y, x))) + 108.0, 20.0)
+
+
+def draw_scene(mould: SegmentMould) -> Image:
+    """Draw how the first core is drawn: shell and silicone cut open, the top plate off, key or pin on its way out."""
+    things = []
+    for part in mould.step(1):
+        if part is mould.shells[0] or part.name == "top-1":
+            continue
+        rise = 0.55 * mould.sizes.shape.length if part is mould.cores[0].parts[0] else 0.0
+        for n, one in enumerate(part.every):
+            things.append(Drawn.of(one.translate((0.0, 0.0, rise if n == 0 else 0.0)), COLOURS[part.kind]))
+    things.append(Drawn.of(_half(mould, mould.first), SILICONE))
+    return picture(things, 390, 480, _front(mould))
+
+
+def sprue_scene(mould: SegmentMould) -> Image:
+    """Draw the body as it comes out of the shell, with what is cut off: gate and ring, in red."""
+    gate, ring = mould.sprues[1]
+    things = [Drawn.of(mould.cast, SILICONE), Drawn.of(gate, CUT), Drawn.of(ring, CUT)]
+    return picture(things, 390, 420, _side(mould))
 
 
 def _half(mould: SegmentMould, solid: Manifold) -> Manifold:

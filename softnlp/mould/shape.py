@@ -70,6 +70,10 @@ class Shape:
         total = _cone(self.z, self.outer) - _cone(self.z, self.lumen)
         return total - sum(_cone(self.z, hole.bore if kind == "bore" else hole.core) for hole in self.holes)
 
+    def liner(self, hole: Hole) -> float:
+        """Return the exact volume between thread and bore of a chamber [mm^3]."""
+        return _cone(self.z, hole.core) - _cone(self.z, hole.bore)
+
     def gaps(self) -> list[float]:
         """Return the angles [rad] in the middle between neighbouring holes, the widest gap first."""
         angles = sorted(hole.angle % (2 * pi) for hole in self.holes)

@@ -18,6 +18,7 @@ from softnlp.scenario.mould import MouldTable as Settings
 SEAT, GAP, LIP = 4.0, 0.3, 4.0  # how far plates reach into the shell, stand off its end, and overlap its step [mm]
 FLOOR, GRIP, PULL = 1.2, 8.0, 6.0  # below sockets; what cores stand out above the plate, and keys above cores [mm]
 LAND, CHANNEL = 2.0, 2.0  # where second rods fit without play; depth of the channel above the liners [mm]
+LEAST_VENT = 0.3  # narrower ones close as they are printed [mm]
 LUER, USUAL_GATE, USUAL_TUBE = 4.3, 4.0, 2.0  # the mouth takes a syringe's tip [mm]
 THREE_PART_FROM = 15.0  # outer diameter of the smallest robot of the paper with three-part cores [mm]
 KEY_DRAFT, SEAL = 0.003, 0.01  # of a key's narrow sides; of shoulders beyond their sockets' play, at least [mm]
@@ -253,10 +254,11 @@ def _refusals(sizes: Sizes) -> Iterator[InputError]:
     """Yield an error for each size that cannot be made."""
     settings, shape, least = sizes.settings, sizes.shape, sizes.settings.minimum_wall_mm
     t, pitch, depth = settings.thread_diameter_mm, settings.thread_pitch_mm, sizes.depth
-    for key in ("wall_mm", "plate_mm", "flange_thickness_mm"):
+    for key in ("wall_mm", "plate_mm", "flange_thickness_mm", "cap_mm"):
         if getattr(settings, key) < least:
             yield refuse(f"{getattr(settings, key):g} mm is less than minimum_wall_mm = {least:g}", key)
     yield from _groove(sizes)
+    yield from _thread(sizes)
     if depth > 0 and pitch - t < least - _ROUND_OFF:
         yield refuse(
             f"the ridge between turns is {pitch - t:.3g} mm, less than minimum_wall_mm = {least:g}: a pitch of "
@@ -269,6 +271,10 @@ def _refusals(sizes: Sizes) -> Iterator[InputError]:
         yield refuse(f"{pitch:g} mm leaves no turn on {shape.length:g} mm", "thread_pitch_mm")
     if sizes.gate > sizes.wall + _ROUND_OFF:
         yield refuse(f"a gate of {sizes.gate:g} mm is wider than the wall of silicone, {sizes.wall:.3g} mm", "gate_mm")
+    if sizes.gate < least - _ROUND_OFF:
+        yield refuse(f"a gate of {sizes.gate:g} mm is less than minimum_wall_mm = {least:g}", "gate_mm")
+    if not LEAST_VENT <= settings.vent_mm <= LIP:
+        yield refuse(f"expected vents of {LEAST_VENT:g} to {LIP:g} mm, got {settings.vent_mm:g}", "vent_mm")
     if settings.flange_mm < 3 * settings.screw_mm:
         yield refuse(f"{settings.flange_mm:g} mm leaves no room for screws of {settings.screw_mm:g} mm", "flange_mm")
     yield from _rods(sizes)
@@ -290,6 +296,25 @@ def _groove(sizes: Sizes) -> Iterator[InputError]:
         yield refuse(
             "pins that lean or widen cannot be turned out of a groove: 0, or three-part cores", "groove_depth_mm"
         )
+
+
+def _thread(sizes: Sizes) -> Iterator[InputError]:
+    """Yield why a thread would not be inside the silicone; its middle is at the circle of the core."""
+    shape, half = sizes.shape, sizes.settings.thread_diameter_mm / 2
+
+    def bare(where: str, room: float) -> Iterator[InputError]:
+        if room < half - _ROUND_OFF:
+            beside = f"there are {max(room, 0.0):.3g} mm beside its middle"
+            yield refuse(f"a thread of {2 * half:g} mm would lie bare {where}: {beside}", "thread_diameter_mm")
+
+    for hole in shape.holes:
+        yield from bare(f"in the bore of chamber {hole.chamber}", float(np.min(hole.core - hole.bore)))
+        yield from bare("in the lumen", float(np.min(hole.circle - hole.core - shape.lumen)))
+        yield from bare("at the surface", float(np.min(shape.outer - hole.circle - hole.core)))
+    for a, b in combinations(shape.holes, 2):
+        for end in (0, -1):
+            room = (distance(a, b, end) - float(a.core[end] + b.core[end])) / 2
+            yield from bare(f"between chambers {a.chamber} and {b.chamber}", room)
 
 
 def _rods(sizes: Sizes) -> Iterator[InputError]:

@@ -107,8 +107,10 @@ class _Candidates:
         self._order: list[Candidate] = []
         self._row = study_row("design", "Find the best design", self._asked, self._finish, self._watch)
         self._why = controls.named(ui.label("").classes("text-sm break-words whitespace-pre-line w-full"), "design.why")
-        self._use = controls.use_button("Use this design", "design.use", self._take)
-        self._use.set_visibility(False)
+        with ui.row().classes("gap-2") as self._use_row:
+            self._use = controls.use_button("Use this design", "design.use", self._take)
+            controls.button("Make its moulds", "view_in_ar", "design.make", self._make, controls.USE).classes("px-2")
+        self._use_row.set_visibility(False)
         self._chart = Chart("design.chart", "", "")
         self._table = NumberTable("design.table", self._choose, height="20rem")
         with ui.row().classes("gap-1") as self._files:
@@ -122,7 +124,7 @@ class _Candidates:
         few_enough(asked, MOST_CANDIDATES, "candidates", "softnlp design")
         self._found, self._drawn = Found(asked), -1
         self._chosen = None
-        self._use.set_visibility(False)
+        self._use_row.set_visibility(False)
         self._why.set_text("")
         return work_of(self._found)
 
@@ -169,7 +171,7 @@ class _Candidates:
         """Say what holds a candidate back or why it is not feasible, and offer it."""
         self._chosen = candidate
         self._why.set_text(why(design, candidate))
-        self._use.set_visibility(bool(candidate.outputs))
+        self._use_row.set_visibility(bool(candidate.outputs))
         best = candidate is design.best
         self._use.set_text("Use this design" if best else f"Use candidate {candidate.number}")
 
@@ -189,6 +191,12 @@ class _Candidates:
         pressure[list(task.sets)] = chosen.outputs["pressure"]
         session.use_pressure(pressure)
         ui.notify(f"the robot is that of candidate {chosen.number}", type="positive")
+
+    def _make(self) -> None:
+        """Make the candidate the robot on the screen, and its moulds on their tab."""
+        self._take()
+        self._stage.asked.add("mould")
+        self._stage.open_tab("mould")
 
 
 def in_order(design: Design) -> list[Candidate]:

@@ -3,7 +3,7 @@ import { Stage } from "softnlp-view";
 
 export default {
   template: `<div class="softnlp-view" role="application" aria-roledescription="3-D view" tabindex="0"
-    aria-label="The robot. Arrow keys turn the view, plus and minus zoom, Home goes back to the first view. O chooses an obstacle, Shift and the arrow keys move it." @keydown="key" style="position:relative;overflow:hidden;min-height:12rem;touch-action:none">
+    aria-label="The robot, or the parts of its moulds. Arrow keys turn the view, plus and minus zoom, Home goes back to the first view. O chooses an obstacle, Shift and the arrow keys move it." @keydown="key" style="position:relative;overflow:hidden;min-height:12rem;touch-action:none">
     <span role="status" style="position:absolute;width:1px;height:1px;overflow:hidden;clip-path:inset(50%)"></span></div>`,
 
   mounted() {
@@ -59,6 +59,12 @@ export default {
     },
     pins(message) {
       this.stage?.setPins(message?.pins ?? []);
+    },
+    parts(message) {
+      this.stage?.setParts(message);
+    },
+    explode(share) {
+      this.stage?.explode(share);
     },
     reset() {
       this.stage?.reset();

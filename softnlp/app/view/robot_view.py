@@ -86,6 +86,21 @@ class RobotView(Element, component="robot_view.js", esm={"softnlp-view": "js"}):
         """Call a handler as an obstacle is dragged or moved by keys: number from 0, how far [mm], if that is all."""
         self._movers.append(handler)
 
+    def parts(self, message: dict[str, Any] | None) -> None:
+        """Show the parts of a mould in place of the robot, or the robot again for None.
+
+        message : `name`; `apart` as of `explode`; `solids`, each with `points` and `faces` (`wide`: of 32 bits),
+        `colour` and `opacity`; `places`, each with the index of its `solid`, `turn` about z [deg], and
+        `at` and `apart` (3,) [mm]: where it is, and how far it goes when all are apart.
+        """
+        self._mark("parts", message)
+
+    def explode(self, share: float) -> None:
+        """Draw the parts from together, 0, to apart, 1."""
+        if (shown := self._marks.get("parts")) is not None:
+            shown["apart"] = share
+            self._call("explode", share)
+
     def on_pick(self, handler: Callable[[Point], Any]) -> None:
         """Call a handler with (x, y, z) [mm] when the view is clicked, not dragged.
 

@@ -6,6 +6,7 @@ import { stationFrames } from "./expand.js";
 import { Label, spread } from "./label.js";
 import { Marks } from "./marks.js";
 import { Obstacles } from "./obstacles.js";
+import { Parts } from "./parts.js";
 import { Surroundings } from "./surroundings.js";
 import { followTheme } from "./theme.js";
 
@@ -46,6 +47,8 @@ export class Stage {
     this.camera = new THREE.PerspectiveCamera(FIELD, 1, 1, 1e4);
     this.light = new THREE.DirectionalLight(0xffffff, 1.6);
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0xb8bcc4, 1.5), this.light);
+    this.world = new THREE.Group(); // the robot and all around it; hidden while parts are shown
+    this.scene.add(this.world);
     this.hold(false);
     this.labels = new Set();
     this.surroundings = new Surroundings(this.labels);
@@ -54,8 +57,8 @@ export class Stage {
     this.tipFrame.group.visible = false;
     this.marks = new Marks(() => this.request());
     this.obstacles = new Obstacles(this.labels, (moved) => this.emit("moved", moved));
-    this.scene.add(this.surroundings.group, this.arrows.group, this.tipFrame.group, this.marks.group);
-    this.scene.add(this.obstacles.group);
+    this.world.add(this.surroundings.group, this.arrows.group, this.tipFrame.group, this.marks.group);
+    this.world.add(this.obstacles.group);
     this.followed = followTheme((theme) => this.paint(theme));
     this.paint(this.followed.theme);
     this.listen(canvas);
@@ -82,7 +85,7 @@ export class Stage {
     this.palette = message.palette;
     this.body = new Bodies(pieces, this.theme);
     this.ghost = new Ghosts(pieces, this.theme);
-    this.scene.add(this.body.group, this.ghost.group);
+    this.world.add(this.body.group, this.ghost.group);
   }
 
   // Bodies that stay, each a ghost of its own robot with a letter at its tip.
@@ -101,7 +104,7 @@ export class Stage {
       label.sprite.position.set(...tube.axis.subarray(-7, -4));
       this.labels.add(label);
       ghost.group.add(label.sprite);
-      this.scene.add(ghost.group);
+      this.world.add(ghost.group);
       return { ghost, label, text: message.label };
     });
     this.rescale();
@@ -132,6 +135,49 @@ export class Stage {
     return this.obstacles.made[chosen].name;
   }
 
+  // Parts in place of the robot, or the robot again for null. Other parts keep the direction from which they are seen.
+  setParts(message) {
+    const before = this.parts ?? null;
+    if (before === null && message === null) return;
+    before?.dispose();
+    this.parts = message === null ? null : new Parts(message);
+    this.world.visible = this.parts === null;
+    this.element.dataset.parts = message?.name ?? "";
+    if (this.parts !== null) this.scene.add(this.parts.group);
+    if (before === null || this.parts === null) {
+      this.hold(this.upsideDown);
+      this.reset();
+      this.rescale();
+    } else this.follow();
+    this.request();
+  }
+
+  explode(share) {
+    this.parts?.explode(share);
+    this.follow();
+    this.request();
+  }
+
+  // See all parts from where the user left the camera.
+  follow() {
+    if (!this.parts) return;
+    const away = this.camera.position.clone().sub(this.controls.target).normalize();
+    this.lookAtParts(away);
+  }
+
+  lookAtParts(away) {
+    const { center, radius } = this.parts.sphere;
+    const distance = (1.05 * radius * Math.max(1, 1 / this.camera.aspect)) / Math.sin(radians(FIELD / 2));
+    this.controls.target.copy(center);
+    this.camera.position.copy(center).addScaledVector(away, distance);
+    this.limit(radius);
+    this.controls.update();
+  }
+
+  get upsideDown() {
+    return !this.parts && (this.frame?.hanging ?? false);
+  }
+
   // Only kept here: of several that come before the next animation frame the last is drawn, and the tip of each.
   show(frame) {
     this.next = { ...frame, body: readTube(frame.body), ghost: readTube(frame.ghost) };
@@ -152,6 +198,7 @@ export class Stage {
     this.frame = frame;
     this.tip = [...tip.subarray(0, 3)];
     const turned = (before?.hanging ?? false) !== frame.hanging;
+    if (this.parts) return;
     if (turned) this.hold(frame.hanging);
     if (before === undefined || turned) this.reset();
     else if (before.length !== frame.length) this.grow(frame.length / before.length);
@@ -174,13 +221,18 @@ export class Stage {
   }
 
   reset() {
-    if (this.frame === undefined) return;
+    if (this.frame === undefined && !this.parts) return;
     // What is left of the swing of a drag would go on after it.
     this.controls.enableDamping = false;
     this.controls.update();
     this.controls.enableDamping = true;
-    const size = this.frame.length;
     const [a, e] = [radians(AZIMUTH), radians(ELEVATION)];
+    if (this.parts) {
+      this.lookAtParts(new THREE.Vector3(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e)));
+      this.request();
+      return;
+    }
+    const size = this.frame.length;
     const away = 4.1 * size * narrowness(this.camera.aspect);
     this.controls.target.set(0, 0, 0.45 * size);
     this.camera.position.set(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e) * this.camera.up.z);
@@ -281,7 +333,7 @@ export class Stage {
     let start = null;
     canvas.addEventListener("pointerdown", (event) => {
       start = event.button === 0 ? [event.clientX, event.clientY] : null;
-      if (start === null || !this.obstacles.take(this.caster(event), this.camera)) return;
+      if (start === null || this.parts || !this.obstacles.take(this.caster(event), this.camera)) return;
       this.controls.enabled = false;
       canvas.setPointerCapture(event.pointerId);
       this.obstacles.paint(this.theme);
@@ -303,7 +355,7 @@ export class Stage {
       if (this.obstacles.drop()) return;
       if (start === null || Math.hypot(event.clientX - start[0], event.clientY - start[1]) > CLICK) return;
       const picked = this.pick(this.caster(event));
-      if (picked !== null) this.emit("pick", picked);
+      if (picked !== null && !this.parts) this.emit("pick", picked);
     });
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     canvas.addEventListener("webglcontextrestored", () => this.request());
@@ -342,6 +394,7 @@ export class Stage {
     this.ghost?.dispose();
     this.setPins([]);
     this.obstacles.clear();
+    this.parts?.dispose();
     for (const label of this.labels) label.dispose();
     this.renderer.dispose();
     this.renderer.forceContextLoss(); // a browser has few of them
