@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.rich import rich_html
 from softnlp.base.status import Status
 from softnlp.model.contact_settings import NO_CLOSURE, ContactSettings
 from softnlp.model.conventions import Coefficients, Conventions
@@ -380,6 +381,8 @@ class Run:
     contact: ContactSettings | None = None
     uncertainty: Mapping[str, Any] = field(default_factory=dict)
     obstacles: tuple[Obstacle, ...] = ()
+
+    _repr_html_ = rich_html
 
     @property
     def failed(self) -> tuple[Step, ...]:
