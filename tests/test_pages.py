@@ -25,6 +25,7 @@ PAGES = [
     "index",
     "tutorial",
     "extending",
+    "nlp",
     "problem",
     *(f"how-to/{page.stem}" for page in sorted((DOCS / "how-to").glob("*.md"))),
 ]
@@ -208,8 +209,11 @@ def test_a_notebook_runs_from_top_to_bottom(notebook: Path) -> None:
     notebooks.make_one(notebook)  # what is kept of an earlier run was made from the same sources
     page = notebooks.made()[f"notebooks/{notebook.stem}.md"].decode()
     images = re.findall(r"\]\((\w+\.png)\)", page)
-    assert len(images) >= 3
+    frames = re.findall(r'<iframe src="(\w+\.html)"', page)
+    assert len(images) + len(frames) >= 2
     assert all(notebooks.made()[f"notebooks/{image}"].startswith(b"\x89PNG") for image in images)
+    assert all(b"softnlp-view" in notebooks.made()[f"notebooks/{frame}"] for frame in frames)
+    assert len(frames) == ("NotebookView(" in notebook.read_text())
     assert "Error" not in page
 
 

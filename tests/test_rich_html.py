@@ -71,8 +71,8 @@ def test_a_run_shows_the_table_of_the_command() -> None:
     run = forward(robot("D25L60"), material("Ecoflex 00-50", "yeoh"), P, conventions=AS_PRINTED, title="A & B")
     html = run._repr_html_()
     header, *rows = cells(html)
-    assert header[:5] == ["step", "p1\n[bar]", "p2\n[bar]", "p3\n[bar]", "status"]
-    angle = header.index("bending\n[deg]")
+    assert header[:5] == ["step", "p1 [bar]", "p2 [bar]", "p3 [bar]", "status"]
+    angle = header.index("bending [deg]")
     assert float(rows[1][angle]) == pytest.approx(np.degrees(run.steps[1].pose.bending_angle), abs=6e-3)
     assert rows[2][4] == str(run.steps[2].status) != "solved"
     assert run.steps[2].message in "".join(ET.fromstring(html).itertext())

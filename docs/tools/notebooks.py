@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
+from collections.abc import Sequence
 from html import unescape
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -60,9 +61,20 @@ def _build(path: Path, folder: Path) -> None:
             parts.append(re.sub(r"(\]\(\w+)\.ipynb\)", r"\1.md)", cell.source))
             continue
         parts.append(f"```python\n{cell.source}\n```")
-        for k, output in enumerate(cell.outputs):
+        for k, output in enumerate(_joined(cell.outputs)):
             parts.append(_shown(output, folder, f"{path.stem}_{number}_{k}"))
     (folder / f"{path.stem}.md").write_text("\n\n".join(parts) + "\n")
+
+
+def _joined(outputs: Sequence[Any]) -> list[Any]:
+    """Return the outputs of a cell with what was printed in pieces as one, however long it took to come."""
+    joined: list[Any] = []
+    for output in outputs:
+        if joined and output.output_type == "stream" and joined[-1].get("name") == output.name:
+            joined[-1].text += output.text
+        else:
+            joined.append(output)
+    return joined
 
 
 def _shown(output: Any, folder: Path, name: str) -> str:

@@ -71,7 +71,7 @@ def _run(run: Run) -> str:
     parts.append(f"<p>{escape(run.robot.name)}, {escape(run.material.name)} ({escape(run.material.law.name)})</p>")
     for part in table_lines(run).renderables:
         if isinstance(part, Table):
-            header = [str(column.header) for column in part.columns]
+            header = [str(column.header).replace("\n", " ") for column in part.columns]
             rows = list(zip(*([str(cell) for cell in column.cells] for column in part.columns), strict=True))
             parts.append(_table(header, rows[:_MOST_STEPS]))
             if len(rows) > _MOST_STEPS:
