@@ -69,6 +69,8 @@ def test_a_page_does_what_it_shows(
             read_toml(name, code, saved)
         elif language == "bash":
             for line in code.splitlines():
+                if line.startswith("mkdir -p "):
+                    Path(line.split()[-1]).mkdir(parents=True, exist_ok=True)
                 if line.startswith("softnlp "):
                     assert main(shlex.split(line)[1:]) == 0, line
         elif language == "python":
