@@ -27,7 +27,7 @@ PAGES = [
     "extending",
     "nlp",
     "problem",
-    *(f"how-to/{page.stem}" for page in sorted((DOCS / "how-to").glob("*.md"))),
+    *(f"how-to/{page.stem}" for page in sorted((DOCS / "how-to").glob("*.md")) if page.stem != "first-tasks"),
 ]
 SCRIPTS = sorted((DOCS / "figures").glob("[!_]*.py"))
 LONGEST_EXTENSION = 30
