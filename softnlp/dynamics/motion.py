@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
+import scipy  # its parts are imported where they are first used
 from numpy.typing import NDArray
 
 from softnlp.base.status import Status

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from softnlp.base.errors import InputError
 from softnlp.base.status import Status
@@ -162,6 +161,8 @@ class ChainWall:
             step, found = self._rough_poses.solve(part * pressure, self._loads, near)
             near = found or near
             return float("nan") if step.pose is None else self._gap(step.pose, wall)
+
+        from scipy.optimize import brentq  # here: runs without a wall do without scipy
 
         scan = np.linspace(0, 1, _SCAN)
         known = np.array([gap(float(part)) for part in scan])

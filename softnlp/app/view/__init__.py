@@ -6,9 +6,10 @@ notebook, need the extra `gui` and are imported when they are asked for.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from softnlp.app.view.frame import Arrow, Frame, Tube, frame_of
+from softnlp.base.lazy import names_of
 
 if TYPE_CHECKING:
     from softnlp.app.view.notebook import NotebookView
@@ -16,14 +17,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Arrow", "Frame", "NotebookView", "RobotView", "Tube", "frame_of"]
 
-
-def __getattr__(name: str) -> Any:
-    if name == "RobotView":
-        from softnlp.app.view.robot_view import RobotView
-
-        return RobotView
-    if name == "NotebookView":
-        from softnlp.app.view.notebook import NotebookView
-
-        return NotebookView
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__ = names_of(
+    __name__, {"softnlp.app.view.robot_view": ("RobotView",), "softnlp.app.view.notebook": ("NotebookView",)}
+)
