@@ -189,6 +189,17 @@ def test_every_script_of_a_figure_is_shown_by_a_page() -> None:
     assert shown == {script.stem for script in SCRIPTS}
 
 
+def test_a_figure_is_seen_where_the_repository_is_read() -> None:
+    """Each script with a figure has its picture kept beside the pages, and the pages show it."""
+    seen = {
+        name
+        for page in WRITTEN
+        for name in re.findall(r"\[!\[[^\]]+\]\((?:\.\./)*images/figures/(\w+)\.png\)\]\(", page.read_text())
+    }
+    drawn = {s.stem for s in SCRIPTS if re.search(r"^def figure|^text, figure", s.read_text(), re.MULTILINE)}
+    assert seen == drawn == {path.stem for path in (DOCS / "images" / "figures").glob("*.png")}
+
+
 def test_every_page_is_in_the_navigation() -> None:
     written = {page.relative_to(DOCS).as_posix() for page in WRITTEN} - {"mutation.md"}  # CONTRIBUTING leads there
     written |= {f"notebooks/{notebook.stem}.md" for notebook in (DOCS / "notebooks").glob("*.ipynb")}
