@@ -112,7 +112,6 @@ GUIDES = {
     "collocation": "nlp.html",
     "multipliers": "nlp.html",
     "kPa": "glossary.html",
-    "Jupyter": "view.html",
     "closure": "how-to/blocked-force.html",
 }
 """The page that a word of a person has to lead to first."""
@@ -127,16 +126,16 @@ def test_the_search_leads_to_guides_before_sources() -> None:
         Thread(target=server.serve_forever, daemon=True).start()
         browser = play.chromium.launch(executable_path=chromium(), args=list(FLAGS))
         page = browser.new_page(viewport={"width": 1280, "height": 800})
-        page.goto(f"http://127.0.0.1:{server.server_port}/index.html")
         first = {}
         for words in GUIDES:
-            page.fill(".md-search__input", "")
-            page.fill(".md-search__input", words)
-            link = page.locator(".md-search-result__list > li a").first
+            page.goto(f"http://127.0.0.1:{server.server_port}/index.html")
+            page.click(".md-search__input")
+            page.keyboard.type(words)
+            link = page.locator("a.md-search-result__link").first
             link.wait_for(state="attached", timeout=60_000)
-            page.wait_for_timeout(700)  # for the results of these words
-            address = str(link.get_attribute("href"))
-            first[words] = address.partition("?")[0].partition("#")[0].split(f":{server.server_port}/")[-1]
+            page.wait_for_timeout(500)  # for the results of the last letters
+            address = str(link.get_attribute("href")).partition("?")[0].partition("#")[0]
+            first[words] = address.split(f":{server.server_port}/")[-1]
         browser.close()
         server.shutdown()
     assert first == GUIDES
