@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-from docs.tools import figures, links, mathml, notebooks, paper, work  # noqa: E402
+from docs.tools import figures, links, mathml, notebooks, paper, search, work  # noqa: E402
 
 DOCS = ROOT / "docs"
 
@@ -44,6 +44,7 @@ def _text(content: str | bytes) -> str:
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
     """Show figures and tables in place of links to the scripts that make them; lead other links into the site."""
     uri = page.file.src_uri
+    page.meta.setdefault("search", {"boost": search.boost(uri)})
     return links.into_site(figures.shown(markdown, uri), uri)
 
 

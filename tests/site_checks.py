@@ -6,12 +6,16 @@ Not collected by pytest on its own: the site needs to be built first.
 from __future__ import annotations
 
 import re
+from functools import partial
 from html.parser import HTMLParser
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
 import softnlp
+from benchmarks.app import FLAGS, chromium
 
 ROOT = Path(__file__).parents[1]
 SITE = ROOT / "site"
@@ -96,4 +100,49 @@ def test_figures_and_tables_stand_in_place_of_their_scripts() -> None:
 
 @pytest.mark.parametrize("name", sorted(set(softnlp.__all__) - {"__version__"}))
 def test_a_name_of_the_interface_has_its_entry(name: str) -> None:
-    assert re.search(rf'id="softnlp\.[\w.]*\b{name}"', (SITE / "api.html").read_text())
+    assert re.search(
+        rf'id="softnlp\.[\w.]*\b{name}"', "".join(page.read_text() for page in sorted((SITE / "api").glob("*.html")))
+    )
+
+
+GUIDES = {
+    "hanging": "how-to/loaded.html",
+    "gravity": "how-to/loaded.html",
+    "outer wall": "tutorial.html",
+    "collocation": "nlp.html",
+    "multipliers": "nlp.html",
+    "kPa": "glossary.html",
+    "closure": "how-to/blocked-force.html",
+}
+"""The page that a word of a person has to lead to first."""
+
+
+@pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
+def test_the_search_leads_to_guides_before_sources() -> None:
+    """The search box of the site itself, in a browser."""
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    handler = partial(Quiet, directory=str(SITE))
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server, sync_api.sync_playwright() as play:
+        Thread(target=server.serve_forever, daemon=True).start()
+        browser = play.chromium.launch(executable_path=chromium(), args=list(FLAGS))
+        page = browser.new_page(viewport={"width": 1280, "height": 800})
+        first = {}
+        for words in GUIDES:
+            page.goto(f"http://127.0.0.1:{server.server_port}/index.html")
+            page.click(".md-search__input")
+            page.keyboard.type(words)
+            link = page.locator("a.md-search-result__link").first
+            link.wait_for(state="attached", timeout=60_000)
+            page.wait_for_timeout(500)  # for the results of the last letters
+            address = str(link.get_attribute("href")).partition("?")[0].partition("#")[0]
+            first[words] = address.split(f":{server.server_port}/")[-1]
+        browser.close()
+        server.shutdown()
+    assert first == GUIDES
+
+
+class Quiet(SimpleHTTPRequestHandler):
+    """Serves the site without a line for each file."""
+
+    def log_message(self, *args: object) -> None:
+        """Say nothing."""

@@ -12,6 +12,7 @@ pytest.importorskip("nicegui", reason="the extra gui is not installed")
 pytest.importorskip("playwright", reason="playwright is not installed")
 
 from benchmarks.app import chromium
+from docs.tools.steps import Step, action, steps
 from tests.browser import Watched, keeps, reload
 
 pytestmark = [
@@ -20,31 +21,44 @@ pytestmark = [
 ]
 
 
+def follow(tab: Watched, step: Step) -> None:
+    """Do what a step says, to what bears the name that it says."""
+    verb, name, number = action(step)
+    page = tab.page
+    if verb == "Put":
+        page.locator(f"//*[text()='{name}']/following::input[@type='number'][1]").fill(number)
+    elif verb == "Open the tab":
+        page.get_by_role("tab", name=name).click()
+    else:
+        page.get_by_text(name, exact=True).locator("visible=true").first.click()
+
+
 def test_a_design_is_pinned_compared_and_reported(tab: Watched, new_tab: Any, tmp_path: Path, pictures: Path) -> None:
-    """The ten steps of a person, as docs/app.md names them."""
+    """The steps of a person, by what docs/how-to/first-tasks.md says to press, and by nothing else."""
+    told = iter(steps("how-to/first-tasks", "Only the app: design, pin, compare, report"))
     first = tab.numbers()
-    tab.press("pin")  # 1: the robot to beat
-    tab.press("tab-design")  # 2
-    tab.press("design.example")  # 3
+    for _ in range(3):  # the robot to beat is pinned, and an example of a design opened
+        follow(tab, next(told))
     tab.settled()
-    tab.press("design.run")  # 4
+    follow(tab, next(told))
     tab.page.wait_for_selector("[data-testid='design.use']:visible", timeout=300_000)
     found = re.search(r"bending angle ([\d.]+) ° at 0.8 bar", tab.text("design.why"))
     assert found
-    tab.press("design.use")  # 5
+    follow(tab, next(told))
     tab.settled()
     tab.shows("bending_angle_deg", float(found[1]), 0.05)  # solved again by the page
     assert float(found[1]) > 2 * float(first["bending_angle_deg"])
-    tab.press("pin")  # 6
-    tab.type("pressure-number-1", "0.5")  # 7
+    follow(tab, next(told))
+    follow(tab, next(told))
     tab.settled()
     less = float(tab.text("pin.A.bending_angle_deg"))
     now = float(tab.numbers()["bending_angle_deg"])
     assert less == pytest.approx(now - float(first["bending_angle_deg"]), abs=2e-3)
     tab.page.screenshot(path=pictures / "app_pins.png")
-    tab.press("export")  # 8
+    follow(tab, next(told))
     with tab.page.expect_download() as waiting:
-        tab.press("report")  # 9
+        follow(tab, next(told))
+    assert next(told, None) is None
     report = Path(waiting.value.path()).read_text()
     assert report.count("<img") >= 3  # picture, section, design
     assert "Pinned states" in report

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.judge import VARIANTS, judge
+from benchmarks.measured import ANGLES
 from docs.figures import glossary, statuses
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.status import Status
@@ -52,7 +54,7 @@ def test_every_message_is_one_that_the_code_says() -> None:
                 assert word in SOURCE, word
 
 
-@pytest.mark.parametrize("page", ["which.md", "troubleshooting.md", "from-matlab.md", "glossary.md"])
+@pytest.mark.parametrize("page", ["which.md", "troubleshooting.md", "from-matlab.md", "glossary.md", "trust.md"])
 def test_every_command_and_option_is_there(page: str) -> None:
     app = _app()
     for command in re.findall(r"`softnlp ([^`]+)`", (DOCS / page).read_text()):
@@ -61,3 +63,28 @@ def test_every_command_and_option_is_there(page: str) -> None:
         help_text = "".join(path.read_text() for path in (ROOT / "softnlp" / "cli").glob("*.py"))
         for option in (word for word in words if word.startswith("--")):
             assert option.removeprefix("--").replace("-", "_") in help_text, command
+
+
+def test_the_advice_on_trust_leads_to_what_it_names() -> None:
+    closures = {row[0].split("`")[1] for row in rows("trust.md", "## Which closure")}
+    assert closures == {"compliant", "none", "free", "weighted", "rigid"}
+    for page in re.findall(r"\]\(([\w/-]+\.md)", (DOCS / "trust.md").read_text()):
+        assert (DOCS / page).is_file()
+
+
+@pytest.mark.slow
+def test_the_errors_on_the_page_of_trust_are_those_of_the_judge() -> None:
+    judged = [judge(variant) for variant in VARIANTS]
+    fitted, *shown = [[float(cell) for cell in row[1:]] for row in rows("trust.md", "## How far off each was")]
+    assert fitted == [one.variant.fitted for one in judged]
+    names = [name for name in judged[0].table if name != "constants fitted"]
+    for name, cells in zip(names, shown, strict=True):
+        assert cells == pytest.approx([one.table[name] for one in judged], rel=6e-3)
+    for one in judged:  # the order of the robots, which the page says of all of them
+        for sets in (0, 1):
+            by_model = sorted(ANGLES, key=lambda name, sets=sets, one=one: one.angles[name, sets + 1])
+            assert by_model == sorted(ANGLES, key=lambda name, sets=sets: ANGLES[name][sets])
+    longest = max(abs(error) for one in judged for error in one.elongation_errors.values())
+    assert longest == pytest.approx(4.2, abs=0.05)
+    worst = [abs(error) for error in judged[2].angle_errors.values()]
+    assert (min(worst), max(worst)) == (pytest.approx(1, abs=0.5), pytest.approx(75, abs=0.5))

@@ -25,11 +25,14 @@ PAGES = [
     "index",
     "tutorial",
     "extending",
+    "nlp",
     "problem",
-    *(f"how-to/{page.stem}" for page in sorted((DOCS / "how-to").glob("*.md"))),
+    *(f"how-to/{page.stem}" for page in sorted((DOCS / "how-to").glob("*.md")) if page.stem != "first-tasks"),
 ]
 SCRIPTS = sorted((DOCS / "figures").glob("[!_]*.py"))
 LONGEST_EXTENSION = 30
+NAMED = re.compile(r"^::: softnlp\.([\w.]+)$", re.MULTILINE)
+WRITTEN = sorted(path for path in DOCS.rglob("*.md") if path.parent.name not in ("paper", "__pycache__"))
 
 
 def read_toml(name: str, code: str, saved: list[Path]) -> None:
@@ -66,6 +69,8 @@ def test_a_page_does_what_it_shows(
             read_toml(name, code, saved)
         elif language == "bash":
             for line in code.splitlines():
+                if line.startswith("mkdir -p "):
+                    Path(line.split()[-1]).mkdir(parents=True, exist_ok=True)
                 if line.startswith("softnlp "):
                     assert main(shlex.split(line)[1:]) == 0, line
         elif language == "python":
@@ -153,7 +158,7 @@ def test_output_that_is_printed_and_drawn_is_that_of_the_page_s_file() -> None:
 
 def test_what_is_installed_is_this_checkout_and_an_extra_keeps_it_editable() -> None:
     """The package is on no index, and an extra without -e would put a copy in the place of an editable checkout."""
-    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *DOCS.glob("*.md"), *(DOCS / "how-to").glob("*.md")]
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *WRITTEN]
     said = [command for page in pages for command in re.findall(r"pip install ([^`\n&#]+)", page.read_text())]
     asked = [command for command in said if "softnlp" in command or "." in command.split()]
     extras = [command for command in said if "[" in command]
@@ -164,32 +169,47 @@ def test_what_is_installed_is_this_checkout_and_an_extra_keeps_it_editable() -> 
 
 
 def test_every_name_of_the_interface_is_on_its_page() -> None:
-    shown = re.findall(r"^::: softnlp\.([\w.]+)$", (DOCS / "api.md").read_text(), re.MULTILINE)
+    pages = {page.name: NAMED.findall(page.read_text()) for page in sorted((DOCS / "api").glob("*.md"))}
+    shown = [path for paths in pages.values() for path in paths]
     listed = {path.rpartition(".")[2] for path in shown}
     missing = set(softnlp.__all__) - listed - {"__version__"}
-    assert not missing, f"add `::: softnlp.MODULE.{sorted(missing)[0]}` to docs/api.md"
+    assert not missing, f"add `::: softnlp.MODULE.{sorted(missing)[0]}` to a page of docs/api"
     assert len(shown) == len(set(shown))
     for path in shown:
         module, _, name = path.rpartition(".")
         __import__(f"softnlp.{module}")
         assert hasattr(sys.modules[f"softnlp.{module}"], name), path
+    rows = re.findall(r"^\| \[[^\]]+\]\((\w+\.md)\) \| (.+) \|$", (DOCS / "api" / "index.md").read_text(), re.MULTILINE)
+    index = {page: re.findall(r"`(\w+)`", names) for page, names in rows}
+    assert index == {page: [path.rpartition(".")[2] for path in paths] for page, paths in pages.items() if paths}
 
 
 def test_every_script_of_a_figure_is_shown_by_a_page() -> None:
-    pages = [*DOCS.glob("*.md"), *(DOCS / "how-to").glob("*.md")]
-    shown = {name for page in pages for name in re.findall(r"\]\((?:\.\./)?figures/(\w+)\.py\)", page.read_text())}
+    shown = {name for page in WRITTEN for name in re.findall(r"\]\((?:\.\./)?figures/(\w+)\.py\)", page.read_text())}
     assert shown == {script.stem for script in SCRIPTS}
 
 
+def test_a_figure_is_seen_where_the_repository_is_read() -> None:
+    """Each script with a figure has its picture kept beside the pages, and the pages show it."""
+    seen = {
+        name
+        for page in WRITTEN
+        for name in re.findall(r"\[!\[[^\]]+\]\((?:\.\./)*images/figures/(\w+)\.png\)\]\(", page.read_text())
+    }
+    drawn = {s.stem for s in SCRIPTS if re.search(r"^def figure|^text, figure", s.read_text(), re.MULTILINE)}
+    assert seen == drawn == {path.stem for path in (DOCS / "images" / "figures").glob("*.png")}
+
+
 def test_every_page_is_in_the_navigation() -> None:
-    written = {page.relative_to(DOCS).as_posix() for page in [*DOCS.glob("*.md"), *(DOCS / "how-to").glob("*.md")]}
+    written = {page.relative_to(DOCS).as_posix() for page in WRITTEN} - {"mutation.md"}  # CONTRIBUTING leads there
     written |= {f"notebooks/{notebook.stem}.md" for notebook in (DOCS / "notebooks").glob("*.ipynb")}
     listed = set(re.findall(r"([\w/-]+\.md)\s*$", (ROOT / "mkdocs.yml").read_text(), re.MULTILINE))
     assert written <= listed
+    assert "mutation.md" not in listed
 
 
 def test_links_between_pages_lead_somewhere() -> None:
-    for page in [*(DOCS / "how-to").glob("*.md"), *(DOCS / "notebooks").glob("*.ipynb")]:
+    for page in [*WRITTEN, *(DOCS / "notebooks").glob("*.ipynb")]:
         for target in re.findall(r"\]\(([^)#]+?)(?:#[^)]*)?\)", page.read_text()):
             assert target.startswith("http") or (page.parent / target).exists(), f"{page.name}: {target}"
 
@@ -202,8 +222,11 @@ def test_a_notebook_runs_from_top_to_bottom(notebook: Path) -> None:
     notebooks.make_one(notebook)  # what is kept of an earlier run was made from the same sources
     page = notebooks.made()[f"notebooks/{notebook.stem}.md"].decode()
     images = re.findall(r"\]\((\w+\.png)\)", page)
-    assert len(images) >= 3
+    frames = re.findall(r'<iframe src="(\w+\.html)"', page)
+    assert len(images) + len(frames) >= 2
     assert all(notebooks.made()[f"notebooks/{image}"].startswith(b"\x89PNG") for image in images)
+    assert all(b"softnlp-view" in notebooks.made()[f"notebooks/{frame}"] for frame in frames)
+    assert len(frames) == ("NotebookView(" in notebook.read_text())
     assert "Error" not in page
 
 

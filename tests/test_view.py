@@ -30,6 +30,7 @@ from softnlp.results import Body
 from softnlp.statics.wall import Wall
 
 ARM = robot("D25L60")
+BESIDE_THE_VIEW = {"frame_of", "RobotView", "NotebookView", "run", "handler", "picture"}
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
 
@@ -200,7 +201,8 @@ def test_the_document_s_example_runs() -> None:
     from sybil.parsers.markdown import PythonCodeBlockParser
 
     document = Path(__file__).parents[1] / "docs" / "view.md"
-    (example,) = Document.parse(str(document), PythonCodeBlockParser()).examples()
+    in_a_cell, example = Document.parse(str(document), PythonCodeBlockParser()).examples()
+    in_a_cell.evaluate()
     example.evaluate()
     from nicegui import ui
     from nicegui.client import Client
@@ -210,7 +212,7 @@ def test_the_document_s_example_runs() -> None:
     (view,) = [element for element in client.elements.values() if type(element).__name__ == "RobotView"]
     assert view._frame.robot.name == "D25L60"
     for call in re.findall(r"`(\w+)\(", document.read_text()):
-        assert hasattr(view, call) or call in {"frame_of", "RobotView", "run", "handler", "picture"}, call
+        assert hasattr(view, call) or call in BESIDE_THE_VIEW, call
 
 
 # The text of each label that is seen, and its box on the screen without the margin of its halo.

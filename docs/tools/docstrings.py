@@ -8,7 +8,7 @@ from typing import Any
 
 from griffe import DocstringSectionKind, Extension, Object, Parser
 
-PAGE = Path(__file__).parents[1] / "api.md"
+FOLDER = Path(__file__).parents[1] / "api"
 _KINDS = (DocstringSectionKind.parameters, DocstringSectionKind.attributes)
 
 
@@ -19,8 +19,9 @@ class OwnLines(Extension):
     """
 
     def on_package(self, *, pkg: Any, **kwargs: Any) -> None:
-        """Go through what the page of the interface shows."""
-        for path in re.findall(r"^::: softnlp\.([\w.]+)$", PAGE.read_text(), re.MULTILINE):
+        """Go through what the pages of the interface show."""
+        text = "\n".join(page.read_text() for page in sorted(FOLDER.glob("*.md")))
+        for path in re.findall(r"^::: softnlp\.([\w.]+)$", text, re.MULTILINE):
             self._walk(pkg[path])
 
     def _walk(self, found: Object) -> None:

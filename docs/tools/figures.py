@@ -2,7 +2,10 @@
 
 A script has `figure()`, which returns a matplotlib figure or the path of a PNG file, or `text()`, which returns
 Markdown, or both. A page shows them by a link to the script that stands alone in a paragraph, `[What it
-shows](figures/name.py)`: readers of the repository reach the script, readers of the site see what it makes.
+shows](figures/name.py)`, or, where there is a figure, `[![What it shows](images/figures/name.png)](figures/name.py)`:
+readers of the repository see the kept picture and reach the script, readers of the site see what it makes now.
+
+`python -m docs.tools.figures` keeps the pictures of the last build of the site, smaller, in docs/images/figures.
 """
 
 from __future__ import annotations
@@ -16,7 +19,12 @@ from docs.tools import cache
 from docs.tools.work import Job
 
 DPI = 160
-_LINK = re.compile(r"^\[(?P<text>[^\]]+)\]\((?P<up>(?:\.\./)*)figures/(?P<name>\w+)\.py\)$", re.MULTILINE)
+KEPT = cache.ROOT / "docs" / "images" / "figures"
+WIDEST = 1000  # of a kept picture [px]
+_LINK = re.compile(
+    r"^\[(?:!\[(?P<seen>[^\]]+)\]\([^)]+\)|(?P<text>[^\]!]+))\]\((?P<up>(?:\.\./)*)figures/(?P<name>\w+)\.py\)$",
+    re.MULTILINE,
+)
 
 
 def _folder(script: Path) -> Path:
@@ -66,7 +74,24 @@ def shown(markdown: str, uri: str) -> str:
         parts = [text.read_text()] if text.is_file() else []
         if image.is_file():
             link = f"{match['up']}figures/{match['name']}.png"
-            parts.append(f"[![{match['text']}]({link})]({link})")
+            parts.append(f"[![{match['seen'] or match['text']}]({link})]({link})")
         return "\n".join(parts)
 
     return _LINK.sub(replace, markdown)
+
+
+def keep() -> None:
+    """Keep the figures of the last build in the repository, in few colours and no wider than `WIDEST`."""
+    from PIL import Image
+
+    KEPT.mkdir(parents=True, exist_ok=True)
+    for script in _scripts():
+        drawn = sorted(_folder(script).parent.glob("*/figure.png"), key=lambda path: path.stat().st_mtime)
+        if drawn:
+            picture = Image.open(drawn[-1]).convert("RGB")
+            picture.thumbnail((WIDEST, 10 * WIDEST))
+            picture.quantize(128).save(KEPT / f"{script.stem}.png", optimize=True)
+
+
+if __name__ == "__main__":
+    keep()

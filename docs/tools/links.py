@@ -46,6 +46,7 @@ def _page_of(path: str) -> str:
 
 def into_site(markdown: str, uri: str) -> str:
     """Return a page with links that leave docs/ led to pages of the site, and file names as link texts in words."""
+    markdown = re.sub(r"(\]\((?:\.\./)*notebooks/\w+)\.ipynb\)", r"\1.md)", markdown)  # which are pages there
     markdown = _NAMED.sub(lambda match: f"[{_heading(uri, match)}]({match['link']})", markdown)
 
     def replace(match: re.Match[str]) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import base64
 import re
+from collections.abc import Sequence
+from html import unescape
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -59,9 +61,20 @@ def _build(path: Path, folder: Path) -> None:
             parts.append(re.sub(r"(\]\(\w+)\.ipynb\)", r"\1.md)", cell.source))
             continue
         parts.append(f"```python\n{cell.source}\n```")
-        for k, output in enumerate(cell.outputs):
+        for k, output in enumerate(_joined(cell.outputs)):
             parts.append(_shown(output, folder, f"{path.stem}_{number}_{k}"))
     (folder / f"{path.stem}.md").write_text("\n\n".join(parts) + "\n")
+
+
+def _joined(outputs: Sequence[Any]) -> list[Any]:
+    """Return the outputs of a cell with what was printed in pieces as one, however long it took to come."""
+    joined: list[Any] = []
+    for output in outputs:
+        if joined and output.output_type == "stream" and joined[-1].get("name") == output.name:
+            joined[-1].text += output.text
+        else:
+            joined.append(output)
+    return joined
 
 
 def _shown(output: Any, folder: Path, name: str) -> str:
@@ -70,8 +83,20 @@ def _shown(output: Any, folder: Path, name: str) -> str:
     if "image/png" in data:
         (folder / f"{name}.png").write_bytes(base64.b64decode(data["image/png"]))
         return f"![Output of the cell above]({name}.png)"
+    if (html := data.get("text/html", "")).startswith("<iframe srcdoc="):
+        return _framed(html, folder, name)
+    if html.startswith("<div>"):  # of the package; that of others may hold scripts
+        return f'<div class="cell">{html}</div>'
     text = output.get("text") or data.get("text/markdown") or data.get("text/plain", "")
     return text if "text/markdown" in data else f"```text\n{text.rstrip()}\n```"
+
+
+def _framed(html: str, folder: Path, name: str) -> str:
+    """Return a frame whose page is a file of its own: it is read where the frame is seen, and searched nowhere."""
+    page = re.match(r'<iframe srcdoc="([^"]*)"', html)
+    assert page is not None
+    (folder / f"{name}.html").write_text(unescape(page[1]))
+    return html.replace(f'srcdoc="{page[1]}"', f'src="{name}.html" loading="lazy"')
 
 
 def made() -> dict[str, bytes]:

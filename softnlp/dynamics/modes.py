@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import scipy.linalg
+import scipy  # its parts are imported where they are first used
 from numpy.typing import NDArray
 
 from softnlp.dynamics.motion import Stepper

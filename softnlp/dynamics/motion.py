@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.linalg
+import scipy  # its parts are imported where they are first used
 from numpy.typing import NDArray
 
 from softnlp.base.status import Status

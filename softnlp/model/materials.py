@@ -17,6 +17,7 @@ from typing import Any
 from softnlp.base import ranges
 from softnlp.base.errors import MaterialError, nearest
 from softnlp.base.reading import choices
+from softnlp.base.rich import rich_html
 from softnlp.model.formula import shown
 from softnlp.model.laws import LAWS, SYMBOLS, Constant, Law, evaluate, formula_law, function_law
 from softnlp.model.material_reading import (
@@ -84,6 +85,8 @@ class Material:
     density: Any = DENSITY
     fitted_stretch: tuple[float, float] = FITTED_STRETCH
     set: str = ""
+
+    _repr_html_ = rich_html
 
     def __post_init__(self) -> None:
         names = [c.name for c in self.law.constants]

@@ -15,6 +15,7 @@ import casadi as ca
 from softnlp.base.errors import RobotError, first_of, nearest
 from softnlp.base.ranges import SIZE
 from softnlp.base.reading import choices, did_you_mean, shown
+from softnlp.base.rich import rich_html
 from softnlp.base.units import DEGREE, MILLIMETRE
 from softnlp.model.rules import ALLOWABLE as ALLOWABLE
 from softnlp.model.rules import LOWERABLE_RULES as LOWERABLE_RULES
@@ -89,6 +90,8 @@ class Robot:
     chamber_sets: int
     chambers_per_set: int
     chamber_angle: Any
+
+    _repr_html_ = rich_html
 
     @property
     def chambers(self) -> int:

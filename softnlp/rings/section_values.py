@@ -10,7 +10,6 @@ import numpy as np
 from softnlp.model.conventions import CONVENTIONS, UNIAXIAL, Conventions
 from softnlp.model.robot import Robot
 from softnlp.rings.outline import Array
-from softnlp.rings.response import robot_response
 
 
 def ring_values(robot: Robot, stretches: Sequence[float]) -> tuple[Array, Array]:
@@ -19,6 +18,8 @@ def ring_values(robot: Robot, stretches: Sequence[float]) -> tuple[Array, Array]
     Beyond the range that was solved for the section they go on as `Curve` says. Responses are kept by the section's
     shape. Raises `RingError` for a section that cannot be meshed.
     """
+    from softnlp.rings.response import robot_response  # finite elements, which few runs need
+
     response, at = robot_response(robot), np.asarray(stretches, float)
     p, q = response.plane_stretches(at)
     return np.asarray(at * (p**2 + q**2) / 2), np.asarray(response.circle_ratio(at))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +28,9 @@ from softnlp.scenario.schema import (
 )
 from softnlp.scenario.values import is_number
 from softnlp.statics.step import Run, Step
-from softnlp.studies.dynamic import dynamic
-from softnlp.studies.modes import Modes, modes
+
+if TYPE_CHECKING:
+    from softnlp.studies.modes import Modes
 
 Array = NDArray[np.float64]
 
@@ -176,6 +177,8 @@ def row_times(table: DynamicPressureTable, steps: PressurePath) -> Array:
 
 def run_dynamic(scenario: Scenario, progress: Callable[[int, Step], None] | None, branches: int = 0) -> Run:
     """Run the motion, a step an output; `branches` means nothing here."""
+    from softnlp.studies.dynamic import dynamic  # here, as in `modes_of`: files of other studies do without it
+
     task = scenario.task
     assert isinstance(task, DynamicTask)
     return dynamic(
@@ -193,6 +196,8 @@ def run_dynamic(scenario: Scenario, progress: Callable[[int, Step], None] | None
 
 def modes_of(scenario: Scenario) -> Modes:
     """Return the modes about the pose at rest of the last pressures and loads of a scenario."""
+    from softnlp.studies.modes import modes
+
     task, loads = scenario.task, scenario.loads
     more: dict[str, Any] = {}
     if isinstance(task, DynamicTask):

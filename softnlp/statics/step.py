@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.rich import rich_html
 from softnlp.base.status import Status
 from softnlp.model.contact_settings import NO_CLOSURE, ContactSettings
 from softnlp.model.conventions import Coefficients, Conventions
@@ -390,6 +391,8 @@ class Run:
     uncertainty: Mapping[str, Any] = field(default_factory=dict)
     obstacles: tuple[Obstacle, ...] = ()
     limits: Mapping[str, Any] = field(default_factory=dict)
+
+    _repr_html_ = rich_html
 
     @property
     def failed(self) -> tuple[Step, ...]:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from softnlp.base.errors import InputError
 from softnlp.base.status import Status
@@ -224,6 +223,8 @@ class ChainWall:
             if found is not None:
                 shapes[part] = found
             return float("nan") if step.pose is None else self._gap(step.pose, wall)
+
+        from scipy.optimize import brentq  # here: runs without a wall do without scipy
 
         scan = np.linspace(0, 1, _SCAN)
         known = np.array([gap(float(part)) for part in scan])

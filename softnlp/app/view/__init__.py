@@ -1,23 +1,22 @@
 """The 3-D view of a robot in the browser.
 
-`Frame` and `frame_of` need no browser library; `RobotView` needs the extra `gui` and is imported when it is asked for.
+`Frame` and `frame_of` need no browser library; `RobotView`, for a page of NiceGUI, and `NotebookView`, for a cell of a
+notebook, need the extra `gui` and are imported when they are asked for.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from softnlp.app.view.frame import Arrow, Frame, Tube, frame_of
+from softnlp.base.lazy import names_of
 
 if TYPE_CHECKING:
+    from softnlp.app.view.notebook import NotebookView
     from softnlp.app.view.robot_view import RobotView
 
-__all__ = ["Arrow", "Frame", "RobotView", "Tube", "frame_of"]
+__all__ = ["Arrow", "Frame", "NotebookView", "RobotView", "Tube", "frame_of"]
 
-
-def __getattr__(name: str) -> Any:
-    if name != "RobotView":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from softnlp.app.view.robot_view import RobotView
-
-    return RobotView
+__getattr__ = names_of(
+    __name__, {"softnlp.app.view.robot_view": ("RobotView",), "softnlp.app.view.notebook": ("NotebookView",)}
+)
