@@ -103,7 +103,7 @@ def test_the_live_pose_is_that_of_the_command_with_its_forces_and_arrows() -> No
 def test_where_it_touches_in_words() -> None:
     assert where(None, None) == "–"
     assert where(0.5, 0.5001) == "0.50"
-    assert where(0.25, 0.75) == "0.25 to 0.75"
+    assert where(0.25, 0.75) == "0.25–0.75"
 
 
 def test_a_file_with_obstacles_opened_changed_saved_and_opened_again_is_the_same() -> None:

@@ -65,7 +65,7 @@ def where(start: float | None, end: float | None) -> str:
     """Return where the robot touches, fractions of its length, in words."""
     if start is None or end is None:
         return "–"
-    return f"{start:.2f}" if f"{start:.2f}" == f"{end:.2f}" else f"{start:.2f} to {end:.2f}"
+    return f"{start:.2f}" if f"{start:.2f}" == f"{end:.2f}" else f"{start:.2f}–{end:.2f}"
 
 
 def segment_rows(step: Step) -> list[list[Any]]:
