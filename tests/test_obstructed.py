@@ -36,6 +36,7 @@ from softnlp.model.conventions import REPRODUCTION
 from softnlp.model.obstacles import Capsule, Cylinder, Obstacle, Plane, Sphere, Trocar, Tube
 from softnlp.model.quantities import Model
 from softnlp.results import load_run, view_of_run
+from softnlp.scenario.workspace import plan_of
 from softnlp.statics.kept import pose_solver
 from softnlp.statics.loadcase import whole_weight
 from softnlp.statics.obstacle_grid import Touched
@@ -462,3 +463,12 @@ def test_the_shipped_scenario_touches_and_is_drawn() -> None:
     (ball,) = scenario.obstacles
     assert isinstance(ball, Sphere)
     assert run_figure(view_of_run(against_a_ball())) is not None
+
+
+def test_the_other_shipped_scenarios_ask_for_what_they_say() -> None:
+    plan = plan_of(load_scenario(SHIPPED / "cavity.toml"))
+    assert [type(o) for o in plan.obstacles] == [Tube, Sphere]
+    assert plan.fingerprint() != replace(plan, obstacles=()).fingerprint()
+    task = load_scenario(SHIPPED / "reach.toml").task
+    assert isinstance(task, InverseTask)
+    assert task.contact_force == 0.1
