@@ -34,7 +34,8 @@ from softnlp import (
     trajectory,
 )
 from softnlp.cli import main
-from softnlp.results import load_run, to_json, view_of_run
+from softnlp.results import load_run, save, to_json, view_of_run
+from softnlp.scenario.run import partial_run
 from softnlp.statics.clearance import NodeGaps
 from softnlp.studies.trajectory_solver import beside_nodes
 
@@ -344,3 +345,12 @@ def test_a_view_of_a_run_is_that_of_its_file() -> None:
     assert view.targets is not None
     assert view.limits["minimise"] == "pressure"
     assert np.nanmax(view.targets.distance) < 1e-5 * LENGTH
+
+
+def test_a_path_that_was_stopped_leaves_no_part_for_a_regulator(tmp_path: Path) -> None:
+    scenario = load_scenario(written(tmp_path))
+    save(partial_run(scenario, free().steps[:2]), tmp_path / "out")
+    assert (tmp_path / "out" / "table.csv").is_file()
+    assert not (tmp_path / "out" / "path.csv").exists()
+    save(free(), tmp_path / "out")
+    assert len((tmp_path / "out" / "path.csv").read_text().splitlines()) == 7

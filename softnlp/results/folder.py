@@ -32,7 +32,6 @@ from softnlp.studies.fields import (
     AIMED,
     BLOCKED_FORCE,
     DYNAMIC,
-    TRAJECTORY,
     closure_of,
     deviation_outputs,
     series,
@@ -351,7 +350,7 @@ def save(
         "table.csv": table_text(run),
         "results.json": json_text(run),
     }
-    if run.study == TRAJECTORY and any(step.margins is not None for step in run.steps):
+    if run.limits and all(step.margins is not None for step in run.steps):  # no part of a path that was stopped
         contents[PATH_FILE] = path_text(run)
     written = write_files(directory, contents, scenario_text)
     if figure is not None:
