@@ -14,11 +14,11 @@ from softnlp.scenario.examples import shipped_scenarios
 
 @cache
 def examples() -> dict[str, str]:
-    """Return the title of every example that the page shows, by name: those of one segment."""
+    """Return the title of every example that the page shows, by name: those of one segment of round chambers."""
     return {
         name: str(table.get("title") or name)
         for name, (_, table) in shipped_scenarios().items()
-        if "segment" not in table
+        if not {"segment", "chamber"} & set(table)
     }
 
 

@@ -19,6 +19,7 @@ from softnlp.app.live import LivePoses
 from softnlp.base.errors import InputError, located
 from softnlp.base.reading import IMPORTED, LARGEST_TOML, one_line, read_bytes, read_text, shown
 from softnlp.base.units import BAR
+from softnlp.model.outlined import require_round_layout
 from softnlp.model.segments import require_one_segment
 from softnlp.scenario.check import SCHEMAS
 from softnlp.scenario.data import require_no_obstacles
@@ -138,6 +139,7 @@ class Session:
                 (Path(folder) / file).write_bytes(content)
             found = scenario_from_text(document.text(), Path(folder) / name)
             require_one_segment(found.robot, "this page")
+            require_round_layout(found.robot, "this page")
             require_no_obstacles(found, "this page")
             return found
 
@@ -146,6 +148,7 @@ class Session:
         asked = load_scenario(path)  # says the same of a broken file as the commands
         with located(source=one_line(str(path))):
             require_one_segment(asked.robot, "this page")
+            require_round_layout(asked.robot, "this page")
             require_no_obstacles(asked, "this page")
         document = Document(read_text(path, LARGEST_TOML))
         files = {}
