@@ -15,7 +15,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq, minimize
 
 from softnlp import BAR, ENERGY, Coefficients, forward, material, robot
-from softnlp.base.errors import InputError
+from softnlp.base.errors import InputError, RobotError
 from softnlp.figures import section_figure
 from softnlp.figures.mesh import body_solid, cores, mould_body, natural_body
 from softnlp.model.conventions import UNIAXIAL
@@ -26,9 +26,8 @@ from softnlp.model.outlined import Annulus, Chamber, Sector, Semicircle, outline
 from softnlp.model.plane import Circle, Polygon, gap, is_simple, room, turned, widened
 from softnlp.model.potential import NOTHING, Strains
 from softnlp.model.quantities import quantities
-from softnlp.model.robot import Robot, violations
+from softnlp.model.robot import Robot, check, violations
 from softnlp.model.round_layout import as_round, turned_round
-from softnlp.rings import RingError
 from softnlp.rings.outlined import outlined_response, pressed_areas
 from softnlp.scenario.read import robot_of_scenario, scenario_from_text
 from softnlp.statics.branch import branch_function
@@ -318,8 +317,14 @@ def test_the_response_of_a_section_turns_with_it():
 
 
 def test_silicone_without_room_is_refused():
-    with pytest.raises(RingError, match="no room when it is stretched"):
-        outlined_response(made(Chamber(0, Annulus(5 * mm, 8 * mm), 0.5 * mm)))
+    one = made(Chamber(0, Annulus(5 * mm, 8 * mm), 0.5 * mm))
+    with pytest.raises(RobotError, match="no room when it is stretched"):
+        outlined_response(one)
+    with pytest.raises(RobotError, match="no room when it is stretched"):
+        check(one)
+    inside = Chamber(1, Circle(2.5 * mm, 0.0, 1 * mm), 0.5 * mm)
+    with pytest.raises(RobotError, match="has no thread"):
+        check(made(*one.chamber_list, inside, reinforcement="body"))
 
 
 # --- rules, tables, drawings ------------------------------------------------------------------------------------------
@@ -365,6 +370,11 @@ BROKEN = {
     "crossed": (FORM, "polygon = { x_mm = [0, 4, 4, 0], y_mm = [0, 4, 0, 4]", "an outline that does not cross itself"),
     "line": (FORM, "polygon = { x_mm = [0, 4], y_mm = [0, 4]", "a list of at least 3"),
     "unequal": (FORM, "polygon = { x_mm = [0, 4, 4], y_mm = [0, 4, 0, 4]", "as many numbers in y_mm as in x_mm"),
+    "no room": (
+        FORM,
+        "annulus = { inner_mm = 5, outer_mm = 8",
+        "[chamber]: thread leaves the silicone inside an annulus",
+    ),
     "radii": (
         FORM,
         "sector = { inner_mm = 5, outer_mm = 4, from_deg = 0, to_deg = 9",

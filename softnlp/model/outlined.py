@@ -266,7 +266,22 @@ class OutlinedRobot(Robot):
         if outside:
             words = " and ".join(text for _, text in outside)
             found.append(Violation("chambers_inside_wall", words, False, tuple(sorted({n for n, _ in outside}))))
+        if not found:
+            self.require_room()
         return tuple(found)
+
+    def require_room(self) -> None:
+        """Raise `RobotError` where thread leaves silicone no room when it is stretched, or a chamber has none."""
+        wound = self.reinforcement == "body"
+        for part in self.silicone:
+            last = part.outer is self.surface
+            if last is wound and not (part.holes if wound else None in part.chambers):
+                raise RobotError(
+                    "thread leaves the silicone inside an annulus no room when it is stretched; give the body a lumen, "
+                    'or wind it as a whole: [body] reinforcement = "body"'
+                )
+            if wound and not last and any(n is not None for n in part.chambers):
+                raise RobotError("a chamber inside an annulus has no thread in a body that is wound as a whole")
 
     def _require_sizes(self) -> None:
         """Raise `RobotError` for what is no section at all."""

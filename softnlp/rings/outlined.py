@@ -20,7 +20,7 @@ from softnlp.model.plane import Circle, Outline, Polygon, turned
 from softnlp.rings.curve import Curve, fitted
 from softnlp.rings.equilibrium import Balance, Equilibrium
 from softnlp.rings.mesher import mesh
-from softnlp.rings.outline import Array, PlaneSection, RingError
+from softnlp.rings.outline import Array, PlaneSection
 from softnlp.rings.response import balances_on
 
 STEP = pi / 9
@@ -71,8 +71,10 @@ def outlined_response(robot: OutlinedRobot) -> OutlinedResponse:
 
     Raises
     ------
+    RobotError
+        Where thread leaves silicone no room to move.
     RingError
-        For a section that cannot be meshed, or silicone that thread leaves no room to move.
+        For a section that cannot be meshed.
     """
     return _response(robot.chamber_list, robot.surface, robot.reinforcement == "body", float(robot.lumen_radius))
 
@@ -129,6 +131,7 @@ def _pieces(
     """Return the plane section of each piece of silicone with its area."""
     robot = _robot(chambers, surface, wound, lumen)
     found = []
+    robot.require_room()
     back = -_direction(chambers, surface)
     for part in robot.silicone:
         last = part.outer is robot.surface
@@ -136,13 +139,6 @@ def _pieces(
         for outline, n in zip(part.holes, part.chambers, strict=True):
             (holes if n is None or wound else rings).append(outline)
         around = not last if not wound else last
-        if not holes and around:
-            raise RingError(
-                "thread leaves the silicone inside an annulus no room when it is stretched; give the body a lumen, or "
-                'wind it as a whole: [body] reinforcement = "body"'
-            )
-        if wound and not last and any(n is not None for n in part.chambers):
-            raise RingError("a chamber inside an annulus has no thread in a body that is wound as a whole")
         area = part.outer.area - sum(hole.area for hole in part.holes)
         plane = ([_coarse(_turned(outline, back)) for outline in some] for some in ([part.outer], rings, holes))
         (outer,), turned_rings, turned_holes = plane
