@@ -14,8 +14,12 @@ from softnlp.scenario.examples import shipped_scenarios
 
 @cache
 def examples() -> dict[str, str]:
-    """Return the title of every example, by name."""
-    return {name: str(table.get("title") or name) for name, (_, table) in shipped_scenarios().items()}
+    """Return the title of every example that the page shows, by name: those of round chambers."""
+    return {
+        name: str(table.get("title") or name)
+        for name, (_, table) in shipped_scenarios().items()
+        if "chamber" not in table and not any("chamber" in segment for segment in table.get("segment", []))
+    }
 
 
 def open_example(session: Session, name: str) -> bool:

@@ -17,9 +17,10 @@ from softnlp.app.document import START, Document
 from softnlp.app.history import State
 from softnlp.app.live import LivePoses
 from softnlp.app.taken import checked_content, plain_name
-from softnlp.base.errors import InputError
+from softnlp.base.errors import InputError, located
 from softnlp.base.reading import LARGEST_TOML, one_line, read_bytes, read_text, shown
 from softnlp.base.units import BAR
+from softnlp.model.outlined import require_round_layout
 from softnlp.scenario.check import SCHEMAS
 from softnlp.scenario.read import Scenario, load_scenario, placed, scenario_from_text
 
@@ -113,11 +114,15 @@ class Session:
                     raise InputError(f"names the file {shown(file)}; open both together", key="file")
                 content = given[file] if file in given else (self.folder / file).read_bytes()
                 (Path(folder) / file).write_bytes(content)
-            return scenario_from_text(document.text(), Path(folder) / name)
+            found = scenario_from_text(document.text(), Path(folder) / name)
+            require_round_layout(found.robot, "this page")
+            return found
 
     def open_path(self, path: Path) -> None:
         """Show the scenario of a file, with the files that it names; raises `InputError` where one cannot be read."""
-        load_scenario(path)  # says the same of a broken file as the commands
+        asked = load_scenario(path)  # says the same of a broken file as the commands
+        with located(source=one_line(str(path))):
+            require_round_layout(asked.robot, "this page")
         document = Document(read_text(path, LARGEST_TOML))
         files = {}
         for file in document.files():

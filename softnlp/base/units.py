@@ -17,3 +17,8 @@ NEWTON_MILLIMETRE = 1e-3
 DEGREE = pi / 180
 """One degree in [rad]."""
 STANDARD_GRAVITY = 9.80665  # m/s^2
+
+
+def tidy(value: float, scale: float = 1.0) -> float:
+    """Return an input in its file unit without the last-digit noise of the conversion: 0.3, not 0.30000000000000004."""
+    return float(f"{float(value) / scale:.14g}")

@@ -18,6 +18,8 @@ from softnlp.model.inputs import conventions_table, segment_tables
 from softnlp.model.numerics import Numerics
 from softnlp.model.obstacle_tables import obstacle_tables
 from softnlp.model.obstacles import Obstacle
+from softnlp.model.outline_tables import outline_tables
+from softnlp.model.outlined import OutlinedRobot
 from softnlp.model.quantities import LOADS, Model, contact_quantities
 from softnlp.model.rod import Loads
 from softnlp.model.segments import SegmentedRobot, declared
@@ -115,6 +117,8 @@ class Plan:
             told = {**told, "obstacles": obstacle_tables(self.obstacles)}
         if isinstance(self.model.robot, SegmentedRobot):
             told = {**told, "segment": segment_tables(self.model.robot)}
+        elif isinstance(self.model.robot, OutlinedRobot):
+            told = {**told, "outlines": outline_tables(self.model.robot)}
         digest = hashlib.sha256(json.dumps(told, sort_keys=True).encode())
         for part in (self.values, self.order, *(() if self.times is None else (self.times,))):
             digest.update(np.ascontiguousarray(part).tobytes())

@@ -44,6 +44,7 @@ def sensitivity(
     samples
         Draws of the check; 0 leaves it out.
     """
+    from softnlp.model.outlined import require_round_layout
     from softnlp.model.segments import require_one_segment
     from softnlp.results.document import document_text
     from softnlp.results.sensitivity import sensitivity_document, table_rows
@@ -58,6 +59,7 @@ def sensitivity(
     if samples < 0 or samples == 1:
         raise InputError(f"expected 0, or at least 2 samples, got {samples}", key="--samples")
     require_one_segment(asked.robot, "softnlp sensitivity")
+    require_round_layout(asked.robot, "softnlp sensitivity")
     require_no_obstacles(asked, "softnlp sensitivity")
     folder = results_folder(out, json, scenario.stem)
     pressure = asked.pressures[chosen - 1]

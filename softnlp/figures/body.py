@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from softnlp.base.arrays import Array
 from softnlp.base.units import MILLIMETRE, NEWTON_MILLIMETRE
-from softnlp.figures.mesh.rings import circle, placed
 from softnlp.figures.space import axes_3d, draw_faces, draw_lines, plain_3d
 from softnlp.figures.style import GREY, INK, SMALL, TEXT, colour, step_colours
+from softnlp.figures.tubes import chamber_tubes, skin
+from softnlp.figures.tubes import tube as tube
 from softnlp.model.gravity import gravity_lines, is_hanging
 from softnlp.model.section import SectionRadii
 from softnlp.model.segments import segments_of
@@ -34,24 +35,6 @@ _ROUND, _CLEAR = 0.7, 0.65  # radius of a moment's arrow, of that length, and at
 _CONNECTOR, _SLIM = 0.42, 0.6  # grey of a connector, and its radius in drawings, of the segment before
 _CANVAS = 5.6  # side of the square that the panel may draw in [inch]
 _BOX = (4.4, 3.7)  # largest width and height of the box of the axes, labels not included [inch]
-
-
-def tube(body: Body, radius: float | Array, offset: tuple[Any, Any], facets: int, stations: int) -> tuple[Array, Array]:
-    """Return (n, 4, 3) quads [mm] and (n, 3) outward normals of a tube along a body.
-
-    radius : one or (M,) [m]. offset : of the tube's axis from the body's, in the body frame, numbers or (M,) [m].
-    """
-    M = len(body.position)
-    chosen = np.unique(np.linspace(0, M - 1, min(stations, M)).round().astype(int))
-    p, R = body.position[chosen], body.rotation[chosen]
-    wide, x, y = (np.broadcast_to(value, M)[chosen] for value in (radius, *offset))
-    local = wide[:, None, None] * circle(facets) + np.stack([x, y], axis=1)[:, None]
-    rings = placed(p[:, None], R[:, None], np.concatenate([local, local[:, :1]], axis=1)) / MILLIMETRE
-    quads = np.stack([rings[:-1, :-1], rings[1:, :-1], rings[1:, 1:], rings[:-1, 1:]], axis=2)
-    middle = 2 * np.pi * (np.arange(facets) + 0.5) / facets
-    outward = np.column_stack([np.cos(middle), np.sin(middle), 0 * middle])
-    normals = np.einsum("sij,fj->sfi", R[:-1], outward)
-    return quads.reshape(-1, 4, 3), normals.reshape(-1, 3)
 
 
 def disc(radius: float, facets: int, z: float) -> Array:
@@ -117,8 +100,8 @@ def body_panel(figure: Figure, centre: tuple[float, float], view: RunView) -> An
     for k in _ghosts(solved):
         body = view.bodies[k]
         assert body is not None
-        for piece in body.pieces:
-            quads, normals = tube(piece, piece.radii.outer, (0, 0), GHOST_FACETS, GHOST_STATIONS)
+        for piece, (own, _) in zip(body.pieces, segments_of(view.robot), strict=True):
+            quads, normals = skin(piece, own, GHOST_FACETS, GHOST_STATIONS)
             pale = shaded(normals, GHOST_TINT * shades[k][:3] + (1 - GHOST_TINT), light, contrast=0.06)
             draw_faces(axes, quads, pale, zorder=2, label="earlier step")
             reach.append(quads.reshape(-1, 3))
@@ -168,30 +151,29 @@ def draw_cut_open(axes: Any, view: RunView, k: int, eye: Array, light: Array, *,
     assert body is not None
     quads, colours, reach = list[Array](), list[Array](), list[Array]()
     for piece, (own, first) in zip(body.pieces, segments_of(robot), strict=True):
-        skin, normals = tube(piece, piece.radii.outer, (0, 0), BODY_FACETS, BODY_STATIONS)
+        surface, normals = skin(piece, own, BODY_FACETS, BODY_STATIONS)
         behind = normals @ eye < 0
-        quads.append(skin[behind])
+        quads.append(surface[behind])
         colours.append(shaded(-normals[behind], SILICONE, light, contrast=0.14))
-        for theta, chamber_set in zip(own.chamber_angles(), own.set_of_chamber, strict=True):
-            r_cp = piece.radii.chamber_circle
-            offset = (r_cp * float(np.cos(theta)), r_cp * float(np.sin(theta)))
-            chamber, outward = tube(piece, piece.radii.chamber, offset, CHAMBER_FACETS, BODY_STATIONS)
+        for (chamber, outward), chamber_set in zip(
+            chamber_tubes(piece, own, CHAMBER_FACETS, BODY_STATIONS), own.set_of_chamber, strict=True
+        ):
             rgb = np.array(to_rgb(colour(first + chamber_set)))
             if view.pressure[k, first + chamber_set] == 0:
                 rgb = IDLE_TINT * rgb + (1 - IDLE_TINT)
             quads.append(chamber)
             colours.append(shaded(outward, rgb, light))
-        edges = _outline(skin, behind)
+        edges = _outline(surface, behind)
         quads.append(edges)
         colours.append(np.tile(to_rgb(GREY), (len(edges), 1)))
-        reach.append(skin.reshape(-1, 3))
+        reach.append(surface.reshape(-1, 3))
     for link in _connectors(body):
         rod, normals = tube(link, link.radii.outer, (0, 0), CHAMBER_FACETS, 2)
         quads.append(rod)
         colours.append(shaded(normals, np.full(3, _CONNECTOR), light))
     # One collection, so that all is sorted by depth together; edges of the face's colour close the seams.
     draw_faces(axes, np.concatenate(quads), np.concatenate(colours), width=0.6, zorder=4, label="last step")
-    rim = skin.reshape(-1, BODY_FACETS, 4, 3)[-1, :, 1]  # of the last segment
+    rim = surface.reshape(-1, BODY_FACETS, 4, 3)[-1, :, 1]  # of the last segment
     axes.plot(*np.vstack([rim, rim[:1]]).T, color=GREY, linewidth=0.8, zorder=5, label="tip rim")
 
     if not tip_frame:

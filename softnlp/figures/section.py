@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from softnlp.base.errors import InputError
 from softnlp.base.units import MILLIMETRE
+from softnlp.figures.outlined import outlined_figure
 from softnlp.figures.style import GREY, INK, SMALL, TEXT, WRONG, colour, in_own_style, ink_on, legend, new_figure
+from softnlp.model.outlined import OutlinedRobot
 from softnlp.model.robot import Robot, Violation, touching_stretch
 from softnlp.model.round_chambers import radii
 from softnlp.statics.step import SectionRadii
@@ -57,6 +59,8 @@ def section_figure(robot: Robot, violations: Sequence[Violation] = (), stretch: 
     InputError
         When the stretch is impossible.
     """
+    if isinstance(robot, OutlinedRobot):
+        return outlined_figure(robot, violations, stretch)
     states = [("as made", 1.0)] + ([(f"at stretch {stretch:g}", stretch)] if stretch != 1.0 else [])
     radii = [stretched_radii(robot, value) for _, value in states]
     notes = [f"{v.rule}: {v.message}" for v in violations]

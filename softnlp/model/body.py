@@ -124,6 +124,12 @@ class Body:
     def __post_init__(self) -> None:
         if not self.segments:
             raise InputError("expected at least one segment", key="segments")
+        if self.conventions.energy:
+            for segment in self.segments:
+                if segment.along and segment.section is RoundChambers:
+                    raise InputError("the energy section does not vary along a segment so far", key="along")
+                if segment.lines == "bonded":
+                    raise InputError("the energy section has no bonded lines so far", key="lines")
         for k, (segment, model) in enumerate(zip(self.segments, self.models, strict=True)):
             if segment.lines == "bonded" and segment.section is not RoundChambers and k + 1 < len(self.segments):
                 raise InputError("bonded lines pass through a section of round chambers only", key="lines")

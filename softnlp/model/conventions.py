@@ -9,6 +9,9 @@ from typing import Any
 Rings = Callable[[Any, Sequence[float]], tuple[Any, Any]]
 """What thread that keeps its radius does to a robot's section: (robot, stretches) -> lambda T / 2 and a, (n,) each."""
 
+Pressed = Callable[[Any], tuple[Any, Any]]
+"""What thread around a robot's body leaves to the pressures: (robot) -> (N,) areas [m^2] and (N, 2) centres [m]."""
+
 
 @dataclass(frozen=True)
 class Conventions:
@@ -26,6 +29,8 @@ class Conventions:
         Eq. (12) with the mean pressure over all chambers, or with each chamber's own.
     rings
         Of the energy section: what the rings of thread do to it; None takes them for absent.
+    pressed
+        Of the energy section: what the pressures of chambers in a wound body work on.
     """
 
     name: str
@@ -33,6 +38,7 @@ class Conventions:
     fibre_thickness: float
     mean_pressure: bool
     rings: Rings | None = field(default=None, repr=False, compare=False)
+    pressed: Pressed | None = field(default=None, repr=False, compare=False)
 
     @property
     def energy(self) -> bool:

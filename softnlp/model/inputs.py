@@ -11,22 +11,20 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
 from softnlp.base.units import BAR, DEGREE, MILLIMETRE, NEWTON_MILLIMETRE
+from softnlp.base.units import tidy as tidy
 from softnlp.model.body import Segment
 from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import UNIAXIAL, Coefficients, Conventions
 from softnlp.model.gravity import gravity_words
 from softnlp.model.materials import Material
+from softnlp.model.outline_tables import outline_tables, robot_of_outlines
+from softnlp.model.outlined import OutlinedRobot
 from softnlp.model.robot import DIMENSIONS, Robot
 from softnlp.model.rod import Loads
 from softnlp.model.segments import SegmentedRobot, whole_robot
 
 if TYPE_CHECKING:
     from softnlp.model.quantities import Model
-
-
-def tidy(value: float, scale: float = 1.0) -> float:
-    """Return an input in its file unit without the last-digit noise of the conversion: 0.3, not 0.30000000000000004."""
-    return float(f"{float(value) / scale:.14g}")
 
 
 def pressure_bar(pressure: Any) -> list[float]:
@@ -43,6 +41,11 @@ def robot_table(robot: Robot) -> dict[str, Any]:
     return table
 
 
+def section_tables(robot: Robot) -> dict[str, Any]:
+    """Return `[robot]`, and the tables beside it that a robot of any section has."""
+    return outline_tables(robot) if isinstance(robot, OutlinedRobot) else {"robot": robot_table(robot)}
+
+
 def robot_of_table(table: Mapping[str, Any]) -> Robot:
     """Return the robot of a `robot_table`; KeyError where a dimension is missing."""
     values: dict[str, Any] = {
@@ -55,14 +58,14 @@ def segment_tables(robot: SegmentedRobot) -> list[dict[str, Any]]:
     """Return the segments of a robot as the `[[segment]]` tables of a scenario."""
     found = []
     for segment in robot.segments:
-        table = robot_table(segment.robot)
+        tables = section_tables(segment.robot)
         for d in DIMENSIONS:
             if (varies := segment.tables.get(f"robot.{d.field}")) is not None:
                 s, value = varies
-                table[d.file_key] = {"s": s.tolist(), "value": [tidy(v, d.scale or 1.0) for v in value]}
+                tables["robot"][d.file_key] = {"s": s.tolist(), "value": [tidy(v, d.scale or 1.0) for v in value]}
         found.append(
             {
-                "robot": table,
+                **tables,
                 "material": material_table(segment.material),
                 "connector_mm": tidy(segment.connector, MILLIMETRE),
                 "lines": segment.lines,
@@ -76,23 +79,31 @@ def robot_of_segments(tables: Sequence[Mapping[str, Any]]) -> SegmentedRobot:
     """Return the robot of `segment_tables`, for its sizes: without silicones; KeyError where one is missing."""
     segments = []
     for table in tables:
+        if "chamber" in table:
+            segments.append(_segment_of(table, robot_of_outlines(table), {}))
+            continue
         sizes, along = dict(table["robot"]), {}
         for d in DIMENSIONS:
             if isinstance(given := sizes[d.file_key], Mapping):
                 along[f"robot.{d.field}"] = {"s": given["s"], "value": [v * (d.scale or 1.0) for v in given["value"]]}
                 sizes[d.file_key] = given["value"][0]
-        connector, turn = float(table["connector_mm"]) * MILLIMETRE, float(table["turn_deg"]) * DEGREE
-        nothing: Any = None
-        segments.append(
-            Segment(robot_of_table(sizes), nothing, along=along, connector=connector, lines=table["lines"], turn=turn)
-        )
+        segments.append(_segment_of(table, robot_of_table(sizes), along))
     return whole_robot(segments)
+
+
+def _segment_of(table: Mapping[str, Any], robot: Robot, along: Mapping[str, Any]) -> Segment:
+    """Return the segment of one of `segment_tables`, without a silicone."""
+    connector, turn = float(table["connector_mm"]) * MILLIMETRE, float(table["turn_deg"]) * DEGREE
+    nothing: Any = None
+    return Segment(robot, nothing, along=along, connector=connector, lines=table["lines"], turn=turn)
 
 
 def robot_of_attributes(attributes: Mapping[str, Any]) -> Robot:
     """Return the robot of a file's attributes, parsed; KeyError where one is missing."""
     if "segment" in attributes:
         return robot_of_segments(attributes["segment"])
+    if "chamber" in attributes:
+        return robot_of_outlines(attributes)
     return robot_of_table(attributes["robot"])
 
 
@@ -145,7 +156,7 @@ def contact_table(contact: ContactSettings) -> dict[str, Any]:
 def conventions_table(conventions: Conventions) -> dict[str, Any]:
     """Return how ambiguous equations were read."""
     table = asdict(conventions)
-    rings = table.pop("rings") is not None
+    rings, _ = table.pop("rings") is not None, table.pop("pressed")
     if conventions.energy:
         return {"name": conventions.name, "rings": rings}
     table["fibre_thickness_mm"] = tidy(table.pop("fibre_thickness"), MILLIMETRE)
@@ -185,7 +196,7 @@ def loads_of_table(table: Mapping[str, Any]) -> Loads:
 
 def asked_tables(model: Model, loads: Loads) -> dict[str, Any]:
     """Return what was asked of any study as tables by name."""
-    robot: dict[str, Any] = {"robot": robot_table(model.robot), "material": material_table(model.material)}
+    robot = {**section_tables(model.robot), "material": material_table(model.material)}
     if isinstance(model.robot, SegmentedRobot):
         robot = {"segment": segment_tables(model.robot)}
     return {

@@ -10,6 +10,8 @@ from typing import Any
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.model.energy_section import EnergySection
 from softnlp.model.materials import Material
+from softnlp.model.outlined import OutlinedRobot
+from softnlp.model.outlined_section import OutlinedSection
 from softnlp.model.robot import Robot
 from softnlp.model.round_chambers import RoundChambers
 from softnlp.model.section import Section, SectionType
@@ -31,8 +33,11 @@ class Model:
     @cached_property
     def section(self) -> Section:
         """The cross-section."""
-        energy = self.conventions.energy and self.section_type is RoundChambers
-        made: SectionType = EnergySection if energy else self.section_type
+        made: SectionType = self.section_type
+        if made is RoundChambers and isinstance(self.robot, OutlinedRobot):
+            made = OutlinedSection
+        elif made is RoundChambers and self.conventions.energy:
+            made = EnergySection
         return made(self.robot, self.material, self.coefficients, self.conventions)
 
     @property

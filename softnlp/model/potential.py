@@ -19,8 +19,18 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from softnlp.model.quadrature import Disc, Sums, at_point, first_over_disc, over_disc, value_over
-from softnlp.model.stretch_curve import BODY, BODY_SIZE, LINER_SIZE, Place, evaluated, liner_scale, slope_of, slopes_of
+from softnlp.model.quadrature import Disc, Layout, Sums, at_point, first_over_disc, over_disc, placed, value_over
+from softnlp.model.stretch_curve import (
+    BODY,
+    BODY_SIZE,
+    LINER_SIZE,
+    Place,
+    Scale,
+    evaluated,
+    liner_scale,
+    slope_of,
+    slopes_of,
+)
 
 OUTER, LUMEN, CHAMBER = 6, 4, 3
 """Points of the rules over the outer disc, the lumen and a chamber."""
@@ -89,17 +99,18 @@ class Answer(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Potential:
-    """The numbers of U at one set of pressures, N chambers.
+    """The numbers of U at one set of pressures, N chambers with K kinds of liners.
 
-    body : derivative of W's curve [Pa]. liner : of a liner's energy per length [N]. arms : a's curve [1].
+    body : derivative of W's curve [Pa]. liners : (K,) of a liner's energy per length [N]. arms : a's curve [1].
     slip : curve of GA at rest over GA [1]. GA : at rest [N]. gyration : radius of, for GJ = GA gyration^2 / v_3 [m].
-    outer, lumen, chamber : r_r, r_i, r_co [m]. pole : stretch at which a chamber's bore would vanish [1].
+    outer, lumen, chamber : r_r, r_i, r_co [m]. poles : (K,) stretches at which a bore would vanish [1].
     centres : (N, 2) as cast [m]. push : (N,) P_i pi r_co^2 [N].
+    layout : see `Layout`.
     start : (3,) strains without a load. answer : how strains answer to a load there, see `Answer`.
     """
 
     body: Any
-    liner: Any
+    liners: tuple[Any, ...]
     arms: Any
     slip: Any
     GA: Any
@@ -107,26 +118,44 @@ class Potential:
     outer: Any
     lumen: Any
     chamber: Any
-    pole: Any
+    poles: tuple[Any, ...]
     centres: tuple[tuple[Any, Any], ...]
     push: tuple[Any, ...]
+    layout: Layout
     start: tuple[Any, Any, Any] = (1.0, 0.0, 0.0)
     answer: Answer | None = None
 
     @property
     def discs(self) -> list[Disc]:
-        """The body's, of which holes are taken away."""
+        """The body's, of which holes are taken away; none of a body that is summed over points."""
+        if self.layout.points:
+            return []
         return [
             Disc((0.0, 0.0), self.outer, OUTER),
             Disc((0.0, 0.0), self.lumen, LUMEN, -1),
             *(Disc(centre, self.chamber, CHAMBER, -1) for centre in self.centres),
         ]
 
+    @property
+    def _points(self) -> list[tuple[tuple[Any, Any], Any]]:
+        """Places of the body and the areas that they stand for, where it is not of discs."""
+        return placed(self.layout.points, self.outer, self.outer**2)
+
+    def _lined(self) -> list[tuple[int, Scale, Any, list[tuple[tuple[Any, Any], Any]]]]:
+        """Return each chamber that has a liner with its scale, its curve, and places with weights whose sum is 1."""
+        found = []
+        for n, (kind, centre) in enumerate(zip(self.layout.liners, self.centres, strict=True)):
+            if kind >= 0:
+                spread = self.layout.spread[kind]
+                places = placed(spread, self.outer, 1.0) if spread else [(centre, 1.0)]
+                found.append((n, liner_scale(self.poles[kind]), self.liners[kind], places))
+        return found
+
     def tangent(self, at: Strains, pull: Pull) -> Tangent:
         """Return the derivatives of U at strains, with the shear and the twist that the pull makes there."""
-        given = [self.body, self.liner, self.arms, self.slip, *(getattr(self, name) for name in _NUMBERS)]
+        given = [self.body, *self.liners, self.arms, self.slip, *(getattr(self, name) for name in _NUMBERS)]
         flat = [x for centre in self.centres for x in centre]
-        found = _tangent(len(self.centres))(ca.vertcat(*given, *flat, *self.push, *at, *pull))
+        found = _tangent(self.layout)(ca.vertcat(*given, *self.poles, *flat, *self.push, *at, *pull))
         g, H = (tuple(found[k] for k in rows) for rows in (range(3), range(3, 9)))
         return Tangent(g, H)
 
@@ -141,10 +170,11 @@ class Potential:
         bk = b[0] * k_1 + b[1] * k_2
         s, s1, s2 = (value / self.GA for value in evaluated(self.slip, here))
         t1, t2 = (s + at.v * s1) / self.gyration**2, (2 * s1 + at.v * s2) / self.gyration**2
+        p, p_1, p_2 = self._held_push
         g = (
-            sums.v + a1 * bk - (pull.shear2 * s1 + pull.twist2 * t1) / 2 - pull.n,
-            a * k_1 - pull.h_1,
-            a * k_2 - pull.h_2,
+            sums.v + a1 * bk - (pull.shear2 * s1 + pull.twist2 * t1) / 2 - pull.n - p,
+            a * k_1 - pull.h_1 - p_1,
+            a * k_2 - pull.h_2 - p_2,
         )
         vv = sums.vv + 2 * a1 * (b[0] * vk_1 + b[1] * vk_2) + a1**2 * (b[0] * Kb[0] + b[1] * Kb[1]) + a2 * bk
         H = (
@@ -162,11 +192,28 @@ class Potential:
         total = Sums(0.0, (0.0, 0.0), 0.0, (0.0, 0.0), (0.0, 0.0, 0.0))
         for disc in self.discs:
             total = total + over_disc(disc, lambda stretch: slopes_of(self.body, BODY.place(stretch)), v, k)
-        liner = liner_scale(self.pole)
-        for (x, y), push in zip(self.centres, self.push, strict=True):
-            first, second = slopes_of(self.liner, liner.place(v + k[0] * x + k[1] * y))
-            total = total + at_point((x, y), first - push, second)
+        for (x, y), area in self._points:
+            first, second = slopes_of(self.body, BODY.place(v + k[0] * x + k[1] * y))
+            total = total + at_point((x, y), area * first, area * second)
+        for n, scale, curve, places in self._lined():
+            push = self.push[n]
+            for (x, y), weight in places:
+                first, second = slopes_of(curve, scale.place(v + k[0] * x + k[1] * y))
+                if len(places) == 1:
+                    total = total + at_point((x, y), first - push, second)
+                else:
+                    total = total + at_point((x, y), weight * first, weight * second)
+            if len(places) > 1:
+                total = total + at_point(self.centres[n], -push, 0.0)
         return total
+
+    @property
+    def _held_push(self) -> tuple[Any, Any, Any]:
+        """What pressures add to v_3, b_1 and b_2 where the body's thread keeps the chambers' places."""
+        if not self.layout.held:
+            return 0.0, 0.0, 0.0
+        pairs = list(zip(self.push, self.centres, strict=True))
+        return sum(p for p, _ in pairs), sum(p * x for p, (x, _) in pairs), sum(p * y for p, (_, y) in pairs)
 
     def started(self, pull: Pull) -> Strains:
         """Return the strains under a pull to second order."""
@@ -199,18 +246,26 @@ class Potential:
         a, a1, _ = evaluated(self.arms, BODY.place(at.v))
         k = (a * at.b_1, a * at.b_2)
         by_v, by_k = 0.0, [0.0, 0.0]
-        liner = liner_scale(self.pole)
         parts = [first_over_disc(disc, self._slope, at.v, k) for disc in self.discs]
-        for (x, y), push in zip(self.centres, self.push, strict=True):
-            first = slope_of(self.liner, liner.place(at.v + k[0] * x + k[1] * y)) - push
+        for (x, y), area in self._points:
+            first = area * self._slope(at.v + k[0] * x + k[1] * y)
             parts.append((first, (x * first, y * first)))
+        for n, scale, curve, places in self._lined():
+            for (x, y), weight in places:
+                first = slope_of(curve, scale.place(at.v + k[0] * x + k[1] * y))
+                first = first - self.push[n] if len(places) == 1 else weight * first
+                parts.append((first, (x * first, y * first)))
+            if len(places) > 1:
+                x, y = self.centres[n]
+                parts.append((-self.push[n], (-x * self.push[n], -y * self.push[n])))
         for v, (k_1, k_2) in parts:
             by_v, by_k = by_v + v, [by_k[0] + k_1, by_k[1] + k_2]
         _, s1, _ = (value / self.GA for value in evaluated(self.slip, BODY.place(at.v)))
         s = evaluated(self.slip, BODY.place(at.v)).value / self.GA
         t1 = (s + at.v * s1) / self.gyration**2
         along = a1 * (at.b_1 * by_k[0] + at.b_2 * by_k[1]) - (pull.shear2 * s1 + pull.twist2 * t1) / 2
-        return by_v + along - pull.n, a * by_k[0] - pull.h_1, a * by_k[1] - pull.h_2
+        p, p_1, p_2 = self._held_push
+        return by_v + along - pull.n - p, a * by_k[0] - pull.h_1 - p_1, a * by_k[1] - pull.h_2 - p_2
 
     def _slope(self, stretch: Any) -> Any:
         return slope_of(self.body, BODY.place(stretch))
@@ -263,26 +318,32 @@ class Potential:
         a = evaluated(self.arms, BODY.place(at.v)).value
         k = (a * at.b_1, a * at.b_2)
         total = value_over(self.discs, lambda stretch: _summed(self.body, BODY.place(stretch)), at.v, k)
-        liner = liner_scale(self.pole)
-        for (x, y), push in zip(self.centres, self.push, strict=True):
-            stretch = at.v + k[0] * x + k[1] * y
-            total += _summed(self.liner, liner.place(stretch)) - push * stretch
+        for (x, y), area in self._points:
+            total += area * _summed(self.body, BODY.place(at.v + k[0] * x + k[1] * y))
+        for _, scale, curve, places in self._lined():
+            for (x, y), weight in places:
+                total += weight * _summed(curve, scale.place(at.v + k[0] * x + k[1] * y))
+        e = (at.b_1, at.b_2) if self.layout.held else k
+        total -= sum(p * (at.v + e[0] * x + e[1] * y) for p, (x, y) in zip(self.push, self.centres, strict=True))
         s, t = self.compliance(at.v)
         return total + (v_1**2 + v_2**2) / (2 * s) + u_3**2 / (2 * t)
 
 
-_NUMBERS = ("GA", "gyration", "outer", "lumen", "chamber", "pole")
+_NUMBERS = ("GA", "gyration", "outer", "lumen", "chamber")
 
 
 @lru_cache(maxsize=8)
-def _tangent(chambers: int) -> ca.Function:
-    """Return `Potential._tangent` of a section of so many chambers; a call copies it, which is quick."""
-    sizes = [BODY_SIZE - 1, LINER_SIZE - 1, BODY_SIZE, BODY_SIZE, len(_NUMBERS), 2 * chambers, chambers, 3, 5]
+def _tangent(layout: Layout) -> ca.Function:
+    """Return `Potential._tangent` of a section of a layout; a call copies it, which is quick."""
+    chambers, kinds = len(layout.liners), layout.kinds
+    sizes = [BODY_SIZE - 1, *[LINER_SIZE - 1] * kinds, BODY_SIZE, BODY_SIZE]
+    sizes += [len(_NUMBERS), kinds, 2 * chambers, chambers, 3, 5]
     given = ca.SX.sym("given", sum(sizes))
     parts = ca.vertsplit(given, [sum(sizes[:k]) for k in range(len(sizes) + 1)])
-    numbers, flat, push, at, pull = ([part[k] for k in range(part.numel())] for part in parts[4:])
+    body, *liners, arms, slip = parts[: 3 + kinds]
+    numbers, poles, flat, push, at, pull = ([part[k] for k in range(part.numel())] for part in parts[3 + kinds :])
     centres = tuple(zip(flat[::2], flat[1::2], strict=True))
-    every: list[Any] = [*parts[:4], *numbers, centres, tuple(push)]
+    every: list[Any] = [body, tuple(liners), arms, slip, *numbers, tuple(poles), centres, tuple(push), layout]
     potential = Potential(*every)
     found = potential._tangent(Strains(*at), Pull(*pull))
     return ca.Function("tangent", [given], [ca.vertcat(*found.g, *found.H)], {"cse": True})

@@ -13,6 +13,8 @@ from typing import Any
 
 import casadi as ca
 
+from softnlp.model.cubature import Points
+
 _LEAST = 1e-20  # of (k r)^2: a straight section bends in no direction
 
 
@@ -32,6 +34,27 @@ class Disc:
     def area(self) -> Any:
         """With its sign [m^2]."""
         return self.sign * ca.pi * self.radius**2
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What of a section is built into its equations.
+
+    liners : of each chamber (N,) which liner it has, from 0; -1 where the body is wound and its silicone is all one.
+    points : of the silicone outside threads and bores, in the unit of `Potential.outer`; () is a disc without discs.
+    spread : of each liner the points of its silicone with weights whose sum is 1; () takes it at the chamber's centre.
+    held : whether thread around the body keeps the place of each chamber, so that pressures work without arms.
+    """
+
+    liners: tuple[int, ...]
+    points: Points = ()
+    spread: tuple[Points, ...] = ((),)
+    held: bool = False
+
+    @property
+    def kinds(self) -> int:
+        """How many liners there are."""
+        return max(self.liners, default=-1) + 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +136,11 @@ def at_point(centre: tuple[Any, Any], first: Any, second: Any) -> Sums:
     x, y = centre
     by_both = (x * x * second, x * y * second, y * y * second)
     return Sums(first, (x * first, y * first), second, (x * second, y * second), by_both)
+
+
+def placed(points: Points, unit: Any, weight: Any) -> list[tuple[tuple[Any, Any], Any]]:
+    """Return the places of points and their weights, in units of both."""
+    return [((x * unit, y * unit), w * weight) for x, y, w in points]
 
 
 def value_over(discs: Sequence[Disc], energy: Callable[[Any], Any], v: Any, k: tuple[Any, Any]) -> Any:

@@ -173,6 +173,24 @@ class Robot:
         r_cp = self.chamber_circle_radius
         return [(r_cp * ca.cos(theta), r_cp * ca.sin(theta)) for theta in self.chamber_angles()]
 
+    def manufacture(self, minimum_wall: float, walls: Mapping[str, bool]) -> tuple[Violation, ...]:
+        """Return the rules of manufacture that it breaks, as `violations`.
+
+        Parameters
+        ----------
+        minimum_wall
+            delta_s [m].
+        walls
+            As of `softnlp.model.rules.rules`.
+
+        Returns
+        -------
+        tuple
+            At most one entry a rule.
+        """
+        require_dimensions(self)
+        return broken(rules(self, minimum_wall, walls))
+
 
 def _library() -> dict[str, Robot]:
     """Build the robots of the paper's tables; columns in mm and degrees."""
@@ -246,8 +264,7 @@ def violations(
     RobotError
         When a dimension is a symbol, not finite, not positive or so far off that no robot is described.
     """
-    require_dimensions(robot)
-    return broken(rules(robot, minimum_wall, walls))
+    return robot.manufacture(minimum_wall, walls)
 
 
 def check(robot: Robot, *, allow: Collection[str] = (), minimum_wall: float = MINIMUM_WALL) -> tuple[str, ...]:

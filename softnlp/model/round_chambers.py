@@ -166,7 +166,7 @@ def with_numbers(
     """Return the same with other numbers or symbols, by the keys of its section's `quantities`."""
     constants = {c.name: numbers[f"material.{c.name}"] for c in material.law.constants}
     return (
-        replace(robot, **{name: numbers[f"robot.{name}"] for name in SIZES}),
+        replace(robot, **{name: numbers[f"robot.{name}"] for name in SIZES if f"robot.{name}" in numbers}),
         replace(material, constants=constants, density=numbers["material.density"]),
         replace(coefficients, **{field: numbers[name] for field, name in OF_COEFFICIENTS.items() if name in numbers}),
     )
@@ -179,6 +179,12 @@ def of_model(robot: Robot, material: Material) -> list[Quantity]:
         value = float(getattr(robot, name))
         unit = "rad" if name == "chamber_angle" else "m"
         declared.append(quantity(f"robot.{name}", unit, value, scale=max(abs(value), 1e-4), lower=0.0))
+    return [*declared, *of_silicone(material)]
+
+
+def of_silicone(material: Material) -> list[Quantity]:
+    """Return the numbers of a silicone as quantities."""
+    declared = []
     for constant in material.law.constants:
         value = float(material.constants[constant.name])
         unit = "Pa" if constant.unit == "MPa" else constant.unit
@@ -187,12 +193,17 @@ def of_model(robot: Robot, material: Material) -> list[Quantity]:
     return declared
 
 
+def fitted_warnings(material: Material, stretch: float) -> list[str]:
+    """Say where the silicone was not fitted."""
+    low, high = material.fitted_stretch
+    if low - _ROUNDING <= stretch <= high:
+        return []
+    return [f"stretch {stretch:.3f} is outside {low:g} to {high:g}, where {material.name} was fitted"]
+
+
 def chamber_warnings(robot: Robot, material: Material, stretch: float) -> list[str]:
     """Say where the silicone was not fitted, and where neighbouring chambers touch."""
-    found = []
-    low, high = material.fitted_stretch
-    if not low - _ROUNDING <= stretch <= high:
-        found.append(f"stretch {stretch:.3f} is outside {low:g} to {high:g}, where {material.name} was fitted")
+    found = fitted_warnings(material, stretch)
     limit = touching_stretch(robot)
     if stretch > limit:
         found.append(f"stretch {stretch:.3f} is above {limit:.3f}, where neighbouring reinforced chambers touch")

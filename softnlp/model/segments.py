@@ -17,9 +17,11 @@ import numpy as np
 from softnlp.base.errors import InputError
 from softnlp.base.quantity import Quantity
 from softnlp.model.body import Body, Segment
+from softnlp.model.conventions import REPRODUCTION, UNIAXIAL
 from softnlp.model.lined_chambers import LinedChambers
 from softnlp.model.materials import Material
 from softnlp.model.model import Model
+from softnlp.model.outlined import OutlinedRobot
 from softnlp.model.quantities import quantities
 from softnlp.model.robot import Robot
 
@@ -87,7 +89,7 @@ class SegmentedRobot(Robot):
     def notes(self) -> list[str]:
         """What to know of the lines."""
         found = []
-        for k, model in enumerate(Body(self.segments).models):
+        for k, model in enumerate(_body(self.segments).models):
             if isinstance(model.section, LinedChambers):
                 found += [f"segment {k + 1}: {note}" for note in model.section.notes]
         return found
@@ -123,8 +125,14 @@ def segmented_robot(segments: Sequence[Segment]) -> SegmentedRobot:
     InputError
         Without a segment, and for what cannot vary along one.
     """
-    Body(tuple(segments))  # for its errors
+    _body(segments)  # for its errors
     return whole_robot(segments)
+
+
+def _body(segments: Sequence[Segment]) -> Body:
+    """Return the body of segments in the conventions that their sections have."""
+    outlined = any(isinstance(segment.robot, OutlinedRobot) for segment in segments)
+    return Body(tuple(segments), conventions=UNIAXIAL if outlined else REPRODUCTION)
 
 
 def whole_robot(segments: Sequence[Segment]) -> SegmentedRobot:

@@ -15,8 +15,9 @@ from softnlp.base.arrays import Array
 from softnlp.base.errors import InputError
 from softnlp.base.units import MILLIMETRE
 from softnlp.model.body import Segment
+from softnlp.model.outlined import require_round_layout
 from softnlp.model.robot import Robot
-from softnlp.model.segments import SegmentedRobot, sections_of
+from softnlp.model.segments import SegmentedRobot, sections_of, segments_of
 
 _SAME = 1e-6  # lengths and angles closer than this are equal [mm, rad]
 
@@ -96,6 +97,8 @@ def shapes_of(robot: Robot, shrinkage_percent: float = 0.0) -> list[Shape]:
         Where a core could not be drawn: a chamber that is bent, or holes that narrow both ways.
     """
     scale = 1 / (MILLIMETRE * (1 - shrinkage_percent / 100))
+    for own, _ in segments_of(robot):
+        require_round_layout(own, "softnlp mould")
     if not isinstance(robot, SegmentedRobot):
         return [_shape([(0.0, robot)], robot, (), scale)]
     return [_segment(robot.segments, k, scale) for k in range(len(robot.segments))]

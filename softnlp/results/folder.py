@@ -209,6 +209,9 @@ def view_of_run(run: Run) -> RunView:
     )
 
 
+_ASKED = ("segment", "robot", "chamber", "body", "material")
+
+
 def view_of_dataset(dataset: xr.Dataset) -> RunView:
     """Return the view of a dataset of `to_dataset`, as it is in memory or read back.
 
@@ -218,7 +221,7 @@ def view_of_dataset(dataset: xr.Dataset) -> RunView:
         When a variable or an attribute is missing or not what `to_dataset` writes.
     """
     attributes = dataset.attrs
-    asked = {name: json.loads(attributes[name]) for name in ("segment", "robot", "material") if name in attributes}
+    asked = {name: json.loads(attributes[name]) for name in _ASKED if name in attributes}
     values = {str(name): variable.values for name, variable in dataset.variables.items()}
 
     def number(name: str) -> Any:

@@ -5,156 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import atan2, cos, hypot, pi, sin
-from typing import Any
 
 import numpy as np
 
 from softnlp.base.errors import InputError
+from softnlp.model.plane import Arc as Arc
+from softnlp.model.plane import Array as Array
+from softnlp.model.plane import Circle as Circle
+from softnlp.model.plane import Line as Line
+from softnlp.model.plane import Outline
+from softnlp.model.plane import Polygon as Polygon
 from softnlp.model.robot import Robot
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 class RingError(InputError):
     """The section cannot be meshed or its equilibrium not be found; the text says where it ends and what to change."""
-
-
-@dataclass(frozen=True)
-class Arc:
-    """Part of a circle from one angle to another; angles [rad] may run backwards."""
-
-    x: float
-    y: float
-    radius: float
-    start: float = 0.0
-    end: float = 2 * pi
-
-    def points(self, share: Array) -> Array:
-        """Return (n, 2) points at these shares of the length."""
-        angle = self.start + share * (self.end - self.start)
-        return np.array([self.x, self.y]) + self.radius * np.column_stack([np.cos(angle), np.sin(angle)])
-
-    @property
-    def length(self) -> float:
-        """Of the curve [m]."""
-        return self.radius * abs(self.end - self.start)
-
-    @property
-    def least(self) -> int:
-        """Edges below which the curve is not well followed: one for 30 degrees."""
-        return max(1, round(abs(self.end - self.start) / (pi / 6)))
-
-
-@dataclass(frozen=True)
-class Line:
-    """A straight line between two points [m]."""
-
-    x0: float
-    y0: float
-    x1: float
-    y1: float
-
-    def points(self, share: Array) -> Array:
-        """Return (n, 2) points at these shares of the length."""
-        start, end = np.array([self.x0, self.y0]), np.array([self.x1, self.y1])
-        return start + np.outer(share, end - start)
-
-    @property
-    def length(self) -> float:
-        """Of the line [m]."""
-        return hypot(self.x1 - self.x0, self.y1 - self.y0)
-
-    @property
-    def least(self) -> int:
-        """One edge."""
-        return 1
-
-
-@dataclass(frozen=True)
-class Circle:
-    """A round outline [m]."""
-
-    x: float
-    y: float
-    radius: float
-
-    def signed(self, points: Array) -> Array:
-        """Return the distances of (n, 2) points, negative inside."""
-        return np.asarray(np.hypot(points[:, 0] - self.x, points[:, 1] - self.y) - self.radius)
-
-    def grain(self, points: Array) -> Array:
-        """Return the longest edge that follows the outline where it is nearest to (n, 2) points [m]."""
-        return np.full(len(points), pi / 6 * self.radius)
-
-    @property
-    def area(self) -> float:
-        """Enclosed [m^2]."""
-        return pi * self.radius**2
-
-    @property
-    def centre(self) -> tuple[float, float]:
-        """Of the circle [m]."""
-        return self.x, self.y
-
-    def curves(self) -> list[Arc | Line]:
-        """Return the whole circle."""
-        return [Arc(self.x, self.y, self.radius)]
-
-
-@dataclass(frozen=True)
-class Polygon:
-    """An outline of straight lines, once around; (n, 2) corners [m]. Curves become many corners."""
-
-    corners: tuple[tuple[float, float], ...]
-
-    def signed(self, points: Array) -> Array:
-        """Return the distances of (n, 2) points, negative inside."""
-        a = np.array(self.corners)
-        b = np.roll(a, -1, axis=0)
-        along = b - a
-        distance = self._distances(points).min(axis=1)
-        above = a[:, 1] > points[:, 1:2]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            crossing = a[:, 0] + (points[:, 1:2] - a[:, 1]) * along[:, 0] / along[:, 1]
-        crosses = (above != (b[:, 1] > points[:, 1:2])) & (points[:, :1] < crossing)
-        return np.asarray(np.where(crosses.sum(axis=1) % 2, -distance, distance))
-
-    def grain(self, points: Array) -> Array:
-        """Return the length of the side that is nearest to (n, 2) points [m]."""
-        a = np.array(self.corners)
-        return np.asarray(np.hypot(*(np.roll(a, -1, axis=0) - a).T)[self._distances(points).argmin(axis=1)])
-
-    def _distances(self, points: Array) -> Array:
-        """Return (n, sides) distances of points to each side."""
-        a = np.array(self.corners)
-        along, to = np.roll(a, -1, axis=0) - a, points[:, None, :] - a
-        share = np.clip((to * along).sum(axis=2) / (along**2).sum(axis=1), 0, 1)
-        return np.asarray(np.hypot(*np.moveaxis(to - share[..., None] * along, 2, 0)))
-
-    @property
-    def _twice(self) -> Array:
-        a = np.array(self.corners)
-        b = np.roll(a, -1, axis=0)
-        return np.asarray(a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1])
-
-    @property
-    def area(self) -> float:
-        """Enclosed [m^2]."""
-        return abs(float(self._twice.sum())) / 2
-
-    @property
-    def centre(self) -> tuple[float, float]:
-        """Centroid of the enclosed area [m]."""
-        a = np.array(self.corners)
-        x, y = ((a + np.roll(a, -1, axis=0)) * self._twice[:, None]).sum(axis=0) / (3 * self._twice.sum())
-        return float(x), float(y)
-
-    def curves(self) -> list[Arc | Line]:
-        """Return its lines."""
-        return [Line(*a, *b) for a, b in zip(self.corners, (*self.corners[1:], self.corners[0]), strict=True)]
-
-
-Outline = Circle | Polygon
 
 
 @dataclass(frozen=True)

@@ -180,6 +180,34 @@ def response_on(
     section: PlaneSection, on: Mesh, stretches: tuple[float, float] = STRETCHES, count: int = _NODES
 ) -> RingResponse:
     """Return the response of a section on a mesh of it, from `count` stretches."""
+    equilibrium, found, (low, high), stops = balances_on(section, on, stretches, count)
+    at = np.array([b.stretch for b in found])
+    values = [np.arccosh([b.square * b.stretch / 2 for b in found]) / 2 / np.abs(np.log(at))]
+    places = np.array([_centres(equilibrium, b, section) for b in found])
+    cast = np.array([centre for _, centre, *_ in equilibrium.freedom.rings])
+    for (x, y), way in zip(cast, np.moveaxis(places, 1, 0), strict=True):
+        if hypot(x, y) < 1e-6 * section.outer.area**0.5:  # a ring in the middle stays there
+            values += [np.full(at.shape, 0.5), np.zeros(at.shape)]
+        else:
+            ratio = (way[:, 0] + 1j * way[:, 1]) / (x + 1j * y)
+            values += [-np.log(np.abs(ratio)) / np.log(at), np.angle(ratio) / np.log(at)]
+    curves = [fitted(at, v, low, high, min(_ORDER, len(at) - 3)) for v in values]
+    error = max(float(np.abs(curve(at) - v).max()) for curve, v in zip(curves, values, strict=True))
+    return RingResponse(
+        low, high, stops, error, curves[0], tuple(curves[1::2]), tuple(curves[2::2]), _chambers(section, cast)
+    )
+
+
+def balances_on(
+    section: PlaneSection, on: Mesh, stretches: tuple[float, float] = STRETCHES, count: int = _NODES
+) -> tuple[Equilibrium, list[Balance], tuple[float, float], str]:
+    """Return the equations of a section on a mesh, its balances by rising stretch, their range, and why it is shorter.
+
+    Raises
+    ------
+    RingError
+        For a section without a ring, a range that has not 1 in it, or no solution beside stretch 1.
+    """
     if not (section.rings or section.outer_ring):
         raise RingError("the section has no ring: its stress is uniaxial")
     if not 0 < stretches[0] < 1 < stretches[1]:
@@ -193,23 +221,7 @@ def response_on(
     found = [*down[::-1], *up]
     if len(found) < 4:
         raise RingError(f"the section has no equilibrium near stretch 1: {why_low or why_high}")
-
-    at = np.array([b.stretch for b in found])
-    values = [np.arccosh([b.square * b.stretch / 2 for b in found]) / 2 / np.abs(np.log(at))]
-    places = np.array([_centres(equilibrium, b, section) for b in found])
-    cast = np.array([centre for _, centre, *_ in equilibrium.freedom.rings])
-    for (x, y), way in zip(cast, np.moveaxis(places, 1, 0), strict=True):
-        if hypot(x, y) < 1e-6 * section.outer.area**0.5:  # a ring in the middle stays there
-            values += [np.full(at.shape, 0.5), np.zeros(at.shape)]
-        else:
-            ratio = (way[:, 0] + 1j * way[:, 1]) / (x + 1j * y)
-            values += [-np.log(np.abs(ratio)) / np.log(at), np.angle(ratio) / np.log(at)]
-    curves = [fitted(at, v, low, high, min(_ORDER, len(at) - 3)) for v in values]
-    error = max(float(np.abs(curve(at) - v).max()) for curve, v in zip(curves, values, strict=True))
-    stops = "; ".join(text for text in (why_low, why_high) if text)
-    return RingResponse(
-        low, high, stops, error, curves[0], tuple(curves[1::2]), tuple(curves[2::2]), _chambers(section, cast)
-    )
+    return equilibrium, found, (low, high), "; ".join(text for text in (why_low, why_high) if text)
 
 
 def follow(equilibrium: Equilibrium, start: Balance, stretch: float) -> Balance:

@@ -17,6 +17,7 @@ from softnlp.scenario.identify import IdentifyFile
 from softnlp.scenario.inverse import InverseFile
 from softnlp.scenario.near_keys import meant
 from softnlp.scenario.obstacle_schema import AmongObstaclesFile, BlockedAmongObstaclesFile
+from softnlp.scenario.outlined import of_outlines
 from softnlp.scenario.schema import ScenarioFile
 from softnlp.scenario.segments import OF_SEGMENTS, of_segment, of_segments
 from softnlp.scenario.trajectory import TrajectoryFile
@@ -39,7 +40,13 @@ _INSTEAD = "obstacles stand in 'forward', 'blocked-force', 'inverse' and 'worksp
 HOW = ": --all-errors"
 """How to see all mistakes of a file."""
 
-_TABLES = {"segment", "obstacle", *(name for schema in SCHEMAS.values() for name in schema.model_fields)} - {
+_TABLES = {
+    "segment",
+    "obstacle",
+    "chamber",
+    "body",
+    *(name for schema in SCHEMAS.values() for name in schema.model_fields),
+} - {
     "title",
     "study",
 }
@@ -110,6 +117,13 @@ def schema_of(data: Mapping[str, Any], study: str) -> type[ScenarioFile]:
     InputError
         For segments in a study that does not take them, and a single table of that name.
     """
+    if outlines := [name for name in ("chamber", "body") if name in data]:
+        if "segment" in data:
+            raise InputError(f"expected [[segment.{outlines[0]}]] of a [[segment]], got both", table=outlines[0])
+        if study not in OF_SEGMENTS:
+            text = f"study {study!r} takes the round layout of [robot] so far, not [[chamber]] and [body]"
+            raise InputError(text, table=outlines[0])
+        return of_outlines(SCHEMAS[study])
     if "segment" not in data:
         return SCHEMAS[study]
     if study not in OF_SEGMENTS:

@@ -19,6 +19,7 @@ from softnlp.base.reading import choices, read_text, shown
 from softnlp.model.contact_settings import CLOSURES, ContactSettings, ContactTask
 from softnlp.model.conventions import Coefficients, Conventions
 from softnlp.model.materials import Material, load_materials
+from softnlp.model.outlined import require_round_layout
 from softnlp.model.quantities import Model
 from softnlp.model.robot import Robot
 from softnlp.model.segments import require_one_segment
@@ -197,6 +198,7 @@ def _require_study(scenario: Scenario) -> None:
     source = str(scenario.path)
     with located(source=source):
         require_one_segment(scenario.robot, "a comparison with measurements")
+        require_round_layout(scenario.robot, "a comparison with measurements")
         require_no_obstacles(scenario, "a comparison with measurements")
     if scenario.study not in STUDIES:
         raise InputError(f"expected {choices(STUDIES)}, got {scenario.study!r}", source=source, key="study")

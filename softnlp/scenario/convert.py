@@ -11,6 +11,7 @@ import tomlkit
 from tomlkit.items import AoT, InlineTable, Table
 
 from softnlp.base.errors import InputError
+from softnlp.model.outlined import OutlinedRobot
 from softnlp.model.robot import robot as library_robot
 from softnlp.model.segments import SegmentedRobot
 from softnlp.scenario.check import SCHEMAS, schema_of
@@ -46,7 +47,8 @@ def converted(source: Path, study: str, target: Path, data: str) -> Converted:
     document = tomlkit.parse(asked.text)
     segments = study in OF_SEGMENTS
     fields = (schema_of(document, study) if segments else SCHEMAS[study]).model_fields
-    made = asked.robot if segments or not isinstance(asked.robot, SegmentedRobot) else library_robot(ROBOT)
+    own = isinstance(asked.robot, SegmentedRobot | OutlinedRobot)
+    made = asked.robot if segments or not own else library_robot(ROBOT)
     silicone = asked.material if made is asked.robot else None
     values = begun(study, made, data, silicone)
     dropped = [name for name in document if name not in fields]

@@ -69,8 +69,24 @@ def misplaced(data: Mapping[str, Any]) -> Iterator[InputError]:
             yield InputError(text, table=table, key=key)
     for key in sorted({*_table(data, "uncertainty")} & {"chamber_reaction"}):
         yield InputError(NOT_USED, table="uncertainty", key=key)
-    if "segment" in data:
-        yield InputError("conventions energy take one uniform segment so far", table="segment")
+    yield from _of_segments(data)
+
+
+def _of_segments(data: Mapping[str, Any]) -> Iterator[InputError]:
+    """Yield an error for what segments have that is not of the energy section yet."""
+    varies = "expected one number: sections do not vary along s with conventions energy so far"
+    for key, value in _table(data, "robot").items():
+        if key.endswith(("_mm", "_deg")) and isinstance(value, dict | list):
+            yield InputError(varies, table="robot", key=key)
+    several = data.get("segment")
+    for k, one in enumerate(several if isinstance(several, list) else [], start=1):
+        if not isinstance(one, dict):
+            continue
+        if one.get("lines") == "bonded":
+            yield InputError("'bonded' is not with conventions energy so far", table="segment", key=f"{k}.lines")
+        for key, value in _table(one, "robot").items():
+            if key.endswith(("_mm", "_deg")) and isinstance(value, dict | list):
+                yield InputError(varies, table="segment", key=f"{k}.robot.{key}")
 
 
 def _table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:

@@ -21,6 +21,7 @@ from softnlp.model.conventions import COEFFICIENT_SETS, Coefficients
 from softnlp.model.materials import Material, material_from_table
 from softnlp.model.numerics import Numerics
 from softnlp.model.obstacles import Obstacle
+from softnlp.model.outlined import OutlinedRobot
 from softnlp.model.quantities import Model
 from softnlp.model.robot import DIMENSIONS, MOST_CHAMBERS, Robot, Violation, violations
 from softnlp.model.rod import Loads
@@ -36,6 +37,8 @@ from softnlp.scenario.energy import misplaced
 from softnlp.scenario.identify import identify_task
 from softnlp.scenario.inverse import inverse_task
 from softnlp.scenario.obstacles import obstacles_of
+from softnlp.scenario.outlined import made as made_outlined
+from softnlp.scenario.outlined import outlined, outlines_given
 from softnlp.scenario.pressures import PressurePath, pressure_path
 from softnlp.scenario.schema import ScenarioFile
 from softnlp.scenario.segments import OF_SEGMENTS, read_segments
@@ -103,12 +106,13 @@ def robot_of_scenario(path: str | PathLike[str], segment: int | None = None) -> 
     """
     try:
         file = parse(parse_toml(read_text(Path(path), LARGEST_TOML)))
-        tables = [table.robot for table in getattr(file, "segment", None) or [file]]
+        tables: list[Any] = getattr(file, "segment", None) or [file]
         if segment is not None and not 1 <= segment <= len(tables):
             raise InputError(f"expected a segment from 1 to {len(tables)}, got {segment}", table="segment")
         chosen = tables[(segment or 1) - 1]
-        robot = chosen.described()
-        return robot, violations(robot, chosen.minimum_wall_mm * MILLIMETRE)
+        by_outlines = outlines_given(chosen)
+        robot = outlined(chosen, file.corrections.conventions) if by_outlines else chosen.robot.described()
+        return robot, violations(robot, chosen.robot.minimum_wall_mm * MILLIMETRE)
     except InputError as error:
         raise placed(error.located(table="robot"), fspath(path)) from None
 
@@ -140,12 +144,13 @@ def _scenario(text: str, path: Path) -> Scenario:
     scatter = None
     asked = getattr(file, "uncertainty", None)
     said = None if asked is None else asked.model_dump(exclude_unset=True, warnings=False)
-    if said is not None and made is not None and isinstance(made[0], SegmentedRobot):
-        errors.append(
-            InputError(
-                "a robot of several segments, or one that varies along s, takes none so far", table="uncertainty"
-            )
+    if said is not None and made is not None and isinstance(made[0], SegmentedRobot | OutlinedRobot):
+        what = (
+            "with [[chamber]]"
+            if isinstance(made[0], OutlinedRobot)
+            else "of several segments, or one that varies along s,"
         )
+        errors.append(InputError(f"a robot {what} takes none so far", table="uncertainty"))
     if said is not None and not errors and made is not None and chosen is not None:
         silicone = data.get("material") or file.material.model_dump(exclude_none=True)
         model = Model(made[0], chosen, _coefficients(file), ALL_CONVENTIONS[file.corrections.conventions])
@@ -198,7 +203,7 @@ def _robot(
     if "segment" in bad:
         return None, None, ()
     if (tables := getattr(file, "segment", None)) is not None:
-        found = read_segments(tables, data["segment"], folder, errors)
+        found = read_segments(tables, data["segment"], folder, errors, file.corrections.conventions)
         if found is None:
             return None, None, ()
         robot, silicone, warnings = found
@@ -206,14 +211,17 @@ def _robot(
         unlikely = dict.fromkeys(note for one in every for note in notes(one))
         return (robot, warnings), silicone, tuple(unlikely)
     made = chosen = None
-    if "robot" not in bad:
+    outlines: Any = file
+    if outlines_given(file) and not {"robot", "chamber", "body", "corrections"} & bad:
+        made = _attempt(errors, "robot", lambda: made_outlined(outlines, file.corrections.conventions))
+    elif "robot" not in bad and not outlines_given(file):
         made = _attempt(errors, "robot", file.robot.made)
     if "material" not in bad:
         written = data.get("material") or file.material.model_dump(exclude_none=True)
         chosen = _attempt(errors, "material", lambda: material_from_table(written, folder=folder))
     if made is None or chosen is None:
         return made, chosen, ()
-    if along := file.robot.along:
+    if (along := file.robot.along) and not outlines_given(file):
         if file.study not in OF_SEGMENTS:
             key = next(iter(along)).removeprefix("robot.")
             text = f"study {file.study!r} takes one number here so far, not one that varies along s"

@@ -15,6 +15,8 @@ from softnlp.model.body import Segment
 from softnlp.model.materials import Material, material_from_table
 from softnlp.model.robot import Robot
 from softnlp.model.segments import SegmentedRobot, segmented_robot
+from softnlp.scenario.outlined import BodyTable, Chambers, outlines_given
+from softnlp.scenario.outlined import made as made_outlined
 from softnlp.scenario.schema import MaterialTable, NotNegative, RobotTable, ScenarioFile, Table, wrong
 
 OF_SEGMENTS = ("forward", "blocked-force", "inverse", "workspace", "dynamic", "trajectory")
@@ -27,6 +29,8 @@ class SegmentTable(Table):
 
     robot: RobotTable = Field(description="a table [segment.robot] with name or every dimension")
     material: MaterialTable = Field(description="a table [segment.material] with name and model")
+    chamber: Chambers = Field(default=[])
+    body: BodyTable = BodyTable()
     connector_mm: NotNegative = 0.0
     lines: Literal["none", "slack", "bonded"] = "none"
     turn_deg: float = 0.0
@@ -59,7 +63,11 @@ def of_segment(number: int, error: InputError) -> InputError:
 
 
 def read_segments(
-    tables: Sequence[SegmentTable], data: Sequence[Mapping[str, Any]], folder: Path, errors: list[InputError]
+    tables: Sequence[SegmentTable],
+    data: Sequence[Mapping[str, Any]],
+    folder: Path,
+    errors: list[InputError],
+    conventions: str,
 ) -> tuple[Robot, Material, tuple[str, ...]] | None:
     """Return the robot of segments, its silicone and its warnings; None with what is wrong added to the errors.
 
@@ -70,7 +78,8 @@ def read_segments(
     for k, (table, given) in enumerate(zip(tables, data, strict=True)):
         try:
             with of_table("robot"):
-                robot, notes = table.robot.made()
+                outlined = outlines_given(table)
+                robot, notes = made_outlined(table, conventions) if outlined else table.robot.made()
             with of_table("material"):
                 silicone = material_from_table(dict(given["material"]), folder=folder)
         except InputError as error:
@@ -81,7 +90,7 @@ def read_segments(
             Segment(
                 robot,
                 silicone,
-                along=table.robot.along,
+                along={} if outlined else table.robot.along,
                 connector=table.connector_mm * MILLIMETRE,
                 lines=table.lines,
                 turn=table.turn_deg * DEGREE,

@@ -22,6 +22,7 @@ from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.batch.plan import CHUNK, Plan, cells
 from softnlp.model.contact_settings import require_in_front
 from softnlp.model.materials import Material
+from softnlp.model.outlined import require_round_layout
 from softnlp.model.robot import Robot
 from softnlp.model.segments import require_one_segment
 from softnlp.scenario.blocked_force import SEVERAL, contact_settings
@@ -98,12 +99,14 @@ def workspace_task(given: Read) -> WorkspaceTask:
     if wall is not None:
         with located(table="contact"):
             require_one_segment(robot, "a wall")
+            require_round_layout(robot, "a wall in a sweep")
     if file.obstacle and (wall is not None or table.vary):
         key, other = ("contact", "a wall") if wall is not None else ("workspace", "vary")
         raise InputError(f"{other} takes no [[obstacle]] beside it; leave one of them out", table=key)
     if table.vary:
         with located(table="workspace.vary"):
             require_one_segment(robot, "a sweep of other numbers than pressures")
+            require_round_layout(robot, "a sweep of other numbers than pressures")
     sets = list(range(1, robot.chamber_sets + 1)) if table.sets is None else table.sets
     require_sets(sets, robot.chamber_sets, "sets")
     task = WorkspaceTask(

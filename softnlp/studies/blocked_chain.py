@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from softnlp.base.errors import InputError
 from softnlp.base.status import Status
-from softnlp.model.contact_settings import ContactSettings
+from softnlp.model.contact_settings import NO_CLOSURE, ContactSettings
 from softnlp.model.numerics import Numerics
 from softnlp.model.quantities import Model
 from softnlp.model.rod import Loads
@@ -33,7 +33,7 @@ from softnlp.statics.kept import pose_solver
 from softnlp.statics.pose_grid import Solved, iteration_cost
 from softnlp.statics.posed import Problem, problem
 from softnlp.statics.step import Contact, Pose, Step
-from softnlp.statics.wall import Wall
+from softnlp.statics.wall import Wall, with_closure
 
 Array = NDArray[np.float64]
 
@@ -48,8 +48,8 @@ _PULL = 1e-6  # of what bends the robot: less is no pull
 
 
 def require_free(contact: ContactSettings) -> None:
-    """Raise `InputError` for a closure that several segments do not have."""
-    if contact.closure != "free":
+    """Raise `InputError` for a closure that several segments do not have; that of the energy section is none."""
+    if contact.closure not in ("free", NO_CLOSURE):
         raise InputError(
             f"expected 'free' with several segments or a section that varies, got {contact.closure_name!r}: how the "
             "reaction of a chamber passes a junction is not modelled",
@@ -70,7 +70,7 @@ class ChainWall:
     """Solves blocked poses of a model of several segments against a wall under the same loads."""
 
     def __init__(self, model: Model, numerics: Numerics, contact: ContactSettings, loads: Loads) -> None:
-        require_free(contact)
+        require_free(with_closure(model, contact))
         poses = pose_solver(model, numerics.without_ipopt() if numerics.engine == "auto" else numerics)
         assert isinstance(poses, ChainSolver)
         self.poses, self._numerics, self._contact, self._loads = poses, numerics, contact, loads
@@ -242,7 +242,7 @@ class ChainWall:
         found = Solved(lambda: grid, grid.intervals, solution, nodes, nodes, constants, error, 0.0, stable=True)
         step = chain_step(self.poses.body, self._numerics, pressure, self._loads, found, solution.iterations, began)
         assert step.pose is not None
-        pressed = np.repeat(pressure > 0, _chambers(self.poses))
+        pressed = (pressure > 0)[_sets(self.poses)]
         contact = Contact(
             force=max(float(answer["tip_forces"][0]), 0.0),
             normal=wall.normal,
@@ -265,9 +265,10 @@ def _intervals(answer: Answer) -> int:
     return method.intervals
 
 
-def _chambers(poses: ChainSolver) -> list[int]:
-    """Return the number of chambers of each set of all segments."""
-    counts = []
+def _sets(poses: ChainSolver) -> list[int]:
+    """Return the set of each chamber of all segments."""
+    found, before = list[int](), 0
     for segment in poses.body.segments:
-        counts += [segment.robot.chambers_per_set] * segment.robot.chamber_sets
-    return counts
+        found += [before + own for own in segment.robot.set_of_chamber]
+        before += segment.robot.chamber_sets
+    return found

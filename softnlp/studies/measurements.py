@@ -13,6 +13,7 @@ from softnlp.base.errors import InputError, nearest
 from softnlp.base.units import DEGREE
 from softnlp.model.laws import Law
 from softnlp.model.materials import Material
+from softnlp.model.outlined import require_round_layout
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.segments import require_one_segment
 from softnlp.studies.check import Check
@@ -185,6 +186,7 @@ def checked_measurements(given: Measurements) -> Data:
 def observed(given: Measurements, columns: Sequence[str]) -> Observed:
     """Return what was measured, a tip's three columns first, or raise `InputError` naming what is not right."""
     require_one_segment(given.robot, "what takes measurements")
+    require_round_layout(given.robot, "what takes measurements")
     check(given.robot, allow=LOWERABLE_RULES)
     P = pressure_table(given.pressure, given.robot.chamber_sets)
     values = np.full((len(P), len(columns)), np.nan)

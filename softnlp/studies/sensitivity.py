@@ -15,6 +15,7 @@ from softnlp.model.contact_settings import ContactSettings
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.model.materials import Material
 from softnlp.model.numerics import Numerics
+from softnlp.model.outlined import require_round_layout
 from softnlp.model.quantities import Model
 from softnlp.model.robot import LOWERABLE_RULES, Robot, check
 from softnlp.model.rod import Loads
@@ -171,6 +172,7 @@ def sensitivities(
         For a robot that is geometrically impossible.
     """
     require_one_segment(robot, "a sensitivity")
+    require_round_layout(robot, "a sensitivity")
     check(robot, allow=LOWERABLE_RULES)
     P = pressure_table(pressure, robot.chamber_sets)
     if len(P) != 1:

@@ -22,7 +22,9 @@ from softnlp.base.arrays import Array
 from softnlp.base.errors import InputError
 from softnlp.base.palette import colour
 from softnlp.base.units import MILLIMETRE
+from softnlp.figures.mesh.outlines import Ringed, drawn_section
 from softnlp.figures.mesh.rings import circle, natural_body, placed, resampled
+from softnlp.model.outlined import OutlinedRobot
 from softnlp.model.robot import Robot
 from softnlp.model.section import SectionRadii
 from softnlp.model.segments import segments_of
@@ -89,7 +91,11 @@ def body_solid(robot: Robot, body: Body, facets: int = FACETS) -> Solid:
         Without the extra `mesh`, for a number of facets out of range, where no wall is left beside the bores, or for a
         shape that is compressed to nothing somewhere.
     """
-    made = _swept("body", body, _silicone(robot, body, body.radii.bore, facets), facets)
+    if isinstance(robot, OutlinedRobot):
+        section = _outlined(robot, body, facets)
+    else:
+        section = _silicone(robot, body, body.radii.bore, facets)
+    made = _swept("body", body, section, facets)
     return replace(made, warnings=fit_of(body.position, body.rotation, body.radii.outer).warnings)
 
 
@@ -105,6 +111,8 @@ def mould_body(robot: Robot, facets: int = FACETS, holes: str = "bore") -> Solid
         As `body_solid`.
     """
     body = natural_body(robot)
+    if isinstance(robot, OutlinedRobot):
+        return _swept("body", body, _outlined(robot, body, facets, threads=_threaded(robot, holes)), facets)
     return _swept("body", body, _silicone(robot, body, _hole_radius(robot, holes), facets), facets)
 
 
@@ -120,6 +128,13 @@ def cores(robot: Robot, body: Body | None = None, facets: int = FACETS, holes: s
     """
     require(facets)
     shape = natural_body(robot) if body is None else body
+    if isinstance(robot, OutlinedRobot):
+        hole = _threaded(robot, holes) and body is None
+        drawn = drawn_section(robot, shape.radii, facets)
+        lumen = [] if drawn.lumen is None else [_swept("lumen", shape, _section([drawn.lumen]), facets)]
+        inside = drawn.threads if hole and drawn.threads else drawn.bores
+        chambers = (_swept(f"chamber {n + 1}", shape, _ringed(of), facets, n) for n, of in enumerate(inside))
+        return (*lumen, *chambers)
     radius = _hole_radius(robot, holes) if body is None else body.radii.bore
     discs: list[tuple[int | None, Array]] = [(None, shape.radii.lumen * circle(facets))]
     discs += [(n, outline) for n, outline in enumerate(_holes(robot, shape, radius, facets))]
@@ -128,6 +143,28 @@ def cores(robot: Robot, body: Body | None = None, facets: int = FACETS, holes: s
         _swept(name, shape, _section([outline]), facets, chamber=n)
         for name, (n, outline) in zip(names, discs, strict=True)
     )
+
+
+def _threaded(robot: OutlinedRobot, holes: str) -> bool:
+    """Whether holes are as wide as threads; a body that is wound as a whole has no threads around chambers."""
+    _hole_radius(robot, holes)  # for its error
+    return holes != HOLES[0]
+
+
+def _outlined(robot: OutlinedRobot, body: Body, facets: int, *, threads: bool = False) -> CrossSection:
+    """Return the section of a robot of any outline [mm]."""
+    require(facets)
+    drawn = drawn_section(robot, body.radii, facets)
+    section = _section([drawn.surface])
+    for hole in drawn.threads if threads and drawn.threads else drawn.bores:
+        section = section - _ringed(hole)
+    return section if drawn.lumen is None else section - _section([drawn.lumen])
+
+
+def _ringed(area: Ringed) -> CrossSection:
+    """Return an area as a section [mm]."""
+    outer = _section([area.outer])
+    return outer if area.inner is None else outer - _section([area.inner])
 
 
 def _hole_radius(robot: Robot, holes: str) -> float:
@@ -193,6 +230,11 @@ def segment_solids(robot: Robot, body: Body, facets: int = FACETS, fixed: int | 
     made = []
     for k, (piece, (own, _)) in enumerate(zip(body.pieces, segments_of(robot), strict=True)):
         radii = {field.name: np.ravel(getattr(piece.radii, field.name)) for field in fields(piece.radii)}
+        if isinstance(own, OutlinedRobot):  # which does not vary along it
+            there = SectionRadii(**{name: float(values[0]) for name, values in radii.items()})
+            piece = replace(piece, radii=there)
+            made.append(_swept(f"segment {k + 1}", piece, _outlined(own, piece, facets), facets))
+            continue
         for j in range(radii["outer"].size):  # for its errors
             there = SectionRadii(**{name: float(values[j]) for name, values in radii.items()})
             _silicone(own, replace(piece, radii=there), there.bore, facets)
