@@ -46,13 +46,14 @@ _MET = 1e-7  # misfit of a target that is met [L_0]
 _MISSED = 1e-7  # a miss of the elastic program from which a target counts as not met [L_0]
 _CLOSER = 3e-6  # [m] than the clearance between nodes, from which the nodes next to it are kept further away
 _ROUNDS, _GRIDS = 6, 3
+_MORE_BETWEEN = 1.3  # of what gaps between nodes are less at the start: poses change
 _MOST_BETWEEN = 5e-4  # [m] that a gap between nodes is taken to be less than at these, before it is seen
 _NEAR = 1e-3  # scaled violation of a start that counts as a solution
 _HARD, _ELASTIC = 60, 300  # iterations of IPOPT
 _LONGEST = 1200.0  # seconds of one solve
 _IPOPT = {"bound_relax_factor": 0.0, "constr_viol_tol": 1e-10, "max_wall_time": _LONGEST}
 _CHANGED = {"mu_init": 1e-5, "bound_push": 1e-6, "bound_frac": 1e-6}  # for the same path with rows moved a little
-_FAR = {"mu_init": 1e-1, "bound_push": 1e-2, "bound_frac": 1e-2}
+_FAR = {"mu_init": 1e-3, "bound_push": 1e-3, "bound_frac": 1e-3}
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +308,7 @@ class PathSolver:
                     at = np.concatenate([there[j, :1], nodes[k, own]])
                     dip = np.minimum(at[:-1], at[1:]) - least_between(gaps.arc[own], arc, there[j])[:-1]
                     both = np.maximum(dip, np.append(dip[1:], 0.0))
-                    found[k, own] = np.clip(both, 0.0, _MOST_BETWEEN) / self.length
+                    found[k, own] = np.clip(_MORE_BETWEEN * both, 0.0, _MOST_BETWEEN) / self.length
         return found
 
     def judged(self, found: Found) -> tuple[Judged, ...]:
