@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from softnlp.base.errors import InputError
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, complain, progress, say, say_rows
+from softnlp.cli.motion import compare_motion
 from softnlp.cli.report import Report, write_report
 from softnlp.cli.study import (
     AllErrors,
@@ -50,10 +52,11 @@ def compare(
     ----------
     scenario
         TOML file of study forward, blocked-force or workspace: silicone, loads, wall, and the robot of rows that name
-        none. The pressures are those of the measurements; its own are not solved.
+        none. The pressures are those of the measurements; its own are not solved. Or of study dynamic, whose motion
+        under its own pressures is compared with a tip over time.
     measured
         CSV file with columns p1_bar, p2_bar, ... and what was measured: x_mm, y_mm, z_mm, bending_angle_deg,
-        elongation_mm, tilt_deg, blocked_force_N; docs/compare.md has the others.
+        elongation_mm, tilt_deg, blocked_force_N; docs/compare.md has the others. Of a motion: t_s, x_mm, y_mm, z_mm.
     law
         A stress-stretch law of the scenario's silicone, or all; may be repeated.
     coefficients
@@ -74,6 +77,11 @@ def compare(
     asked = scenario_at(scenario, all_errors)
     if legend:
         return say_legend("compare")
+    if asked.study == "dynamic":
+        chosen = {"--law": law, "--coefficients": coefficients, "--conventions": conventions, "--closure": closure}
+        for key in (key for key, value in chosen.items() if value):
+            raise InputError("not used with study 'dynamic': a trace is compared with the scenario as it is", key=key)
+        return compare_motion(asked, measured, out, json, report)
     task = compare_task(asked, measured, Asked(law, coefficients, conventions, closure, shape))
     folder = results_folder(out, json, f"{scenario.stem}_compare")
     if folder is not None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say, say_rows
+from softnlp.cli.motion import identify_from_motion
 from softnlp.cli.report import Report, library_section, write_report
 from softnlp.cli.study import (
     AllErrors,
@@ -43,7 +44,7 @@ def identify(
     all_errors: AllErrors = False,
     legend: Legend = False,
 ) -> int:
-    """Find constants from a tensile test or from measurements of robots, as a scenario of study "identify" asks.
+    """Find constants from a tensile test, from measurements of robots or from a motion, as a scenario asks.
 
     Prints the constants with their standard errors and what is left of the data; writes identified.json, table.csv,
     tables to paste into a scenario (material.toml of a tensile test, else identified.toml), figure.png, versions.json
@@ -61,12 +62,15 @@ def identify(
 
 def run_study(asked: Scenario, out: Path | None, json: bool, report: Path | None = None) -> int:
     """Identify what a scenario asks for, print it and write the results; return the exit status."""
+    from softnlp.scenario.motion import MotionTask
     from softnlp.studies.measurements import TensileTask
 
     folder = results_folder(out, json, asked.path.stem)
     tensile = isinstance(asked.task, TensileTask)
     if report is not None:
         require_file(report)
+    if isinstance(asked.task, MotionTask):
+        return identify_from_motion(asked, folder, json, report)
     return _tensile(asked, folder, json, report) if tensile else _robots(asked, folder, json, report)
 
 

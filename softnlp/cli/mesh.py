@@ -22,6 +22,7 @@ def mesh(
     step: int | None = None,
     undeformed: bool = False,
     cores: bool = False,
+    animate: bool = False,
     holes: str | None = None,
     facets: int | None = None,
     out: Path | None = None,
@@ -42,19 +43,23 @@ def mesh(
         The body as it is cast: straight, of its natural length, without pressure.
     cores
         Also what fills the lumen and each chamber: in a GLB beside the body, with an STL as a second file, NAME-cores.
+    animate
+        All steps as one animated GLB, in the time of a dynamic run, else a step a second; of a run or a scenario.
     holes
         Of --undeformed: "bore" (default) makes the finished body; "reinforced" leaves room for chambers wound before.
     facets
         Sides of every circle; 96 by default.
     out
-        STL or GLB file; NAME.stl by default.
+        STL or GLB file; NAME.stl by default, NAME.glb with --animate.
     """
     from softnlp.figures.mesh import FACETS, HOLES, body_solid, format_of, mould_body, require
     from softnlp.figures.mesh import cores as core_solids
     from softnlp.figures.mesh.solid import segment_solids
     from softnlp.model.segments import SegmentedRobot, require_one_segment
 
-    target = out or Path(f"{_stem(scenario)}.stl")
+    target = out or Path(f"{_stem(scenario)}.{'glb' if animate else 'stl'}")
+    if animate:
+        return _animated(scenario, target, facets, [step, undeformed or None, cores or None, holes], all_errors)
     format_of(target)
     require_file(target)
     sides = FACETS if facets is None else facets
@@ -85,6 +90,32 @@ def mesh(
         inside = core_solids(robot, body, sides) if cores else ()
     _write(solids, inside, robot, target)
     return SOLVED
+
+
+def _animated(scenario: Path, target: Path, facets: int | None, others: list[object], all_errors: bool) -> int:
+    """Write all steps as one animated GLB; return the exit status. others : what does not go with it."""
+    import numpy as np
+
+    from softnlp.base.files import make_folder
+    from softnlp.figures.mesh import format_of
+    from softnlp.figures.mesh.animation import FACETS, frames_of, write_animation
+
+    if any(other is not None for other in others):
+        raise InputError("expected neither --step, --undeformed, --cores nor --holes beside it", key="--animate")
+    if format_of(target) != ".glb":
+        raise InputError("expected a file name that ends in .glb", key="--out")
+    require_file(target)
+    view, number = _view_of(scenario, None, all_errors)
+    if view is None:
+        complain(f"stopped before step {number}; nothing was written")
+        return STOPPED
+    chosen = frames_of(view.solved)
+    bodies = [body for k in chosen if (body := view.bodies[k]) is not None]
+    times = np.array(chosen, float) if view.time is None else np.asarray(view.time, float)[chosen]
+    make_folder(target.parent)
+    written = write_animation(view.robot, bodies, times, target, FACETS if facets is None else facets)
+    say(f"{view.robot.name}: {len(bodies)} of {len(view.bodies)} steps in {written}")
+    return SOLVED if len(view.solved) == len(view.bodies) else SOME_UNSOLVED
 
 
 def _write(solids: tuple[Solid, ...], inside: tuple[Solid, ...], robot: Robot, target: Path) -> None:

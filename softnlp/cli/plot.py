@@ -81,20 +81,27 @@ def plot_material(
 
 
 def plot_run(results: Path, /, *, out: Path | None = None) -> int:
-    """Draw the results of a run again: shapes, bending angle and elongation.
+    """Draw the results of a run again: shapes, bending angle and elongation; or as a GIF its steps one by one.
 
     Parameters
     ----------
     results
         Folder of a run, or its results.nc.
     out
-        PNG, PDF or SVG file; figure.png beside the results by default.
+        PNG, PDF, SVG or GIF file; figure.png beside the results by default.
     """
     from softnlp.figures import run_figure
     from softnlp.results import load_run
 
     folder = results if results.is_dir() else results.parent
     view = load_run(results)
+    if out is not None and out.suffix.lower() == ".gif":
+        from softnlp.figures.animation import write_gif
+        from softnlp.figures.style import import_alone
+
+        import_alone()
+        say(f"drawn in {write_gif(view, out)}")
+        return SOLVED
     return _save(lambda: run_figure(view), out or folder / "figure.png")
 
 

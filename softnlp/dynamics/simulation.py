@@ -129,8 +129,9 @@ class Simulation:
     body, loads : as statics take them; of the loads force and moment act at the tip. pressures : at the regulators
     (columns: sets). force : at the tip, beside that of the loads (3 columns) [N]. intervals : to a segment. points :
     Gauss points to one. numerics : whose engine counts, its options and its accuracy; with "auto" IPOPT closes the pose
-    that it begins at, and the last step before every so many outputs. refused : steps that were taken again, shorter.
-    recent : the last instants since a jump, the last one first.
+    that it begins at, and the last step before every so many outputs. kept : times of outputs in place of those asked
+    for, from 0 to the duration [s]. refused : steps that were taken again, shorter. recent : the last instants since a
+    jump, the last one first.
     """
 
     body: Body
@@ -142,6 +143,7 @@ class Simulation:
     points: int | None = None
     tolerance: float = TOLERANCE
     numerics: Numerics = NEWTON
+    kept: Array | None = None
     refused: int = 0
     warnings: list[str] = field(default_factory=list)
     recent: list[Instant] = field(default_factory=list)
@@ -167,6 +169,11 @@ class Simulation:
         return Acting(force + self.force.at(t, after=after), moment, gravity, self.asked.tip_mass)
 
     @property
+    def outputs(self) -> Array:
+        """The times that are kept [s]."""
+        return self.asked.outputs if self.kept is None else self.kept
+
+    @property
     def jumps(self) -> Array:
         """The times behind t = 0 at which something jumps [s]."""
         found = np.union1d(self.chambers.jumps, self.force.jumps)
@@ -174,7 +181,7 @@ class Simulation:
 
     def landings(self) -> Array:
         """Return the times that steps end at [s]."""
-        found = np.union1d(self.asked.outputs, self.jumps)
+        found = np.union1d(self.outputs, self.jumps)
         if self.asked.step is None:
             kinks = np.union1d(self.chambers.kinks, self.force.times)
             found = np.union1d(found, kinks[(kinks > 0) & (kinks < self.asked.duration)])
@@ -215,7 +222,7 @@ class Simulation:
         count = _Count()
         one, numbers, jump = self.first(count)
         ledger = self.ledger = Ledger(self.rod, one, numbers, self.acting(0.0), jump)
-        outputs, jumps = asked.outputs, self.jumps
+        outputs, jumps = self.outputs, self.jumps
         yield self._output(one, numbers, ledger, count)
         self.recent = before = [one]
         kept, count, unheard = 1, _Count(), 0

@@ -18,7 +18,7 @@ from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.reading import LARGEST_DATA, LARGEST_TOML, read_text
 from softnlp.base.status import Status
-from softnlp.base.units import BAR, MEGAPASCAL
+from softnlp.base.units import BAR, MEGAPASCAL, MILLIMETRE
 from softnlp.model.inputs import loads_of_table, robot_of_table
 from softnlp.model.laws import LAWS
 from softnlp.model.robot import DIMENSIONS, ROBOTS
@@ -92,7 +92,30 @@ def _identified(folder: Path) -> Makers:
         return _tensile(folder, told)
     if told["status"] != Status.SOLVED:
         raise InputError(f"nothing to draw: the identification ended {told['status']!r}", source=str(folder))
+    if "step_s" in told:
+        return {"figure": partial(_motion, told, told["measurements"], ("before", "after"), told["errors"]["after"])}
     return {"figure": partial(_identified_figure, folder, told)}
+
+
+def _motion(told: Any, rows: Any, names: tuple[str, ...], errors: Any) -> Figure:
+    """Draw a tip over time. rows : with t_s, measured and what is named, in mm. errors : of the last of these."""
+    from softnlp.figures.trace import trace_figure
+    from softnlp.studies.trace import Harmonic, Trace, TraceErrors
+
+    times = np.array([row["t_s"] for row in rows])
+    tips = {
+        name: np.array([[_number(value) for value in row[name]] for row in rows]) * MILLIMETRE
+        for name in ("measured", *names)
+    }
+    first = errors["first_harmonic"]
+    harmonic = None
+    if first is not None:
+        simulated = first["simulated_mm"] * MILLIMETRE * np.exp(1j * np.deg2rad(first["phase_deg"]))
+        measured = complex(first["measured_mm"] * MILLIMETRE)
+        harmonic = Harmonic(first["frequency_Hz"], "xyz".index(first["axis"]), measured, complex(simulated))
+    trace = Trace(times, tips.pop("measured"))
+    off = np.sqrt(np.nansum((tips[names[-1]] - trace.tip) ** 2, axis=1))
+    return trace_figure(told["title"], trace, tips, TraceErrors(off, np.zeros(3), nan, harmonic))
 
 
 def _tensile(folder: Path, told: Any) -> Makers:
@@ -285,6 +308,8 @@ def _comparison(folder: Path) -> Makers:
     from softnlp.studies.measurements import observed
 
     told, scenario = _document(folder, "comparison.json"), _scenario(folder)
+    if "first_harmonic" in told:
+        return {"figure": partial(_motion, told, told["measurements"], ("simulated",), told)}
     words = {key: tuple(dict.fromkeys(v[key] for v in told["variants"] if v[key] is not None))
              for key in ("law", "coefficients", "conventions", "closure")}  # fmt: skip
     asked = Asked(words["law"], words["coefficients"], words["conventions"], words["closure"], told["shape"])

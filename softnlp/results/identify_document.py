@@ -244,16 +244,23 @@ def identified_text(asked: Scenario, found: Identified) -> str:
         if table == "contact":
             lines += ["", "# for study blocked-force only"]
         lines += ["", f"[{table}]"] if table != "contact" else [f"[{table}]"]
-        for key, value in values.items():
-            if isinstance(value, dict):
-                lines += ["", f"[{table}.{key}]"]
-                lines += [f"{_quoted(k)} = {v!r}{errors.get(k, '')}" for k, v in value.items()]
-            else:
-                text = _quoted(value, always=True) if isinstance(value, str) else repr(value)
-                lines.append(f"{key} = {text}{errors.get(key, '')}")
+        lines += table_text(table, values, errors)
     if found.registration is not None:
         lines += ["", *found.registration.lines()]
     return "\n".join(lines) + "\n"
+
+
+def table_text(table: str, values: dict[str, Any], notes: dict[str, str]) -> list[str]:
+    """Return the lines of a table of a scenario below its head. notes : what stands behind a key."""
+    lines = []
+    for key, value in values.items():
+        if isinstance(value, dict):
+            lines += ["", f"[{table}.{key}]"]
+            lines += [f"{_quoted(k)} = {v!r}{notes.get(k, '')}" for k, v in value.items()]
+        else:
+            text = _quoted(value, always=True) if isinstance(value, str) else repr(value)
+            lines.append(f"{key} = {text}{notes.get(key, '')}")
+    return lines
 
 
 def robot_table_text(task: RobotTask, found: Identified) -> str:

@@ -121,7 +121,7 @@ def dynamic_task(given: Read) -> DynamicTask:
         With the table and the key, for times that do not fit.
     """
     table: DynamicTable = given.file.dynamic
-    times = _times(given.file.pressure, given.steps)
+    times = row_times(given.file.pressure, given.steps)
     duration = table.duration_s
     if duration is None:
         if not times[-1] > 0:
@@ -132,23 +132,28 @@ def dynamic_task(given: Read) -> DynamicTask:
         raise InputError(f"expected at most {MOST_STEPS} outputs, got {duration / output:.3g}", key="output_step_s")
     if table.step_s is not None and duration / table.step_s > _MOST_TIME_STEPS:
         raise InputError(f"expected at most {_MOST_TIME_STEPS} steps, got {duration / table.step_s:.3g}", key="step_s")
-    asked = Dynamics(
+    asked = dynamics_of(table, duration, min(output, duration))
+    return DynamicTask(asked, times, given.steps.forces)
+
+
+def dynamics_of(table: DynamicTable, duration: float, output: float) -> Dynamics:
+    """Return a table in SI units, with a duration and the time between outputs [s]."""
+    return Dynamics(
         duration=duration,
         step=table.step_s,
         rule=table.rule,
         damping=table.damping_s,
         lag=table.lag_s,
         dead_time=table.dead_time_s,
-        output_step=min(output, duration),
+        output_step=output,
         start=table.start,
         release=table.release,
         tip_mass=table.tip_mass_g * _GRAM,
         accuracy=table.step_accuracy,
     )
-    return DynamicTask(asked, times, given.steps.forces)
 
 
-def _times(table: DynamicPressureTable, steps: PressurePath) -> Array:
+def row_times(table: DynamicPressureTable, steps: PressurePath) -> Array:
     """Return the time of each row [s]."""
     rows = len(steps.pressures)
     times = steps.times

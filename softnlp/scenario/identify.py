@@ -20,6 +20,7 @@ from softnlp.model.materials import Material
 from softnlp.model.robot import Robot
 from softnlp.scenario.blocked_force import SEVERAL
 from softnlp.scenario.data import Read, Scenario
+from softnlp.scenario.dynamic import DynamicPressureTable, DynamicTable
 from softnlp.scenario.laboratory import import_notes, laboratory_columns
 from softnlp.scenario.measured_rows import (
     ALIASES,
@@ -31,6 +32,7 @@ from softnlp.scenario.measured_rows import (
     near_misses,
     rows_by_robot,
 )
+from softnlp.scenario.motion import MotionTask, motion_task, run_motion
 from softnlp.scenario.registration import import_settings, registration_of, takes_orientations
 from softnlp.scenario.schema import (
     ContactTable,
@@ -58,24 +60,36 @@ _KNOWN = (
 
 if TYPE_CHECKING:  # imported where needed: to read a scenario takes none of them
     from softnlp.studies.identified import Identified
+    from softnlp.studies.identify_motion import MotionFit
     from softnlp.studies.tensile import TensileFit
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, float], None]
 
-UNUSED_BY_TENSILE = ("robots", "sigma", "contact", "gravity", "tip_load", "stiffening", "corrections", "registration")
+UNUSED_BY_TENSILE = (
+    "pressure",
+    "dynamic",
+    "robots",
+    "sigma",
+    "contact",
+    "gravity",
+    "tip_load",
+    "stiffening",
+    "corrections",
+    "registration",
+)
 
 
 class MeasurementsTable(DataTable):
     """[measurements]: of one robot or several, and the constants to identify.
 
-    free : the constants to find: k_e, k_b, k_a, k_i, phi, k_c (c_m with "energy"), and constants of the law; as in
-        ["k_e", "k_b"]
+    free : the constants to find: k_e, k_b, k_a, k_i, phi, k_c (c_m with "energy"), and constants of the law; with
+        [dynamic] damping_s, lag_s, modulus_factor; as in ["k_e", "k_b"]
     bounds : lowest and highest, by name; as in { k_e = [0.0, 5.0] }
     """
 
     free: Annotated[list[str], Field(min_length=1)] = Field(
-        description="a list of k_e, k_b, k_a, k_i, phi, k_c and constants of the material"
+        description="a list of k_e, k_b, k_a, k_i, phi, k_c and constants of the material, or of damping_s, lag_s"
     )
     bounds: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(default_factory=dict)
 
@@ -102,9 +116,11 @@ class IdentifyFile(ScenarioFile):
     sigma: SigmaTable = SigmaTable()
     contact: ContactTable = ContactTable()
     registration: RegistrationTable = RegistrationTable()
+    pressure: DynamicPressureTable | None = None
+    dynamic: DynamicTable | None = None
 
 
-def identify_task(given: Read) -> TensileTask | RobotTask:
+def identify_task(given: Read) -> TensileTask | RobotTask | MotionTask:
     """Return what is to be identified.
 
     Raises
@@ -114,6 +130,8 @@ def identify_task(given: Read) -> TensileTask | RobotTask:
     """
     file: IdentifyFile = given.file
     tensile, measured = file.tensile, file.measurements
+    if file.pressure is not None and file.dynamic is None:
+        raise InputError("not used but with [dynamic], for a tip over time; remove it", table="pressure")
     if tensile is not None and measured is None:
         for name in file.written(UNUSED_BY_TENSILE):
             raise InputError("this table is not used by a tensile test; remove it", table=name)
@@ -126,6 +144,9 @@ def identify_task(given: Read) -> TensileTask | RobotTask:
         raise InputError(f"expected a table [tensile] or a table [measurements], got {got}", table="measurements")
     if "material" not in given.data:
         raise InputError("missing; expected a table with name and model", table="material")
+    if file.dynamic is not None:
+        with of_table("measurements"):
+            return motion_task(given, measured)
     wall = file.contact
     wall.refuse(SEVERAL, "not used by study 'identify'; the wall stands at offset_mm", "contact")
     if wall.mode != "blocked" or wall.closure == "weighted":
@@ -237,8 +258,10 @@ def _free(table: MeasurementsTable, material: Material) -> tuple[tuple[str, ...]
     return free, bounds
 
 
-def run_identify(scenario: Scenario, progress: Progress | None = None) -> Identified | TensileFit:
-    """Identify what a scenario asks for, from a tensile test, which has no progress, or from robots."""
+def run_identify(scenario: Scenario, progress: Progress | None = None) -> Identified | TensileFit | MotionFit:
+    """Identify what a scenario asks for, from a tensile test, which has no progress, from robots, or from a motion."""
+    if isinstance(scenario.task, MotionTask):
+        return run_motion(scenario, progress)
     return run_tensile(scenario) if isinstance(scenario.task, TensileTask) else run_robots(scenario, progress)
 
 

@@ -148,7 +148,7 @@ def _csv(text: str, sets: int, *, over_time: bool = False) -> PressurePath:
     pressures = table[:, [columns[name] for name in columns if name != TIME_COLUMN and name not in FORCES]]
     path = _path(pressures, table[:, columns[TIME_COLUMN]].copy() if TIME_COLUMN in columns else None)
     if over_time and path.times is not None:
-        _require_no_gap(path.times, lines)
+        require_no_gap(path.times, lines)
     if forces := [name for name in FORCES if name in columns]:
         acting = np.zeros((len(table), 3))
         acting[:, [FORCES.index(name) for name in forces]] = table[:, [columns[name] for name in forces]]
@@ -156,7 +156,7 @@ def _csv(text: str, sets: int, *, over_time: bool = False) -> PressurePath:
     return path._replace(notes=(*path.notes, *notes, *unit_note(pressures)))
 
 
-def _require_no_gap(times: Array, lines: array[int]) -> None:
+def require_no_gap(times: Array, lines: Sequence[int]) -> None:
     """Refuse a log with a gap: rows as regular as a clock, and then none for three of their intervals or more."""
     apart = np.diff(times)
     usual = float(np.median(apart)) if apart.size >= _A_LOG else 0.0

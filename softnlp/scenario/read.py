@@ -233,7 +233,7 @@ def _steps(file: ScenarioFile, sets: int, folder: Path) -> PressurePath:
     table = getattr(file, "pressure", None)
     if table is None:
         return PressurePath(np.zeros((0, sets)), None)
-    return pressure_path(table, sets, folder, over_time=file.study == "dynamic")
+    return pressure_path(table, sets, folder, over_time=file.study in ("dynamic", "identify"))
 
 
 def _attempt(errors: list[InputError], table: str, build: Callable[[], T]) -> T | None:

@@ -54,7 +54,7 @@ def run_scenario(
 
     Returns
     -------
-    Run, Identified, TensileFit, Design or Workspace
+    Run, Identified, MotionFit, TensileFit, Design or Workspace
         A run for forward, blocked-force, inverse and dynamic, whose steps carry a solution or a named status.
 
     Raises
@@ -79,7 +79,9 @@ def solve_steps(scenario: Scenario, progress: Progress | None = None, branches: 
     """Run a scenario whose study is a run, every step in order; as `run_scenario`."""
     study = STUDIES[scenario.study]
     if scenario.uncertainty is None:
-        return replace(study(scenario, progress, branches), warnings=scenario.warnings)
+        run = study(scenario, progress, branches)
+        own = run.warnings if scenario.study == "dynamic" else ()  # of the motion, beside those of the robot
+        return replace(run, warnings=tuple(dict.fromkeys((*scenario.warnings, *own))))
     contact = scenario.contact if scenario.study == "blocked-force" else None
     deviations = Deviations(scenario.model, scenario.numerics, scenario.loads, contact, scenario.uncertainty)
     steps: list[Step] = []

@@ -95,7 +95,7 @@ def dynamic(
     warnings = check(robot, allow=LOWERABLE_RULES)
     P = pressure_table(pressures, robot.chamber_sets)
     loads = checked_loads(loads)
-    t, F = _series(times, forces, len(P))
+    t, F = series_of(times, forces, len(P))
     body = body_of(Model(robot, material, coefficients, conventions))
     steps: list[Step] = []
 
@@ -108,7 +108,7 @@ def dynamic(
     return Run(STUDY, robot, material, coefficients, conventions, loads, tuple(steps), title, (*warnings, *notes))
 
 
-def _series(times: Any, forces: Any, rows: int) -> tuple[Array, Array]:
+def series_of(times: Any, forces: Any, rows: int) -> tuple[Array, Array]:
     """Return times and forces of the rows, or raise `InputError`."""
     if times is None:
         if rows > 1:
@@ -153,7 +153,7 @@ def _followed(
             Step(
                 pressure=np.asarray(series[0].at(at)),
                 status=failure.status,
-                message=_sentence(failure),
+                message=sentence(failure),
                 time=at,
                 solve_time=time.perf_counter() - began,
             )
@@ -162,7 +162,8 @@ def _followed(
     return simulation.warnings
 
 
-def _sentence(failure: Failed) -> str:
+def sentence(failure: Failed) -> str:
+    """Return what ended a motion, in words."""
     if failure.status is Status.DIVERGED:
         return f"the motion could not be followed: {failure.message}"
     advice = failure.status.advice

@@ -38,7 +38,7 @@ FACETS = 96
 FACET_LIMITS = (8, 2000)
 HOLES = ("bore", "reinforced")
 FORMATS = (".stl", ".glb")
-_SILICONE = (0.93, 0.91, 0.88, 0.45)
+SILICONE = (0.93, 0.91, 0.88, 0.45)
 _LUMEN = (0.6, 0.6, 0.6, 0.3)
 
 
@@ -180,8 +180,10 @@ def _stations(body: Body, facets: int) -> int:
     return 1 + max(1, int(np.ceil(turned * facets / (2 * np.pi))))
 
 
-def segment_solids(robot: Robot, body: Body, facets: int = FACETS) -> tuple[Solid, ...]:
+def segment_solids(robot: Robot, body: Body, facets: int = FACETS, fixed: int | None = None) -> tuple[Solid, ...]:
     """Return the silicone of each segment of a shape, base first, a solid each; connectors are none.
+
+    fixed : stations along each segment, by default as many as its bend asks for.
 
     Raises
     ------
@@ -191,15 +193,16 @@ def segment_solids(robot: Robot, body: Body, facets: int = FACETS) -> tuple[Soli
     made = []
     for k, (piece, (own, _)) in enumerate(zip(body.pieces, segments_of(robot), strict=True)):
         radii = {field.name: np.ravel(getattr(piece.radii, field.name)) for field in fields(piece.radii)}
-        for j in range(len(piece.position)):  # for its errors
+        for j in range(radii["outer"].size):  # for its errors
             there = SectionRadii(**{name: float(values[j]) for name, values in radii.items()})
             _silicone(own, replace(piece, radii=there), there.bore, facets)
         if np.min(advances(piece.position, piece.rotation)) <= 0:
             raise InputError("a part of this shape has negative length (v_z <= 0), so it is no solid")
-        stations = max(_stations(piece, facets), len(piece.position))
+        stations = fixed or max(_stations(piece, facets), len(piece.position))
         axis = resampled(piece, stations)
         chord = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(piece.position, axis=0), axis=1)))
-        along = {name: np.interp(np.linspace(0, chord[-1], stations), chord, v) for name, v in radii.items()}
+        at = np.linspace(0, chord[-1], stations)
+        along = {name: np.interp(at, chord, np.broadcast_to(v, chord.shape)) for name, v in radii.items()}
         unit, theta = circle(facets), np.array(own.chamber_angles(), dtype=float)
         towards = np.column_stack([np.cos(theta), np.sin(theta)])
         rings = [along["outer"][:, None, None] * unit, along["lumen"][:, None, None] * unit[::-1]]
@@ -286,7 +289,7 @@ def _glb(solids: Sequence[Solid], robot: Robot) -> bytes:
 
 def _colour(solid: Solid, robot: Robot) -> tuple[float, float, float, float]:
     if solid.chamber is None:
-        return _LUMEN if solid.name == "lumen" else _SILICONE
+        return _LUMEN if solid.name == "lumen" else SILICONE
     word = colour(robot.set_of_chamber[solid.chamber])
     r, g, b = (int(word[k : k + 2], 16) / 255 for k in (1, 3, 5))
     return r, g, b, 1.0
