@@ -1,7 +1,7 @@
 """Motion over time: what a step costs, a minute of a gait, and how many of many random runs reach their end.
 
-`python -m benchmarks.dynamics cost`, `gait` or `random [COUNT]`. Times are wall times of one process; set
-OMP_NUM_THREADS=1 where other programs run.
+`python -m benchmarks.dynamics cost`, `gait` or `random [COUNT]`; `swing FILE` writes a trace. Times are wall times of
+one process; set OMP_NUM_THREADS=1 where other programs run.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from softnlp.dynamics.sections import Failed, Sections
 from softnlp.dynamics.simulation import Dynamics, Simulation
 from softnlp.model.robot import ROBOTS
 from softnlp.studies.dynamic import chosen_intervals, dynamic
+from softnlp.studies.identify_motion import stiffer
 
 Array = NDArray[np.float64]
 
@@ -152,11 +154,28 @@ def cost() -> dict[str, Any]:
     return {**moving, "wall_ms_per_static_pose": 1e3 * (time.perf_counter() - began) / len(P)}
 
 
+def swing(file: str, seed: int = 19) -> None:
+    """Write the trace of `scenarios/identify/swing.toml`: a step of pressure, known numbers, and noise of 0.2 mm."""
+    asked = Dynamics(0.6, 1e-3, damping=0.006, lag=0.035, output_step=0.01)
+    P, t = np.array([[0.0] * 3, [0.0] * 3, [0.5, 0.0, 0.0]]) * BAR, [0.0, 0.05, 0.05]
+    silicone = stiffer(material(RUBBER), 1.12)
+    run = dynamic(robot(ROBOT), silicone, P, asked, times=t, loads=Loads(gravity="hanging"))
+    draw = np.random.default_rng(seed)
+    with Path(file).open("w") as out:
+        out.write("t_s,x_mm,y_mm,z_mm\n")
+        for step in run.steps:
+            assert step.pose is not None
+            tip = 1e3 * step.pose.tip_position + 0.2 * draw.normal(size=3)
+            out.write(f"{step.time:.3f},{tip[0]:.2f},{tip[1]:.2f},{tip[2]:.2f}\n")
+
+
 def main(words: list[str]) -> None:
     """Print one of the measurements as JSON."""
     what = words[0] if words else "cost"
     if what == "gait":
         print(json.dumps(gait(60.0), indent=2))
+    elif what == "swing":
+        swing(words[1])
     elif what == "random":
         print(json.dumps(random(int(words[1]) if len(words) > 1 else 200), indent=2))
     else:

@@ -210,7 +210,7 @@ def _linear(
     lag: float,
 ) -> Linear:
     """Return the linear system; the pressures in the chambers are states behind a lag."""
-    n, sets = rod.size, pressures.size
+    n, sets = rod.size, int(pressures.size)
     K, D, mass = matrices
     e, at = pose.e, pose.at
     by_pressure = np.empty((n, 6, sets))
@@ -224,8 +224,8 @@ def _linear(
     none = still(n)[1]
     for j in range(3):
         push = Acting(np.eye(3)[j], np.zeros(3), np.zeros(3))
-        N, m = rod.required(at, at, none, push)
-        by_force[:, :3, j], by_force[:, 3:, j] = rotated(at.rotation.transpose(0, 2, 1), N), m
+        N, moment = rod.required(at, at, none, push)
+        by_force[:, :3, j], by_force[:, 3:, j] = rotated(at.rotation.transpose(0, 2, 1), N), moment
     solved = np.linalg.solve(mass, np.hstack([K, D, by_pressure.reshape(6 * n, -1), by_force.reshape(6 * n, -1)]))
     m = 6 * n
     states = 2 * m + (sets if lag else 0)

@@ -253,7 +253,8 @@ class StepProgram:
         was = self._of("V", 6)
         defect = ca.sum1(((strains + was) / 2 - self._strains(mean)) * more)
         work = ca.sum1(more * (strains - was)) + STILL * self.rod.units[0]
-        return mean + self._symbols["same"] * ca.repmat(2 / 3 * defect / work, 6, 1) * more
+        found: ca.MX = mean + self._symbols["same"] * ca.repmat(2 / 3 * defect / work, 6, 1) * more
+        return found
 
     def values(self, rule: Rule | None, numbers: Numbers, acting: Acting) -> Array:
         """Return the quantities of a step, or of the pose at rest where there is no rule."""
@@ -278,8 +279,9 @@ class StepProgram:
             c, weights = rule.rate, [*rule.weights, 0.0][:2]
             instants = [rule.before[0], rule.before[min(1, len(rule.before) - 1)]]
             pairs = list(zip(weights, instants, strict=True))
-            v0 = sum(w * one.at.position for w, one in pairs)
-            a0 = sum(w * one.motion.velocity for w, one in pairs)
+            v0, a0 = np.zeros((n + 1, 3)), np.zeros((n + 1, 3))
+            for w, one in pairs:
+                v0, a0 = v0 + w * one.at.position, a0 + w * one.motion.velocity
             given["s0"] = sum(w * one.at.strains for w, one in pairs)
             given["b0"] = sum(w * one.motion.spin for w, one in pairs)
             given["rates"] = [c, c, -weights[0], -weights[1]]
@@ -322,4 +324,5 @@ class StepProgram:
 
     def resultants(self, x: Array) -> Array:
         """Return the resultants (n, 6) of the unknowns."""
-        return x[: 6 * self.rod.size].reshape(-1, 6) * self.rod.units
+        found: Array = x[: 6 * self.rod.size].reshape(-1, 6) * self.rod.units
+        return found

@@ -201,7 +201,7 @@ class Rod:
         A = self._eye - (self._own[:, :, None, :, None] * M.reshape(K, d, 4, 4).transpose(0, 2, 1, 3)[:, None]).reshape(
             K, 4 * d, 4 * d
         )
-        own = np.linalg.solve(A, self._ones)[:, :, 0].reshape(-1, 4)
+        own: Array = np.asarray(np.linalg.solve(A, self._ones)[:, :, 0].reshape(-1, 4), float)
         rate = np.matmul(M, own[:, :, None])[:, :, 0] / 2
         ends = (self._weights[:, :, None] * rate.reshape(K, d, 4)).sum(axis=1)
         ends[:, 0] += 1.0
@@ -285,7 +285,7 @@ class Rod:
         b = np.empty((K, 4 * d, 2))
         b[:, :, :1] = self._ones
         b[:, :, 1] = np.matmul(2 * self._onward, (y[:n] / self.w[:, None]).reshape(K, d, 4)).reshape(K, 4 * d)
-        both = np.linalg.solve(A, b).reshape(K, d, 4, 2)
+        both: Array = np.asarray(np.linalg.solve(A, b).reshape(K, d, 4, 2), float)
         free, forced = both[..., 0], both[..., 1]
         # what an interval adds from its end to its beginning, of what it was given and of what acts in it
         turned = np.matmul(M.reshape(K, d, 4, 4), both)

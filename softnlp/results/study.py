@@ -41,19 +41,24 @@ def to_json(run: Run | Design | TensileFit | Identified, scenario: Scenario | No
         return run_document(run)
     from softnlp.results.design import design_document
     from softnlp.results.identify_document import robot_document, tensile_document
+    from softnlp.results.motion_document import motion_document
     from softnlp.scenario.data import scenario_of
+    from softnlp.scenario.motion import MotionTask
     from softnlp.studies.design import Design
     from softnlp.studies.identified import Identified
+    from softnlp.studies.identify_motion import MotionFit
     from softnlp.studies.measurements import RobotTask, TensileTask
     from softnlp.studies.tensile import TensileFit
 
     if isinstance(run, Design):
         return design_document(run)
-    if not isinstance(run, TensileFit | Identified):
+    if not isinstance(run, TensileFit | Identified | MotionFit):
         return run_document(require_run(run, "softnlp.to_json"))
     asked = scenario_of(scenario, "identify", "softnlp.to_json, of a fit,")
     if isinstance(run, TensileFit) and isinstance(asked.task, TensileTask):
         return tensile_document(asked, asked.task, run)
     if isinstance(run, Identified) and isinstance(asked.task, RobotTask):
         return robot_document(asked, asked.task, run)
+    if isinstance(run, MotionFit) and isinstance(asked.task, MotionTask):
+        return motion_document(asked, asked.task, run)
     raise InputError("expected the scenario of this fit, got that of another kind of measurement", key="scenario")

@@ -23,6 +23,7 @@ from softnlp.studies.uncertainty import Deviations
 if TYPE_CHECKING:  # imported where needed: a run takes none of them
     from softnlp.studies.design import Design
     from softnlp.studies.identified import Identified
+    from softnlp.studies.identify_motion import MotionFit
     from softnlp.studies.tensile import TensileFit
     from softnlp.sweep.read import Workspace
 
@@ -36,7 +37,7 @@ def run_scenario(
     *,
     workers: int = 1,
     folder: str | PathLike[str] | None = None,
-) -> Run | Identified | TensileFit | Design | Workspace:
+) -> Run | Identified | MotionFit | TensileFit | Design | Workspace:
     """Run the study of a scenario.
 
     Parameters
