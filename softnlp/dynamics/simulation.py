@@ -34,6 +34,8 @@ _SAFE = 0.9
 _FIRST = 1e-3  # part of the duration, of the first step that is chosen
 _LEAST = 1e-9  # part of the duration below which no step is taken
 _ROUND = 1e-9
+_KEPT = 6  # times whose sections are kept
+_GUESSED = 4  # instants that the next one is guessed from
 _CLOSED, _UNHEARD = 20, 1000  # steps closed by IPOPT in a run, about; most steps between two of them, then an output
 NEWTON = Numerics(engine="newton")
 
@@ -158,6 +160,7 @@ class Simulation:
         rest = asked.start == "rest"
         first = np.zeros(body.sets) if rest else self.pressures.at(0.0, after=False)
         self.chambers = Chambers(regulator, asked.lag, first)
+        self._known: dict[tuple[float, bool], Numbers] = {}
 
     def acting(self, t: float, *, after: bool = True) -> Acting:
         """Return the loads at a time."""
@@ -236,7 +239,7 @@ class Simulation:
                 before, h = self._across(before, float(start), float(end), h, ledger, count, close)
             except Failed as error:
                 raise Failed(error.status, f"at t = {self.recent[0].time:.6g} s: {error.message}") from None
-            numbers = self.rod.sections.at(self.chambers.at(end, after=False))
+            numbers = self.sections(float(end), after=False)
             if here:
                 yield self._output(before[0], numbers, ledger, count)
                 unheard = 0 if close else unheard + count.steps
@@ -281,19 +284,26 @@ class Simulation:
             held, loads = self._ends(before[0].time, t)
             ledger.step(rule(asked.rule, before, t, loads[0]), now, held, loads)
             count.add(now)
-            before, at = [now.instant, *before[:2]], t
+            before, at = [now.instant, *before[: _GUESSED - 1]], t
             self.recent = before
         return before, (asked.step or h)
 
+    def sections(self, t: float, *, after: bool = True) -> Numbers:
+        """Return the sections at a time; those of the last few are kept. Raises `Failed`."""
+        key = t, after
+        if key not in self._known:
+            self._known[key] = self.rod.sections.at(self.chambers.at(t, after=after))
+            while len(self._known) > _KEPT:
+                del self._known[next(iter(self._known))]
+        return self._known[key]
+
     def _ends(self, a: float, b: float) -> tuple[tuple[Numbers, Numbers], tuple[Acting, Acting]]:
         """Return sections and loads at both ends of a step."""
-        sections = self.rod.sections
-        first = sections.at(self.chambers.at(a))
-        return (first, sections.at(self.chambers.at(b, after=False))), (self.acting(a), self.acting(b, after=False))
+        return (self.sections(a), self.sections(b, after=False)), (self.acting(a), self.acting(b, after=False))
 
     def _one(self, before: list[Instant], t: float, *, close: bool) -> Solved:
         """Return the instant at t, begun from what is extrapolated."""
-        numbers = self.rod.sections.at(self.chambers.at(t, after=False))
+        numbers = self.sections(t, after=False)
         guess = _extrapolated(before, t, [one.e for one in before])
         step = rule(self.asked.rule, before, t, self.acting(before[0].time))
         return self.stepper.step(step, t, guess, numbers, self.acting(t, after=False), close=close)
@@ -302,7 +312,7 @@ class Simulation:
         """Return the estimated error of the positions in a step over the length, 0 where nothing can be said."""
         if len(before) < 3:
             return 0.0
-        guess = _extrapolated(before, now.time, [one.at.position for one in before])
+        guess = _extrapolated(before, now.time, [one.at.position for one in before[:3]])
         h = now.time - before[0].time
         spread = np.prod([now.time - one.time for one in before[:3]])
         third = 6 * np.linalg.norm(now.at.position - guess, axis=1).max() / spread
@@ -326,8 +336,8 @@ class Simulation:
 
 
 def _extrapolated(before: list[Instant], t: float, values: list[Array]) -> Array:
-    """Return the polynomial through the last three values, or as many as there are, at t."""
-    times = [one.time for one in before[:3]]
+    """Return the polynomial through the last values, as many as are given, at t."""
+    times = [one.time for one in before[: len(values)]]
     found = np.zeros_like(values[0])
     for j, a in enumerate(times):
         weight = 1.0
