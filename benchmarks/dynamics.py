@@ -25,7 +25,7 @@ from softnlp.dynamics.sections import Failed, Sections
 from softnlp.dynamics.simulation import Dynamics, Simulation
 from softnlp.model.robot import ROBOTS
 from softnlp.studies.dynamic import chosen_intervals, dynamic
-from softnlp.studies.identify_motion import stiffer
+from softnlp.studies.free_motion import stiffer
 
 Array = NDArray[np.float64]
 

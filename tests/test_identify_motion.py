@@ -16,7 +16,8 @@ from softnlp.cli import main
 from softnlp.dynamics.drive import Series
 from softnlp.dynamics.simulation import Dynamics
 from softnlp.model.conventions import REPRODUCTION
-from softnlp.studies.identify_motion import Motion, MotionFit, identify_motion, stiffer
+from softnlp.studies.free_motion import Motion, stiffer
+from softnlp.studies.identify_motion import MotionFit, identify_motion
 from softnlp.studies.trace import Trace, trace_errors
 
 Array = NDArray[np.float64]

@@ -103,13 +103,10 @@ def _motion(told: Any, rows: Any, names: tuple[str, ...], errors: Any) -> Figure
     from softnlp.studies.trace import Harmonic, Trace, TraceErrors
 
     times = np.array([row["t_s"] for row in rows])
-    tips = {
-        name: np.array([[_number(value) for value in row[name]] for row in rows]) * MILLIMETRE
-        for name in ("measured", *names)
-    }
-    first = errors["first_harmonic"]
+    every = ("measured", *names)
+    tips = {name: np.array([[_number(v) for v in row[name]] for row in rows]) * MILLIMETRE for name in every}
     harmonic = None
-    if first is not None:
+    if (first := errors["first_harmonic"]) is not None:
         simulated = first["simulated_mm"] * MILLIMETRE * np.exp(1j * np.deg2rad(first["phase_deg"]))
         measured = complex(first["measured_mm"] * MILLIMETRE)
         harmonic = Harmonic(first["frequency_Hz"], "xyz".index(first["axis"]), measured, complex(simulated))
