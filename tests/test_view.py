@@ -252,7 +252,7 @@ def pixels(page: Any) -> np.ndarray:
 
 
 def vertices_in_the_browser(page: Any) -> np.ndarray:
-    return np.array(page.evaluate(f"Array.from({STAGE}.body.position.array)")).reshape(-1, 3)
+    return np.array(page.evaluate(f"Array.from({STAGE}.body.pieces[0].position.array)")).reshape(-1, 3)
 
 
 def expected_vertices(shown: Frame) -> np.ndarray:

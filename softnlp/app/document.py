@@ -186,9 +186,12 @@ class Document:
                 unused.append("contact")
             if study == "identify" and "tensile" in wanted and "measurements" not in wanted:
                 unused += [*UNUSED_BY_TENSILE, "solver"]  # whose grid means nothing there
+            if study == "identify" and self.study != "identify":
+                unused.append("dynamic")  # of the tab Time
             for name in unused:
                 wanted.pop(name, None)
-            self._time(study, wanted)
+            if not (study == "identify" and "dynamic" in wanted):
+                self._time(study, wanted)
         if wanted.get("study") != study:
             wanted["study"] = study
         return tomlkit.dumps(wanted)

@@ -54,7 +54,7 @@ def trace_figure(title: str, trace: Trace, simulated: Mapping[str, Array], error
                 legend(panel, None, loc="upper right", ncols=3)
             panel.tick_params(labelbottom=False)
         else:
-            plain(panel, OUTPUTS["t"].axis, "distance [mm]")
+            plain(panel, OUTPUTS["t"].axis, "tip's distance [mm]")
             off = np.sqrt(np.nansum((simulated[last] - trace.tip) ** 2, axis=1)) / MILLIMETRE
             panel.plot(trace.times, off, color=colour(0), linewidth=1.2)
             panel.set_ylim(0, max(1.1 * float(off.max()), 1e-3))

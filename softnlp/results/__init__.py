@@ -4,15 +4,14 @@ Files carry the unit in the name of a number; the package itself stays in SI.
 """
 
 from softnlp.base.files import write_whole
+from softnlp.results.body import Body, body_of_pose
 from softnlp.results.dataset import netcdf_bytes, to_dataset
 from softnlp.results.document import json_text
 from softnlp.results.folder import (
-    Body,
     ContactView,
     MovingView,
     RunView,
     TargetView,
-    body_of_pose,
     load_run,
     save,
     view_of_dataset,

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from softnlp.app.view.frame import Frame, cloud_message, frame_message, frame_of, robot_message
+from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.files import write_whole
-from softnlp.base.units import BAR, DEGREE, MILLIMETRE
+from softnlp.base.units import BAR, MILLIMETRE
 from softnlp.results import RunView, view_of_run
 from softnlp.statics.step import Run
 from softnlp.statics.wall import Wall
@@ -98,7 +99,8 @@ def _frames(view: RunView) -> Iterator[tuple[Frame, str]]:
         acting = {"tip_force": loads.tip_force, "tip_moment": loads.tip_moment, "gravity": loads.gravity}
         frame = frame_of(view.robot, body, view.pressure[k], **acting, **wall)
         bars = ", ".join(f"{p / BAR:.3g}" for p in view.pressure[k])
-        words = f"step {k + 1} of {len(view.status)}: {bars} bar, bending {view.bending_angle[k] / DEGREE:.1f}°"
+        bending = OUTPUTS["bending_angle"].shown(view.bending_angle[k])
+        words = f"step {k + 1} of {len(view.status)}: {bars} bar, bending {bending:.1f}°"
         if wall.get("wall_force") is not None:
             words += f", force {wall['wall_force']:.3g} N"
         yield frame, words
