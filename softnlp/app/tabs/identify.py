@@ -224,6 +224,8 @@ class _Identification:
         self._box.set_visibility(False)
 
     def _asked(self) -> Callable[[Progress], tuple[Scenario, RobotTask, Identified]]:
+        if self._session.table("dynamic"):
+            raise InputError("This page fits poses, `softnlp identify` fits motions; remove [dynamic] to fit poses.")
         named = bool(self._session.table("measurements"))
         asked, task = asked_with(self._session, RobotTask, "measurements", named)
 
