@@ -156,6 +156,8 @@ LOG = "t_s,p1_bar,p2_bar,p3_bar\n" + "".join(f"{k / 100},0.1,0,0\n" for k in ran
         (TABLES.replace("lag_s", "leg_s"), {}, "leg_s"),
         (TABLES.replace("damping_s = 0.004", "damping_s = -1.0"), {}, "damping_s"),
         (TABLES.replace("damping_s", 'step_s = "small"\ndamping_s'), {}, "step_s: expected 'auto' or a number above 0"),
+        (TABLES.replace("damping_s", "step_s = 5\ndamping_s"), {}, "step_s: expected at most the duration of"),
+        (TABLES.replace("0.04\nda", "1e9\nda"), {}, "[dynamic] duration_s: expected at most 100000 s, got 1e+09 s"),
     ],
 )
 def test_what_is_wrong_is_one_line(
@@ -173,3 +175,10 @@ def test_rows_of_ones_own_may_be_as_far_apart_as_they_like(tmp_path: Path) -> No
     asked = load_scenario(scenario(tmp_path, FILE, rows=rows))
     assert isinstance(asked.task, DynamicTask)
     assert asked.task.asked.duration == 3.0
+
+
+def test_a_run_in_which_nothing_moves_warns_of_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its panels have no lines, and so no legends."""
+    path = scenario(tmp_path, TABLES.replace("[0.4, 0.0, 0.0]", "[0.0, 0.0, 0.0]"))
+    assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 0
+    assert not capsys.readouterr().err

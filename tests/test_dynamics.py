@@ -24,6 +24,7 @@ from softnlp import (
     segmented_robot,
     solve,
 )
+from softnlp.base.errors import InputError
 from softnlp.base.status import Status
 from softnlp.dynamics.drive import Chambers, Series
 from softnlp.dynamics.rod import matrices, rotated, turned_by
@@ -299,6 +300,46 @@ def test_chosen_steps_keep_the_error_asked_for() -> None:
     assert errors[1] < 2e-4
     assert errors[1] < errors[0]
     assert steps[0] < steps[1] < 400
+
+
+def test_the_error_of_chosen_steps_does_not_hang_on_how_long_the_run_is() -> None:
+    """No error is known of the first steps behind a jump, so these are short against the swing and do not grow."""
+    jump = Series(np.array([0.0, 0.01, 0.01]), np.array([[0.0] * 3, [0.0] * 3, [0.5, 0.0, 0.0]]) * BAR)
+    kept = np.array([0.0, 0.2])
+
+    def seen(duration: float, step: float | None = None) -> Array:
+        asked = Dynamics(duration, step, damping=0.004, output_step=duration)
+        run = simulated(asked, pressures=jump, kept=np.append(kept, duration)).run()
+        next(run)
+        return tip(next(run))
+
+    best = seen(0.3, 1e-3)
+    assert np.linalg.norm(seen(300.0) - best) < 1e-3 * D25.length
+
+
+@pytest.mark.parametrize("wrong", [{"step": 1e-7}, {"step": 1e-3, "damping": 1e9}])
+def test_a_step_in_which_rounding_is_all_there_is_counts_as_none(wrong: dict[str, float]) -> None:
+    asked = Dynamics(**{"duration": 10 * wrong["step"], "output_step": 10 * wrong["step"], **wrong})
+    run = dynamic(D25, RUBBER, [[0.0] * 3, [0.3 * BAR, 0.0, 0.0]], asked, times=[0.0, 0.1])
+    assert run.steps[-1].status is Status.DIVERGED
+    assert "rounding leaves a residual of" in run.steps[-1].message
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        *(("duration", value) for value in (0.0, -1.0, float("nan"), 1e9, "long")),
+        *(("step", value) for value in (0.0, -1.0, float("inf"), True)),
+        *(("output_step", 0.0), ("accuracy", 0.0), ("damping", -1.0), ("lag", -1.0), ("dead_time", -1.0)),
+        *(("tip_mass", -1.0), ("rule", "euler"), ("start", "bent")),
+    ],
+)
+def test_what_no_run_can_have_is_refused_with_its_name(key: str, value: Any) -> None:
+    with pytest.raises(InputError, match=f"^{key}: expected "):
+        Dynamics(**{"duration": 1.0, key: value})
+    if key in ("damping", "lag", "tip_mass"):
+        with pytest.raises(InputError, match=f"^{key}: expected "):
+            modes(D25, RUBBER, [0.0] * 3, **{key: value})
 
 
 def test_a_motion_that_cannot_go_on_says_when() -> None:

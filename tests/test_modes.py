@@ -192,6 +192,17 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert main(["modes", str(path)]) == 2
 
 
+def test_an_obstacle_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What it holds back would swing in another way."""
+    path = Path(__file__).parent.parent / "scenarios" / "contact" / "sphere.toml"
+    assert main(["modes", str(path), "--out", str(tmp_path / "out")]) == 2
+    shown = capsys.readouterr()
+    assert not shown.out
+    assert shown.err.count("\n") == 1
+    assert "[obstacle]" in shown.err
+    assert not (tmp_path / "out").exists()
+
+
 def test_files_are_read_by_xarray(tmp_path: Path) -> None:
     import xarray as xr
 

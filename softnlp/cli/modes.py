@@ -36,6 +36,7 @@ def modes(
     """
     from softnlp.results.document import document_text
     from softnlp.results.modes import files, modes_document, modes_rows
+    from softnlp.scenario.data import require_no_obstacles
     from softnlp.scenario.dynamic import modes_of
 
     asked = scenario_at(scenario, all_errors)
@@ -43,6 +44,7 @@ def modes(
         raise InputError(
             f"expected study 'forward' or 'dynamic', got {asked.study!r}", source=str(scenario), key="study"
         )
+    require_no_obstacles(asked, "softnlp modes")
     if count < 1:
         raise InputError(f"expected a number of at least 1, got {count}", key="--count")
     if out is not None:

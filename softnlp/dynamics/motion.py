@@ -30,6 +30,7 @@ TOLERANCE = 1e-10
 _MOST = 12  # corrections of a step
 _SLOW = 0.15  # what is left by a correction with an old slope, above which a new one is made
 _ROUNDINGS = 8  # that a residual may be made of
+_MOST_ROUNDING = 1e-6  # residual that counts as none at most
 _LONGEST = 30  # of a correction, in the units of the residual
 _MOST_IPOPT = 60  # iterations of a step
 _LOAD_STEPS, _FINEST = 4, 2.0**-12  # of the way to a loaded static pose
@@ -120,14 +121,25 @@ class Stepper:
         e = program.resultants(found.x)
         at, balance = balanced(e)
         size = float(np.max(np.abs(balance.off)))
-        if not size <= max(self.tolerance, _ROUNDINGS * rod.noise(0.0 if rule is None else rule.rate)):
+        if not size <= self._enough(0.0 if rule is None else rule.rate):
             raise Failed(Status.DIVERGED, f"IPOPT left a residual of {size:.2g} ({found.engine_status})")
         return Solved(Instant(t, e, at, balance.motion, numbers), balance, size, found.iterations, found.ipopt)
+
+    def _enough(self, rate: float) -> float:
+        """Return the residual that counts as none at a rate of the steps.
+
+        Raises `Failed` where rounding alone leaves more than an answer may have.
+        """
+        rounding = _ROUNDINGS * self.rod.noise(rate)
+        if not rounding <= _MOST_ROUNDING:
+            words = f"rounding leaves a residual of {rounding:.2g}: the step is too short or the damping too large"
+            raise Failed(Status.DIVERGED, words)
+        return max(self.tolerance, rounding)
 
     def _by_newton(self, rule: Rule, t: float, guess: Array, numbers: Numbers, acting: Acting) -> Solved:
         rod, e = self.rod, guess
         before, fresh = np.inf, False
-        enough = max(self.tolerance, _ROUNDINGS * rod.noise(rule.rate))
+        enough = self._enough(rule.rate)
         for count in range(_MOST + 1):
             at = rod.placed(numbers, e)
             balance = rule.balance(rod, e, at, numbers, acting)

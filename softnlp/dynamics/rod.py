@@ -102,6 +102,7 @@ def _quaternion(a: Array, b: Array) -> Array:
     return np.array([a[0] * b[0] - a[1:] @ b[1:], *(a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:]))])
 
 
+_SLOWEST = 1.8751**2  # of a cantilever, over sqrt(EI / (rho A L^4))
 _ONE = np.array([1.0, 0.0, 0.0, 0.0])
 _CROSS = _bilinear(np.cross, 3, 3)
 _TIMES = _bilinear(_quaternion, 4, 4)
@@ -159,7 +160,8 @@ def turned_by(before: Array, after: Array) -> Array:
 class Rod:
     """The rod of a body on a grid; everything SI, in the world frame or that of the body.
 
-    damping_s : the Kelvin-Voigt time. units : (6,) of the residual, EI/L^2 and EI/L.
+    damping_s : the Kelvin-Voigt time. units : (6,) of the residual, EI/L^2 and EI/L. period : about that of the slowest
+    swing, of a straight beam of Euler and Bernoulli without a mass at its tip [s].
     """
 
     def __init__(self, sections: Sections, grid: Grid, damping_s: float = 0.0) -> None:
@@ -174,6 +176,7 @@ class Rod:
         self.viscosity = damping_s * rest.stiffness
         EI = float(np.mean(rest.stiffness[:, [3, 4], [3, 4]]))
         self.units = np.repeat([EI / self.length**2, EI / self.length], 3)
+        self.period = 2 * np.pi / _SLOWEST * self.length**2 * float(np.sqrt(np.mean(self.mass) / EI))
         EA = float(np.mean(rest.stiffness[:, 2, 2]))
         self._noise = (
             np.finfo(float).eps * self.length**2 / EI * np.array([np.mean(self.mass) * self.length**2, damping_s * EA])

@@ -6,11 +6,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import ceil
-from typing import Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softnlp.base.errors import InputError
+from softnlp.base.reading import choices, shown
 from softnlp.base.status import Status
 from softnlp.dynamics.drive import Chambers, Series
 from softnlp.dynamics.energy import Energy, Ledger
@@ -31,13 +33,21 @@ STARTS = Literal["static", "rest"]
 _HALVINGS = 8  # of a step that fails
 _GROWTH, _SHRINKING = 2.0, 0.2  # of a step that is chosen
 _SAFE = 0.9
-_FIRST = 1e-3  # part of the duration, of the first step that is chosen
+_FIRST, _FIRST_SWING = 1e-3, 1e-2  # parts of the duration and of the slowest swing, of the first step that is chosen
+LONGEST = 1e5  # duration [s]; times of a run are told apart to a billionth of it
 _LEAST = 1e-9  # part of the duration below which no step is taken
 _ROUND = 1e-9
 _KEPT = 6  # times whose sections are kept
 _GUESSED = 4  # instants that the next one is guessed from
 _CLOSED, _UNHEARD = 20, 1000  # steps closed by IPOPT in a run, about; most steps between two of them, then an output
 NEWTON = Numerics(engine="newton")
+
+
+def require_number(key: str, value: Any, *, above_0: bool = False) -> None:
+    """Raise `InputError` with the key for what is not a finite number of at least 0, or above it."""
+    number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+    if not (number and np.isfinite(value) and (value > 0 if above_0 else value >= 0)):
+        raise InputError(f"expected a number {'above' if above_0 else 'of at least'} 0, got {shown(value)}", key=key)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +89,27 @@ class Dynamics:
     release: bool = False
     tip_mass: float = 0.0
     accuracy: float = 1e-5
+
+    def __post_init__(self) -> None:
+        """Refuse what no run can have.
+
+        Raises
+        ------
+        InputError
+            For a number that is not finite or has the wrong sign, a duration too long, and an unknown word.
+        """
+        positive = {"duration": self.duration, "output_step": self.output_step, "accuracy": self.accuracy}
+        if self.step is not None:
+            positive["step"] = self.step
+        for key, value in positive.items():
+            require_number(key, value, above_0=True)
+        for key in ("damping", "lag", "dead_time", "tip_mass"):
+            require_number(key, getattr(self, key))
+        if self.duration > LONGEST:
+            raise InputError(f"expected at most {LONGEST:g} s, got {self.duration:g} s", key="duration")
+        for key, words in (("rule", get_args(RuleName)), ("start", get_args(STARTS))):
+            if getattr(self, key) not in words:
+                raise InputError(f"expected {choices(words)}, got {shown(getattr(self, key))}", key=key)
 
     @property
     def outputs(self) -> Array:
@@ -177,6 +208,11 @@ class Simulation:
         return self.asked.outputs if self.kept is None else self.kept
 
     @property
+    def shortest(self) -> float:
+        """The step that is begun with where steps are chosen, at t = 0 and behind a jump [s]."""
+        return min(_FIRST * self.asked.duration, _FIRST_SWING * self.rod.period)
+
+    @property
     def jumps(self) -> Array:
         """The times behind t = 0 at which something jumps [s]."""
         found = np.union1d(self.chambers.jumps, self.force.jumps)
@@ -230,7 +266,7 @@ class Simulation:
         self.recent = before = [one]
         kept, count, unheard = 1, _Count(), 0
         every = ceil(outputs.size / _CLOSED)
-        h = asked.step or min(_FIRST * asked.duration, asked.output_step)
+        h = asked.step or min(self.shortest, asked.output_step)
         landings = self.landings()
         for start, end in pairwise(landings):
             here = kept < outputs.size and abs(end - outputs[kept]) <= _ROUND * asked.duration
@@ -250,7 +286,7 @@ class Simulation:
                 ledger.jump(numbers, after, behind, before[0])
                 self.recent = before = [behind]
                 if asked.step is None:
-                    h = min(h, _FIRST * asked.duration)
+                    h = min(h, self.shortest)
 
     def _across(
         self, before: list[Instant], start: float, end: float, h: float, ledger: Ledger, count: _Count, close: bool
@@ -271,7 +307,7 @@ class Simulation:
                     raise Failed(Status.DIVERGED, "the equations of a step are singular") from None
                 h = (t - at) / 2
                 continue
-            if asked.step is None:
+            if asked.step is None and len(before) > 2:  # before, nothing can be said, so the step stays short
                 off = self._error(before, now.instant)
                 factor = _SAFE * (asked.accuracy / max(off, 1e-300)) ** (1 / 3)
                 factor = min(max(factor, _SHRINKING), _GROWTH)
@@ -309,9 +345,7 @@ class Simulation:
         return self.stepper.step(step, t, guess, numbers, self.acting(t, after=False), close=close)
 
     def _error(self, before: list[Instant], now: Instant) -> float:
-        """Return the estimated error of the positions in a step over the length, 0 where nothing can be said."""
-        if len(before) < 3:
-            return 0.0
+        """Return the estimated error of the positions in a step behind three others, over the length."""
         guess = _extrapolated(before, now.time, [one.at.position for one in before[:3]])
         h = now.time - before[0].time
         spread = np.prod([now.time - one.time for one in before[:3]])

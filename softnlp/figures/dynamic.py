@@ -45,7 +45,8 @@ def dynamic_figure(view: RunView, moving: MovingView) -> Figure:
         panel.tick_params(labelbottom=False)
     figure.align_ylabels(panels)
     for panel in panels:
-        legend(panel, None, loc="upper right", ncols=4, handlelength=1.2, columnspacing=1.0)
+        if panel.get_legend_handles_labels()[0]:  # none where nothing moved or no pressure or energy is other than 0
+            legend(panel, None, loc="upper right", ncols=4, handlelength=1.2, columnspacing=1.0)
         low, high = panel.get_ylim()
         panel.set_ylim(low, high + 0.3 * (high - low))  # room for the legend
     last = view.solved[-1] if view.solved else None

@@ -12,7 +12,7 @@ from pydantic import Field, PlainValidator
 
 from softnlp.base.errors import InputError
 from softnlp.base.reading import shown
-from softnlp.dynamics.simulation import Dynamics
+from softnlp.dynamics.simulation import LONGEST, Dynamics
 from softnlp.scenario.data import Read, Scenario
 from softnlp.scenario.pressures import PressurePath
 from softnlp.scenario.schema import (
@@ -128,6 +128,11 @@ def dynamic_task(given: Read) -> DynamicTask:
         if not times[-1] > 0:
             raise InputError("missing; the pressures say no time to go to", table="dynamic", key="duration_s")
         duration = float(times[-1])
+    if duration > LONGEST:
+        raise InputError(f"expected at most {LONGEST:g} s, got {duration:g} s", table="dynamic", key="duration_s")
+    if table.step_s is not None and table.step_s > duration:
+        problem = f"expected at most the duration of {duration:g} s, got {table.step_s:g} s"
+        raise InputError(problem, table="dynamic", key="step_s")
     output = duration / _OUTPUTS if table.output_step_s is None else table.output_step_s
     if duration / output > MOST_STEPS:
         raise InputError(f"expected at most {MOST_STEPS} outputs, got {duration / output:.3g}", key="output_step_s")

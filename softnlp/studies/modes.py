@@ -15,6 +15,7 @@ from softnlp.dynamics.modes import Vibration, vibration
 from softnlp.dynamics.motion import Stepper
 from softnlp.dynamics.rod import Acting, Rod
 from softnlp.dynamics.sections import Failed, Sections
+from softnlp.dynamics.simulation import require_number
 from softnlp.model.conventions import REPRODUCTION, Coefficients, Conventions
 from softnlp.model.materials import Material
 from softnlp.model.numerics import Numerics
@@ -93,9 +94,11 @@ def modes(
     RobotError
         For a robot that is geometrically impossible.
     InputError
-        For pressures or loads that do not fit.
+        For pressures or loads that do not fit, and a damping, lag or mass that is negative or no number.
     """
     warnings = check(robot, allow=LOWERABLE_RULES)
+    for key, value in {"damping": damping, "lag": lag, "tip_mass": tip_mass}.items():
+        require_number(key, value)
     P = pressure_table(pressure, robot.chamber_sets)[-1]
     loads = checked_loads(loads)
     body = body_of(Model(robot, material, coefficients, conventions))
