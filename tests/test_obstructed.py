@@ -428,6 +428,17 @@ def test_a_target_is_reached_with_no_more_force_than_is_allowed(most: float | No
         assert 1e-4 < step.aimed.distance < 5e-3
 
 
+def test_a_target_inside_an_obstacle_is_out_of_reach_with_any_force() -> None:
+    ball = Sphere(centre=(-0.03, 0, 0.04), radius=0.01)
+    target = Target(np.array(ball.centre), None)
+    task = InverseTask((target,), np.zeros(3), np.full(3, 1.5e5), 0.06)
+    step, _ = InverseAmongObstacles(Model(robot("D25L60"), SILICONE), NEWTON, Loads(), task, [ball]).nearest(
+        target, None
+    )
+    assert step.status is Status.OUT_OF_REACH
+    assert "mm away" in step.message
+
+
 def test_the_jacobian_in_numbers_is_that_of_the_expressions() -> None:
     rng = np.random.default_rng(1)
     obstacles = [

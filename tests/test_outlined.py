@@ -356,6 +356,7 @@ BROKEN = {
     "thin": ("x_mm = 1.0", "x_mm = 2.3", "between chamber 1 and the surface is 0.7 mm, less than the minimum 0.8"),
     "lumen": ("length_mm = 60.0", "length_mm = 60.0, lumen_diameter_mm = 4.0", "into the lumen"),
     "sets": ("set = 1", "set = 2", "expected sets from 1 on without a gap, got none with set = 1"),
+    "far set": ("set = 1", f"set = {10**30}", "expected sets from 1 on without a gap, got none with set = 1"),
     "no wall": ("wall_mm = 0.5", "wall_mm = 0.0", "expected silicone between bore and thread"),
     "twice": (HALF, HALF + HALF, "chambers 1 and 2 with their walls overlap by"),
     "no form": (HALF, "[[chamber]]\nset = 1\n", "one of circle, sector, semicircle, annulus, polygon, got none"),
@@ -368,6 +369,12 @@ BROKEN = {
     "both": (HALF, HALF + "[body]\noutline = { x_mm = [0, 1, 1], y_mm = [0, 0, 1] }\n", "not used with an outline"),
     "wire": (HALF, HALF + '[body]\nreinforcement = "wire"\n', "expected 'chamber' or 'body'"),
     "crossed": (FORM, "polygon = { x_mm = [0, 4, 4, 0], y_mm = [0, 4, 0, 4]", "an outline that does not cross itself"),
+    "closed": (
+        FORM,
+        "polygon = { x_mm = [0, 4, 4, 0, 0], y_mm = [-2, -2, 2, 2, -2]",
+        "chamber 1: expected each corner once, got corner 5 again as the next one",
+    ),
+    "flat": (FORM, "polygon = { x_mm = [1, 3, 5], y_mm = [0, 0, 0]", "an outline that does not cross itself"),
     "line": (FORM, "polygon = { x_mm = [0, 4], y_mm = [0, 4]", "a list of at least 3"),
     "unequal": (FORM, "polygon = { x_mm = [0, 4, 4], y_mm = [0, 4, 0, 4]", "as many numbers in y_mm as in x_mm"),
     "no room": (
@@ -388,6 +395,10 @@ def test_a_section_that_cannot_be_made_is_one_line(case):
     before, after, words = BROKEN[case]
     assert before in HEAD + HALF
     assert words in refused((HEAD + HALF).replace(before, after))
+
+
+def test_a_chamber_that_does_not_fit_is_all_that_is_wrong():
+    assert "more" not in refused((HEAD + HALF).replace("set = 1", "set = 0"))
 
 
 def test_thin_walls_are_let_pass_with_leave():

@@ -36,8 +36,7 @@ from softnlp import (
 from softnlp.cli import main
 from softnlp.results import load_run, save, to_json, view_of_run
 from softnlp.scenario.run import partial_run
-from softnlp.statics.clearance import NodeGaps
-from softnlp.studies.trajectory_solver import beside_nodes
+from softnlp.statics.clearance import NodeGaps, beside_nodes
 
 Array = NDArray[np.float64]
 
@@ -159,6 +158,19 @@ def test_targets_out_of_reach_leave_the_others_as_they_are() -> None:
     assert table["tip_position_mm"] is None
     assert table["distance_mm"] > 1
     assert table["margin_pressure_bar"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_target_inside_an_obstacle_leaves_the_others_as_they_are() -> None:
+    ball = Sphere(centre=(0.04, 0.0, 0.05), radius=0.01)
+    points = np.vstack([circle(6)[:1], [ball.centre]])
+    run = trajectory(D25, SILICONE, times=np.arange(2.0), positions=points, obstacles=[ball], numerics=GRID)
+    assert [step.status for step in run.steps] == [Status.SOLVED, Status.OUT_OF_REACH]
+    assert np.allclose(run.steps[0].pressure, free().steps[0].pressure, atol=1e-7 * BAR)
+    lost = run.steps[1]
+    assert lost.aimed is not None
+    assert lost.aimed.distance is not None
+    assert lost.aimed.distance > ball.radius  # the tip is outside the ball
+    assert all(step.margins is not None and (step.margins.clearance or 0.0) > -1e-5 for step in run.steps)
 
 
 def test_a_set_to_spare_takes_the_least_pressures_or_the_smoothest() -> None:

@@ -23,6 +23,7 @@ from softnlp.model.plane import (
     arc_corners,
     gap,
     is_simple,
+    not_an_outline,
     reach,
     room,
     turned,
@@ -339,13 +340,13 @@ def outlined_robot(
         raise RobotError("expected at least one chamber", key="chamber")
     sets = {chamber.set for chamber in chambers}
     if sets != set(range(len(sets))):
-        missing = min(set(range(max(sets))) - sets)
+        missing = next(k for k in range(len(sets)) if k not in sets)
         raise RobotError(f"expected sets from 1 on without a gap, got none with set = {missing + 1}", key="set")
     if (outer_diameter is None) == (surface is None):
         raise RobotError("expected either the diameter of a round body or its outline", key="outline")
     body = surface if surface is not None else Circle(0.0, 0.0, float(outer_diameter or 0.0) / 2)
-    if isinstance(body, Polygon) and not is_simple(body):
-        raise RobotError("expected an outline that does not cross itself", key="outline")
+    if isinstance(body, Polygon) and (words := not_an_outline(body)):
+        raise RobotError(words, key="outline")
     for number, chamber in enumerate(chambers, start=1):
         if words := _unfit(chamber):
             raise RobotError(f"chamber {number}: {words}", key="chamber")
@@ -364,9 +365,10 @@ def _unfit(chamber: Chamber) -> str:
         return "expected a sector of less than 360 degrees that goes from a smaller angle to a larger one"
     if isinstance(form, Annulus) and form.inner - chamber.wall <= 0:
         return f"expected a wall thinner than the inner radius {in_mm(form.inner)}, got {in_mm(chamber.wall)}"
-    bore, area = chamber.bore().outer, chamber.threaded().outer
-    if isinstance(bore, Polygon) and not is_simple(bore):
-        return "expected an outline that does not cross itself"
+    bore = chamber.bore().outer
+    if isinstance(bore, Polygon) and (words := not_an_outline(bore)):
+        return words
+    area = chamber.threaded().outer
     if isinstance(area, Polygon) and not is_simple(area):
         return f"a wall of {in_mm(chamber.wall)} does not fit around this outline: a recess is too narrow"
     return ""

@@ -187,6 +187,14 @@ def is_simple(polygon: Polygon) -> bool:
     return not np.any(_meet(a[i], b[i], a[j], b[j]))
 
 
+def not_an_outline(polygon: Polygon) -> str:
+    """Return what is wrong with a polygon's corners, "" where nothing is."""
+    a = np.array(polygon.corners)
+    for k in np.flatnonzero(np.hypot(*(np.roll(a, -1, axis=0) - a).T) < _LEAST)[:1]:
+        return f"expected each corner once, got corner {k + 1} again as the next one"
+    return "" if is_simple(polygon) else "expected an outline that does not cross itself"
+
+
 def widened(outline: Outline, wall: float, step: float = STEP) -> Outline:
     """Return an outline with a wall around it, whose outer corners are round. wall : [m]; negative is inside a circle.
 

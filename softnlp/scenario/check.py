@@ -35,7 +35,7 @@ SCHEMAS: Mapping[str, type[ScenarioFile]] = {
 }
 """The studies that this version runs, and the file of each."""
 
-_INSTEAD = "obstacles stand in 'forward', 'blocked-force', 'inverse' and 'workspace' so far"
+_INSTEAD = "obstacles stand in 'forward', 'blocked-force', 'inverse', 'workspace' and 'trajectory' so far"
 
 HOW = ": --all-errors"
 """How to see all mistakes of a file."""

@@ -212,16 +212,17 @@ def _robot(
         return (robot, warnings), silicone, tuple(unlikely)
     made = chosen = None
     outlines: Any = file
-    if outlines_given(file) and not {"robot", "chamber", "body", "corrections"} & bad:
+    by_outlines = not {"chamber", "body"}.isdisjoint(data)  # also where they do not fit
+    if by_outlines and not {"robot", "chamber", "body", "corrections"} & bad:
         made = _attempt(errors, "robot", lambda: made_outlined(outlines, file.corrections.conventions))
-    elif "robot" not in bad and not outlines_given(file):
+    elif "robot" not in bad and not by_outlines:
         made = _attempt(errors, "robot", file.robot.made)
     if "material" not in bad:
         written = data.get("material") or file.material.model_dump(exclude_none=True)
         chosen = _attempt(errors, "material", lambda: material_from_table(written, folder=folder))
     if made is None or chosen is None:
         return made, chosen, ()
-    if (along := file.robot.along) and not outlines_given(file):
+    if (along := file.robot.along) and not by_outlines:
         if file.study not in OF_SEGMENTS:
             key = next(iter(along)).removeprefix("robot.")
             text = f"study {file.study!r} takes one number here so far, not one that varies along s"

@@ -184,3 +184,26 @@ def _straight(robot: Robot) -> list[tuple[float, float]]:
     return [
         (float(one.robot.length) + float(one.connector), float(one.robot.outer_diameter) / 2) for one in robot.segments
     ]
+
+
+def beside_nodes(gaps: NodeGaps, arc: Array, closer: Array) -> Array:
+    """Return by how much the body is closer than it may be beside each node, 0 where it is not (rows,).
+
+    arc : (M,). closer : (obstacles, M) there. Beside a node are the two intervals that meet in it.
+    """
+    found = np.zeros(gaps.arc.size)
+    for j in range(len(closer)):
+        own = gaps.obstacle == j
+        worst = np.maximum(-least_between(gaps.arc[own], arc, -closer[j]), 0.0)
+        found[own] = np.maximum(worst[:-1], worst[1:])
+    return found
+
+
+def least_between(nodes: Array, arc: Array, values: Array) -> Array:
+    """Return the least of values (M,) at points arc (M,) in each interval that ends at a node, and behind the last one.
+
+    nodes : (K,) rising. The result has K + 1 entries, inf where no point is.
+    """
+    found = np.full(nodes.size + 1, np.inf)
+    np.minimum.at(found, np.searchsorted(nodes, arc - 1e-12), values)
+    return found

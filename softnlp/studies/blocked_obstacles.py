@@ -31,7 +31,7 @@ def require_plain_wall(contact: ContactSettings) -> None:
         text = f"expected 'free' beside [[obstacle]], which have no closure, got {contact.closure!r}"
         raise InputError(text, key="closure")
     if contact.wall_point is None or contact.wall_normal is None:
-        raise InputError("missing; expected wall_point and wall_normal beside [[obstacle]]", key="wall_point_mm")
+        raise InputError("missing; expected a point and a normal of the wall beside [[obstacle]]", key="wall_point_mm")
     if contact.tip_cap:
         raise InputError("expected 0 beside [[obstacle]], where the axis of the tip touches", key="tip_cap_mm")
 

@@ -115,7 +115,8 @@ class InverseAmongObstacles:
             text += f" {best.aimed.distance / MILLIMETRE:.4g} mm away"
         if best.aimed.angle is not None:
             text += f" {np.degrees(best.aimed.angle):.4g} degrees off"
-        bound = [c.obstacle for c, left in zip(best.step.contacts, best.limits, strict=True) if left < 1e-6]
+        limited = best.step.contacts if best.limits.size else ()  # no limit, nothing in the way by one
+        bound = [c.obstacle for c, left in zip(limited, best.limits, strict=True) if left < 1e-6]
         return text + (f", where {', '.join(bound)} may not be pushed harder" if bound else "")
 
     def _meets(self, aim: Aim, point: _Point) -> bool:

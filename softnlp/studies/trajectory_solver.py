@@ -23,7 +23,7 @@ from softnlp.model.rod import Loads
 from softnlp.nlp.joined import with_bounds
 from softnlp.nlp.reduced import Point
 from softnlp.nlp.solver import FROM_SOLUTION, Engine, Solution, violation
-from softnlp.statics.clearance import BodyGaps, NodeGaps, require_whole_body
+from softnlp.statics.clearance import BodyGaps, beside_nodes, least_between, require_whole_body
 from softnlp.statics.kept import pose_solver
 from softnlp.statics.obstacle_step import names_of
 from softnlp.statics.pose_grid import Solved
@@ -31,7 +31,15 @@ from softnlp.statics.step import Step
 from softnlp.studies.inverse_problem import Program, Tips, coarse_intervals, pressure_limits
 from softnlp.studies.inverse_solver import InverseKinematics
 from softnlp.studies.targets import InverseTask, aim_of
-from softnlp.studies.trajectory_problem import CLEARANCE, PathProgram, PathTask, effort_of, instant, path_program
+from softnlp.studies.trajectory_problem import (
+    CLEARANCE,
+    ON_TARGET,
+    PathProgram,
+    PathTask,
+    effort_of,
+    instant,
+    path_program,
+)
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -48,6 +56,7 @@ _CLOSER = 3e-6  # [m] than the clearance between nodes, from which the nodes nex
 _ROUNDS, _GRIDS = 6, 3
 _MORE_BETWEEN = 1.3  # of what gaps between nodes are less at the start: poses change
 _MOST_BETWEEN = 5e-4  # [m] that a gap between nodes is taken to be less than at these, before it is seen
+_DEEP = 1e-3  # [m] in an obstacle, from which a start is not near to what keeps the clearance
 _NEAR = 1e-3  # scaled violation of a start that counts as a solution
 _HARD, _ELASTIC = 60, 300  # iterations of IPOPT
 _LONGEST = 1200.0  # seconds of one solve
@@ -184,7 +193,7 @@ class PathSolver:
         return path_program(one, self.task, self.moving)
 
     def found(
-        self, program: PathProgram, start: Array, missed: Mask, tightened: Array, *, again: bool = False
+        self, program: PathProgram, intervals: int, start: Array, missed: Mask, tightened: Array, *, again: bool = False
     ) -> Found:
         """Let IPOPT solve a path from a start: as asked, else with as few targets missed as can be.
 
@@ -198,7 +207,15 @@ class PathSolver:
             if attempt.solution is not None or bool(np.all(missed)):
                 return attempt
             spent = attempt.iterations
-        relaxed = self._attempt(program, start, missed, tightened, spent, elastic=True)
+        # A start deep in an obstacle leads IPOPT astray; at rest every limit is kept, but the way there may be another.
+        deep = self._overlap(program, start) > _DEEP
+        relaxed = None
+        for at_rest in (deep, not deep):
+            begin = self._resting(program, intervals) if at_rest else start
+            if begin is not None and (relaxed is None or relaxed.solution is None):
+                relaxed = self._attempt(program, begin, missed, tightened, spent, elastic=True)
+                spent = relaxed.iterations
+        assert relaxed is not None
         if relaxed.solution is None:
             return relaxed
         x = program.split(relaxed.solution.x).copy()
@@ -207,6 +224,27 @@ class PathSolver:
         left[:] = 0.0
         last = self._attempt(program, x.ravel(), lost, tightened, relaxed.iterations, again=True)
         return last if last.solution is not None else replace(relaxed, missed=lost)
+
+    def _overlap(self, program: PathProgram, x: Array) -> float:
+        """Return how deep in an obstacle a node of a path is at most [m], 0 where none is."""
+        rows = program.instant.rows(CLEARANCE)
+        gaps = self._rows(program, x)[:, rows] * self.length
+        return float(-np.min(gaps, initial=0.0))
+
+    def _rows(self, program: PathProgram, x: Array) -> Array:
+        """Return the rows of each instant (T, rows)."""
+        g = np.asarray(program.compiled.residual(x, self._packed(program, np.zeros(program.count, bool)))).ravel()
+        return g[: program.count * program.rows].reshape(program.count, -1)
+
+    def _resting(self, program: PathProgram, intervals: int) -> Array | None:
+        """Return the robot at its lowest pressures at every instant, with each target missed by what it takes."""
+        _, rest = self.quick.solve(self.limits.clip(self.task.lower / BAR) * BAR, self.loads)
+        if rest is None:
+            return None
+        x = self.start(program, intervals, [rest] * program.count)
+        off = self._rows(program, x)[:, program.instant.rows(ON_TARGET)]
+        program.split(x)[:, program.instant.misses] = np.hstack([np.maximum(off, 0.0), np.maximum(-off, 0.0)])
+        return x
 
     def _violates(self, program: PathProgram, start: Array, tightened: Array) -> bool:
         """Whether a start that is on every target breaks a limit."""
@@ -269,7 +307,7 @@ class PathSolver:
         tightened = self._between(program, start, steps)
         found, judged, spent, grids = None, tuple[Judged, ...](), 0, 0
         for _ in range(_ROUNDS):
-            found = self.found(program, start, missed, tightened, again=spent > 0)
+            found = self.found(program, intervals, start, missed, tightened, again=spent > 0)
             spent += found.iterations
             found = replace(found, iterations=spent)
             if found.solution is None:
@@ -298,8 +336,7 @@ class PathSolver:
         found = np.zeros((program.count, rows.size))
         if gaps is None or self.body is None:
             return found
-        g = program.compiled.residual(x, self._packed(program, np.zeros(program.count, bool)))
-        nodes = np.asarray(g).ravel()[: program.count * program.rows].reshape(program.count, -1)[:, rows] * self.length
+        nodes = self._rows(program, x)[:, rows] * self.length
         for k, step in enumerate(steps):
             if step.pose is not None:
                 arc, there = self.body.at(step.pose)
@@ -341,29 +378,6 @@ class PathSolver:
         if worst <= self.numerics.accuracy / 2:
             return None
         return self.quick.next_intervals(worst, intervals, self.numerics.accuracy / 3)
-
-
-def beside_nodes(gaps: NodeGaps, arc: Array, closer: Array) -> Array:
-    """Return by how much the body is closer than it may be beside each node, 0 where it is not (rows,).
-
-    arc : (M,). closer : (obstacles, M) there. Beside a node are the two intervals that meet in it.
-    """
-    found = np.zeros(gaps.arc.size)
-    for j in range(len(closer)):
-        own = gaps.obstacle == j
-        worst = np.maximum(-least_between(gaps.arc[own], arc, -closer[j]), 0.0)
-        found[own] = np.maximum(worst[:-1], worst[1:])
-    return found
-
-
-def least_between(nodes: Array, arc: Array, values: Array) -> Array:
-    """Return the least of values (M,) at points arc (M,) in each interval that ends at a node, and behind the last one.
-
-    nodes : (K,) rising. The result has K + 1 entries, inf where no point is.
-    """
-    found = np.full(nodes.size + 1, np.inf)
-    np.minimum.at(found, np.searchsorted(nodes, arc - 1e-12), values)
-    return found
 
 
 def _continued(program: Program, last: Point | None) -> Point | None:
