@@ -502,14 +502,15 @@ def test_the_page_says_which_set_and_silicone_of_each_segment(monkeypatch: pytes
     """Sets count on through the segments, as in a scenario."""
     monkeypatch.setattr("softnlp.mould.page._step", lambda n, step: " ".join(step.text))  # without pictures
     monkeypatch.setattr("softnlp.mould.page.pours", lambda mould: defaultdict(lambda: 1.0))
-    below = Segment(robot("D25L40"), material("Ecoflex 00-50"), connector=3e-3)
-    both = segmented_robot([below, Segment(robot("D20L40"), material("Ecoflex 00-30"))])
+    below = Segment(robot("laparoscope-3"), material("Ecoflex 00-50"), connector=3e-3, lines="bonded")
+    above = Segment(robot("laparoscope-3"), material("Ecoflex 00-30"), turn=pi / 3)
+    both = segmented_robot([below, above])
     page = steps_page("Two", moulds(both, MouldTable(thread_pitch_mm=COARSE)), [], [])
     first, second = page.split("<h2>Segment 2")
     assert "Segment 1, of Ecoflex 00-50" in first
     assert ", of Ecoflex 00-30" in second
-    assert "set 1 has 1 and 2; set 2 has 3 and 4; set 3 has 5 and 6" in first
-    assert "set 4 has 1 and 2; set 5 has 3 and 4; set 6 has 5 and 6" in second
+    assert "set 1 has 1; set 2 has 2; set 3 has 3. Chambers 4 to 6 are the lines" in first
+    assert "set 4 has 1; set 5 has 2; set 6 has 3. Cut gate" in second
 
 
 def test_parts_of_earlier_moulds_in_the_folder_are_told(tmp_path: Path) -> None:
