@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
@@ -18,6 +19,7 @@ import pytest
 from softnlp.base.errors import InputError
 from softnlp.base.units import MILLIMETRE
 from softnlp.cli import main
+from softnlp.cli.mould import left_over
 from softnlp.model.body import LinesName, Segment
 from softnlp.model.materials import material
 from softnlp.model.robot import ROBOTS, Robot, robot
@@ -25,7 +27,7 @@ from softnlp.model.segments import segmented_robot
 from softnlp.mould import Moulds, MouldTable, Part, SegmentMould, bill, checks_of, moulds
 from softnlp.mould.bill import pours
 from softnlp.mould.checks import failed, first_balance, overlap, surface_distance, thinnest
-from softnlp.mould.page import steps
+from softnlp.mould.page import steps, steps_page
 from softnlp.mould.picture import Drawn, camera, picture
 from softnlp.mould.plates import tie_places, vent_angles
 from softnlp.mould.shape import shapes_of
@@ -163,6 +165,18 @@ def test_files_of_D25L60_are_read_back_in_millimetres(suffix: str) -> None:
         assert read.is_volume
         assert read.volume == pytest.approx(part.solid.volume(), rel=1e-4)
         assert read.bounds[0, 2] == pytest.approx(0, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["D25L40", "D10L40"])
+def test_every_part_lies_flat_on_the_bed(name: str) -> None:
+    """What faces the bed is on it: sides and keys by their cut faces, though these lean by the draft."""
+    for part in made(name).parts:
+        read = read_back(part)
+        on_bed = np.abs(read.triangles[:, :, 2]).max(axis=1) < 2e-3
+        assert read.area_faces[on_bed].sum() > 1.0, part.name
+        if part.name.startswith(("core-side", "core-key")):
+            facing = read.face_normals[:, 2] < np.cos(np.radians(170))
+            assert read.area_faces[on_bed].sum() > 0.99 * read.area_faces[facing].sum(), part.name
 
 
 def radii(part: Part, low: float, high: float, axis: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
@@ -484,9 +498,33 @@ def test_bad_moulds_are_one_line_and_write_nothing(
     assert not (tmp_path / "out").exists()
 
 
+def test_the_page_says_which_set_and_silicone_of_each_segment(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sets count on through the segments, as in a scenario."""
+    monkeypatch.setattr("softnlp.mould.page._step", lambda n, step: " ".join(step.text))  # without pictures
+    monkeypatch.setattr("softnlp.mould.page.pours", lambda mould: defaultdict(lambda: 1.0))
+    below = Segment(robot("laparoscope-3"), material("Ecoflex 00-50"), connector=3e-3, lines="bonded")
+    above = Segment(robot("laparoscope-3"), material("Ecoflex 00-30"), turn=pi / 3)
+    both = segmented_robot([below, above])
+    page = steps_page("Two", moulds(both, MouldTable(thread_pitch_mm=COARSE)), [], [])
+    first, second = page.split("<h2>Segment 2")
+    assert "Segment 1, of Ecoflex 00-50" in first
+    assert ", of Ecoflex 00-30" in second
+    assert "set 1 has 1; set 2 has 2; set 3 has 3. Chambers 4 to 6 are the lines" in first
+    assert "set 4 has 1; set 5 has 2; set 6 has 3. Cut gate" in second
+
+
+def test_parts_of_earlier_moulds_in_the_folder_are_told(tmp_path: Path) -> None:
+    """Three parts of a shell before, two now: the third would be printed in vain."""
+    for file in ("small-shell-2.stl", "small-shell-3.stl", "small-shell-3.3mf", "other-shell-3.stl", "small-notes.txt"):
+        (tmp_path / file).touch()
+    assert left_over(tmp_path, "small", {"small-shell-2.stl"}) == ["small-shell-3.3mf", "small-shell-3.stl"]
+
+
 @pytest.mark.thorough
 def test_the_command_writes_every_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = scenario_file(tmp_path), tmp_path / "out"
+    out.mkdir()
+    (out / "small-shell-3.stl").touch()
     assert main(["mould", str(path), "--out", str(out)]) == 0
     names = {file.name for file in out.iterdir()}
     assert {"small-shell-1.stl", "small-shell-1.3mf", "small-assembly.glb", "small-steps.html"} <= names
@@ -497,7 +535,9 @@ def test_the_command_writes_every_file(tmp_path: Path, capsys: pytest.CaptureFix
     assert page.count("data:image/png") >= 9
     assert "http" not in page
     assert "core-pin" in (out / "small-bill.csv").read_text()
-    assert "moulds in" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "moulds in" in told
+    assert "files of earlier moulds too, which do not belong to these: small-shell-3.stl" in told
 
 
 def test_a_finished_design_is_made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

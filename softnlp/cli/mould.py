@@ -98,7 +98,18 @@ def _write(asked: Scenario, name: str, folder: Path) -> None:
         write_whole(folder / file, content)
     for note in made.notes:
         say(f"note: {note}")
+    if left := left_over(folder, name, set(files)):
+        say(f"note: {folder} has files of earlier moulds too, which do not belong to these: {', '.join(left)}")
     count = sum(part.count for part in made.parts)
     methods = " and ".join(dict.fromkeys(segment.sizes.method for segment in made.segments))
     say(f"{asked.robot.name}: {count} pieces of {len(made.parts)} parts, {methods} cores; {len(checks)} checks hold")
     say(f"moulds in {folder}; begin with {name}-steps.html")
+
+
+def left_over(folder: Path, name: str, written: set[str]) -> list[str]:
+    """Return what an earlier run with other settings left: parts of this name that were not written now."""
+    return sorted(
+        one.name
+        for one in folder.iterdir()
+        if one.name.startswith(f"{name}-") and one.suffix in (".stl", ".3mf") and one.name not in written
+    )

@@ -158,7 +158,7 @@ def _three(
     L = shape.length
     made = [Part(f"core-key{tag}", "key", key, turns, (0.0, -cos(draft), -sin(draft)), (0.0, 0.0, 2 * _APART * L))]
     for name, side, way in (("a", sides[0], 1.0), ("b", sides[-1], -1.0)):
-        flat = (0.0, way * cos(draft), -sin(draft))
+        flat = (0.0, way * cos(draft), sin(draft))
         made.append(Part(f"core-side-{name}{tag}", "core", side, turns, flat, (0.0, -3.0 * way, _APART * L)))
     return made
 

@@ -58,14 +58,15 @@ def steps_page(title: str, moulds: Moulds, rows: list[dict[str, Any]], checks: l
     parts += [f"<p>{escape(note[0].upper() + note[1:])}.</p>" for note in moulds.notes]
     tape = ", tape" if any(segment.sizes.method == "three-part" for segment in moulds.segments) else ""
     parts += ["<h2>What is needed</h2>", _bill(rows), f"<p>{_BESIDES.format(tape=tape)}</p>"]
-    robots = (
-        [one.robot for one in moulds.robot.segments] if isinstance(moulds.robot, SegmentedRobot) else [moulds.robot]
-    )
+    own = moulds.robot.segments if isinstance(moulds.robot, SegmentedRobot) else []
+    first = 0  # sets count on through the segments, as in a scenario
     for k, segment in enumerate(moulds.segments):
         if len(moulds.segments) > 1:
-            parts.append(f"<h2>Segment {k + 1}</h2>")
-        for n, step in enumerate(steps(segment, _sets(robots[k])), start=1):
+            parts.append(f"<h2>Segment {k + 1}, of {escape(own[k].material.name)}</h2>")
+        robot = own[k].robot if own else moulds.robot
+        for n, step in enumerate(steps(segment, _sets(robot, first, len(segment.sizes.shape.holes))), start=1):
             parts.append(_step(n, step))
+        first += robot.chamber_sets
     for part in moulds.connectors:
         words = [
             "Print it with the face to the lower segment down. Glue it between the two segments with the "
@@ -244,13 +245,18 @@ def _cap(mould: SegmentMould, end: str) -> Step:
     return Step(f"The {end} cap", words, (partial(cap_scene, mould, end),))
 
 
-def _sets(robot: Robot) -> str:
-    """Return in words which chambers get the same pressure."""
+def _sets(robot: Robot, first: int, holes: int) -> str:
+    """Return in words which chambers get the same pressure, and which are lines of segments above.
+
+    first : sets of the segments below. holes : chambers and lines.
+    """
     each: dict[int, list[str]] = {}
     for chamber, number in enumerate(robot.set_of_chamber):
         each.setdefault(number, []).append(str(chamber + 1))
-    words = "; ".join(f"set {k + 1} has {' and '.join(members)}" for k, members in sorted(each.items()))
-    return f" Of these chambers {words}."
+    words = "; ".join(f"set {first + k + 1} has {' and '.join(members)}" for k, members in sorted(each.items()))
+    own = robot.chambers
+    lines = f" Chambers {own + 1} to {holes} are the lines of what comes above." if holes > own else ""
+    return f" Of these chambers {words}.{lines}"
 
 
 _BESIDES = (
