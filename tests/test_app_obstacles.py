@@ -116,7 +116,7 @@ def test_a_file_with_obstacles_opened_changed_saved_and_opened_again_is_the_same
         )
         text = session.text()
         assert text.startswith("# mine\n")
-        session.choose("workspace")  # a look at a study that takes none
+        session.choose("dynamic")  # a look at a study that takes none
         assert not session.takes("obstacle")
         assert session.scenario is not None
         assert not session.scenario.obstacles
@@ -144,7 +144,7 @@ def test_a_list_of_tables_keeps_its_comments() -> None:
     document.replace_rows("obstacle", [{**document.rows("obstacle")[0], "radius_mm": 11.0}])
     assert "# the liver" in document.text()
     assert "radius_mm = 11.0" in document.text()
-    assert "obstacle" not in document.text("workspace")
+    assert "obstacle" not in document.text("dynamic")
 
 
 def test_the_panel_adds_names_moves_turns_and_takes_away() -> None:
@@ -174,7 +174,7 @@ def test_the_panel_adds_names_moves_turns_and_takes_away() -> None:
         assert row["radius_mm"] == 5.0
         assert session.problem is None
         assert middle(row)[0] == -40.0
-        session.choose("workspace")
+        session.choose("dynamic")
         assert "takes no obstacles" in control(user, "obstacle.note").text
         session.choose("forward")
         user.find(marker="obstacle.1.remove").click()

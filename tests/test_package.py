@@ -45,7 +45,7 @@ def files(folder: Path, pattern: str) -> set[str]:
 
 
 def test_the_wheel_holds_the_package_its_data_and_nothing_else(wheel: zipfile.ZipFile) -> None:
-    expected = {f"softnlp/{name}" for kind in ("*.py", "*.js") for name in files(ROOT / "softnlp", kind)}
+    expected = {f"softnlp/{name}" for kind in ("*.py", "*.js", "*.html") for name in files(ROOT / "softnlp", kind)}
     expected |= {"softnlp/py.typed"}
     expected |= {"softnlp/materials.toml"} | {f"softnlp/scenarios/{name}" for name in files(ROOT / "scenarios", "*.*")}
     about = {f"{NAME}.dist-info/{name}" for name in ("METADATA", "RECORD", "WHEEL", "entry_points.txt")}

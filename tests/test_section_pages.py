@@ -10,8 +10,10 @@ import pytest
 from softnlp.scenario.read import scenario_from_text
 
 DOCS = Path(__file__).parents[1] / "docs"
-HEAD = 'study = "forward"\nrobot = { name = "D25L60" }\npressure = { sequence_bar = [[1, 0, 0]] }\n'
-HEAD += 'material = { name = "Ecoflex 00-50", model = "mooney-rivlin" }\n'
+OF_EVERY = 'robot = { name = "D25L60" }\nmaterial = { name = "Ecoflex 00-50", model = "mooney-rivlin" }\n'
+HEAD = 'study = "forward"\npressure = { sequence_bar = [[1, 0, 0]] }\n' + OF_EVERY
+TO_TARGETS = 'study = "inverse"\n' + OF_EVERY
+TO_TARGETS += '[[obstacle]]\nkind = "sphere"\ncentre_mm = [-30, 0, 40]\nradius_mm = 10\n'
 
 
 @pytest.mark.parametrize("page", ["energy", "obstacles"])
@@ -24,4 +26,5 @@ def test_a_page_shows_what_runs(page: str) -> None:
             assert "assert" in code
             exec(compile(code, f"{page}.md", "exec"), {})
         elif kind == "toml":
-            assert scenario_from_text(code if "study" in code else HEAD + code, "x.toml").step_count > 0
+            head = "" if "study" in code else TO_TARGETS if "[target]" in code else HEAD
+            assert scenario_from_text(head + code, "x.toml").step_count > 0

@@ -188,6 +188,8 @@ class Document:
                 unused += [*UNUSED_BY_TENSILE, "solver"]  # whose grid means nothing there
             if study == "identify" and self.study != "identify":
                 unused.append("dynamic")  # of the tab Time
+            if study == "identify" and ("dynamic" in unused or "dynamic" not in wanted):
+                unused.append("pressure")  # of motions only
             for name in unused:
                 wanted.pop(name, None)
             if not (study == "identify" and "dynamic" in wanted):

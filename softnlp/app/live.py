@@ -82,7 +82,7 @@ class LivePoses:
             Where the wall does not fit the pressures.
         """
         assert scenario.contact is not None
-        if isinstance(scenario.robot, SegmentedRobot):
+        if isinstance(scenario.robot, SegmentedRobot) or scenario.obstacles:
             with self._lock:
                 run = solve_steps(replace(scenario, pressures=np.atleast_2d(pressure), times=None))
             pressed = run.steps[0].contact

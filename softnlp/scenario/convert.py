@@ -51,7 +51,8 @@ def converted(source: Path, study: str, target: Path, data: str) -> Converted:
     made = asked.robot if segments or not own else library_robot(ROBOT)
     silicone = asked.material if made is asked.robot else None
     values = begun(study, made, data, silicone)
-    dropped = [name for name in document if name not in fields]
+    of_motions = ("dynamic", "pressure") if study == "identify" else ()
+    dropped = [name for name in document if name not in fields or name in of_motions]
     for name in dropped:
         document.remove(name)
     dropped = [f"[{name}]" for name in dropped]

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from softnlp.app.view.frame import Frame, cloud_message, frame_message, frame_of, robot_message
+from softnlp.app.view.frame import Frame, cloud_message, frame_message, frame_of, pieces_message
 from softnlp.base.columns import OUTPUTS
 from softnlp.base.errors import InputError
 from softnlp.base.files import write_whole
@@ -74,7 +74,7 @@ def _page(view: RunView) -> str:
         frame_message(frame, number, full) | {"said": words} for number, (frame, words) in enumerate(_frames(view), 1)
     ]
     targets = None if view.targets is None else cloud_message(view.targets.position / MILLIMETRE, None)
-    data = {"robot": robot_message(view.robot), "frames": frames, "targets": targets}
+    data = {"robot": pieces_message(view.robot), "frames": frames, "targets": targets}
     filled = {
         "title": escape(view.title or view.robot.name),
         "imports": json.dumps({"imports": _modules()}),
