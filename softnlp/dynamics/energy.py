@@ -97,9 +97,7 @@ class Ledger:
         gravity = self._weight(one, acting[1]) - self._gravity_0
         pressure = 0.0
         if held[0] is not held[1]:
-            for e in (last.e, one.e):
-                more = rod.sections.complement(held[1], e) - rod.sections.complement(held[0], e)
-                pressure -= float(w @ more) / 2
+            pressure = self._pressed(rule, one, held)
         rate, dissipated, numerical = one.motion.strain_rate, 0.0, 0.0
         if rod.damping_s:
             dissipated = h * float(w @ (rate * rotated(rod.viscosity, rate)).sum(axis=1))
@@ -115,6 +113,19 @@ class Ledger:
             numerical = h * self._power(solved, acting[1]) + pressure
             numerical -= kinetic + elastic + gravity - was.kinetic - was.elastic - was.gravity
         self._book(kinetic, elastic, gravity, pressure, float(load), dissipated, numerical)
+
+    def _pressed(self, rule: Rule, one: Instant, held: tuple[Numbers, Numbers]) -> float:
+        """Return what the change of the pressures adds: less the change of the complementary energy at held resultants.
+
+        The trapezoid's is what its mean resultants leave of the change of elastic energy, so that the sum closes: the
+        strains' mean along the change of the resultants, less the change of the complementary energy.
+        """
+        last, complement, w = rule.last, self._rod.sections.complement, self._rod.w
+        if isinstance(rule, Trapezoid):
+            along = ((one.e - last.e) * (one.at.strains + last.at.strains)).sum(axis=1) / 2
+            return float(w @ (along - complement(held[1], one.e) + complement(held[0], last.e)))
+        more = sum(complement(held[1], e) - complement(held[0], e) for e in (last.e, one.e))
+        return -float(w @ np.asarray(more)) / 2
 
     def _power(self, solved: Solved, acting: Acting) -> float:
         """Return the power that goes into kinetic, elastic and gravity energy, of the equations at an instant."""
