@@ -213,6 +213,21 @@ def test_a_measuring_wall_stands_beside_obstacles() -> None:
     assert beside[1].contact.force != pytest.approx(alone[1].contact.force, abs=1e-3)  # type: ignore[union-attr]
 
 
+def test_the_usual_measuring_wall_stands_where_the_free_shape_goes() -> None:
+    poses = pose_solver(Model(robot("D25L60"), SILICONE), NEWTON)
+    pressures, ball = np.array([[1.0, 0, 0]]) * BAR, Sphere(centre=(0.2, 0, 0.03), radius=0.01)
+    for offset in (0.0, -2e-3):
+        wall = ContactSettings(closure="free", offset=offset)
+        (apart,) = blocked_among(poses, pressures, Loads(), wall, [ball])
+        (alone,) = blocked_force(robot("D25L60"), SILICONE, pressures, wall, numerics=NEWTON).steps
+        assert apart.contact is not None
+        assert alone.contact is not None
+        assert apart.contact.force == pytest.approx(alone.contact.force, abs=1e-6)
+        assert apart.contact.gap == pytest.approx(alone.contact.gap, abs=1e-7)
+    with pytest.raises(InputError, match="expected at most 0"):
+        blocked_among(poses, pressures, Loads(), ContactSettings(closure="free", offset=2e-3), [ball])
+
+
 def test_a_rim_pushes_further_out_than_the_axis() -> None:
     forces, bending = [], []
     for part in ("tip axis", "tip rim", "body"):

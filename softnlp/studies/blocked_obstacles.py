@@ -17,6 +17,7 @@ from softnlp.model.rod import Loads
 from softnlp.statics.obstacle_solver import among_obstacles
 from softnlp.statics.solver import PoseSolver
 from softnlp.statics.step import Contact, Step
+from softnlp.statics.wall import standing_wall
 from softnlp.studies.forward import followed
 
 Array = NDArray[np.float64]
@@ -30,8 +31,9 @@ def require_plain_wall(contact: ContactSettings) -> None:
     if contact.closure not in ("free", "none"):
         text = f"expected 'free' beside [[obstacle]], which have no closure, got {contact.closure!r}"
         raise InputError(text, key="closure")
-    if contact.wall_point is None or contact.wall_normal is None:
-        raise InputError("missing; expected a point and a normal of the wall beside [[obstacle]]", key="wall_point_mm")
+    if contact.wall_point is None and contact.offset > 0:
+        text = "expected at most 0 beside [[obstacle]], where no wall presses the tip without pressure"
+        raise InputError(text, key="offset_mm")
     if contact.tip_cap:
         raise InputError("expected 0 beside [[obstacle]], where the axis of the tip touches", key="tip_cap_mm")
 
@@ -47,7 +49,8 @@ def blocked_among(
 ) -> tuple[Step, ...]:
     """Return a step a pressure, with what the wall and the obstacles do.
 
-    poses : of the model without obstacles. pressures : (steps, sets) [Pa]. contact : see `require_plain_wall`.
+    poses : of the model without obstacles. pressures : (steps, sets) [Pa]. contact : see `require_plain_wall`; a wall
+    at an offset stands where the free shape goes without the obstacles.
 
     Raises
     ------
@@ -55,9 +58,8 @@ def blocked_among(
         As `require_plain_wall` and `among_obstacles`.
     """
     require_plain_wall(contact)
-    assert contact.wall_point is not None
-    assert contact.wall_normal is not None
-    plane = Plane(point=contact.wall_point, normal=contact.wall_normal, part="tip axis", name=WALL)
+    wall = standing_wall(poses, contact, pressures, loads)
+    plane = Plane(point=tuple(wall.point), normal=tuple(wall.normal), part="tip axis", name=WALL)
     point, normal = np.array(plane.point), np.array(plane.normal)
     free, walled = among_obstacles(poses, obstacles), among_obstacles(poses, [*obstacles, plane])
 
@@ -71,7 +73,7 @@ def blocked_among(
         if step.pose is None:
             return step, (found, near_walled)
         force = float(step.contacts[-1].force @ normal)
-        wall = Contact(
+        pressed = Contact(
             force=force,
             normal=normal,
             wall_point=point,
@@ -82,7 +84,7 @@ def blocked_among(
             gap=gap,
             length_error=0.0,
         )
-        step = replace(step, contact=wall, contacts=step.contacts[:-1])
+        step = replace(step, contact=pressed, contacts=step.contacts[:-1])
         if touched is not None and not touched.active[-1].any():
             step = replace(step, status=Status.NO_CONTACT, message=Status.NO_CONTACT.advice)
         return step, (found, touched)
