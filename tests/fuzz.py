@@ -108,7 +108,8 @@ def _valid_texts() -> Iterator[tuple[str, Path, str]]:
     texts = {}
     for path in sorted(SHIPPED.rglob("*.toml")):
         name, text = path.relative_to(SHIPPED).with_suffix("").as_posix(), path.read_text()
-        if "study" in tomllib.loads(text) and path.parent.name != "paper":
+        # a path of several segments that is nowhere met takes a minute
+        if "study" in tomllib.loads(text) and path.parent.name != "paper" and path.stem != "trocar_and_sphere":
             texts[name] = path, text
     for name, (base, old, new) in MADE.items():
         path, text = texts[base]
@@ -157,7 +158,7 @@ def _cut(tables: Tables) -> None:
     target.update({key: rows[:few] for key, rows in target.items() if isinstance(rows, list)})
     path = tables.get("trajectory", {})
     path.update({key: rows[:3] for key, rows in path.items() if isinstance(rows, list)})
-    if "obstacle" in tables:
+    if "obstacle" in tables or ("segment" in tables and "contact" in tables):
         tables.setdefault("solver", {})["accuracy"] = 1e-3
     workspace = tables.get("workspace", {})
     workspace.update({key: size for key, size in (("levels", 2), ("samples", 6)) if key in workspace})
@@ -166,7 +167,8 @@ def _cut(tables: Tables) -> None:
     if "dynamic" in tables and tables["study"] == "dynamic":
         tables["dynamic"]["duration_s"] = 0.02
     elif "dynamic" in tables:
-        tables["dynamic"]["step_s"] = 0.01
+        tables["dynamic"]["step_s"] = 0.02
+        tables["measurements"]["free"] = ["lag_s"]
     if "measurements" in tables:
         tables["solver"] = {"accuracy": 1e-3}
         tables["measurements"]["free"] = tables["measurements"]["free"][:2]
