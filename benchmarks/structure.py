@@ -20,6 +20,7 @@ import numpy as np
 
 import softnlp
 from softnlp.cli.console import say
+from softnlp.native.jit import Machine
 
 PACKAGE = Path(softnlp.__file__).parent
 _MAY_ITERATE = ("nlp", "batch")
@@ -121,21 +122,32 @@ def frames(call: Callable[[], Any]) -> int:
     deepest: list[int] = []
     real = np.linalg.solve
 
-    def noted(*given: Any) -> Any:
+    real_call = Machine.call
+
+    def note(frame: FrameType | None) -> None:
         if not deepest:
-            frame: FrameType | None = sys._getframe(1)
             count = 0
             while frame is not None:
                 count += str(PACKAGE) in frame.f_code.co_filename
                 frame = frame.f_back
             deepest.append(count)
+
+    def noted(*given: Any) -> Any:
+        note(sys._getframe(1))
         return real(*given)
 
+    def called(machine: Machine, name: str, *given: Any) -> None:
+        if name.startswith("solve_"):  # Newton's method in machine code
+            note(sys._getframe(1))
+        real_call(machine, name, *given)
+
     np.linalg.solve = noted
+    Machine.call = called  # type: ignore[method-assign,assignment]
     try:
         call()
     finally:
         np.linalg.solve = real
+        Machine.call = real_call  # type: ignore[method-assign]
     return deepest[0] if deepest else 0
 
 

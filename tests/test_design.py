@@ -345,7 +345,7 @@ def test_candidates_come_one_by_one_and_none_is_begun_after_a_stop(monkeypatch: 
     monkeypatch.setattr(design_module, "worker_pool", pool)
     with pytest.raises(KeyboardInterrupt):
         design(D25, SOFT, numbers_task(6), workers=2, progress=stop)
-    assert begun == [1, 2]
+    assert begun in ([1], [1, 2])  # the second may be on its way when the first one is told
 
 
 def numbers_task(count: int) -> DesignTask:

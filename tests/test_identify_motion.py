@@ -88,7 +88,7 @@ def test_a_softer_silicone_is_slower_by_the_root() -> None:
 def test_the_energy_section_has_a_coefficient_for_the_factor() -> None:
     drive = Series(TIMES, ROWS), Series(TIMES, np.zeros((2, 3)))
     made = Motion(
-        D25, RUBBER, Coefficients(modulus_factor=1.2), ENERGY, HANGING, ASKED, *drive, COARSE, ("modulus_factor",)
+        D25, RUBBER, Coefficients(modulus_factor=1.2), ENERGY, HANGING, ASKED, *drive, COARSE, ("modulus_factor",), 6e-3
     )
     _, silicone, coefficients = made.with_values(np.array([1.4]))
     assert silicone is RUBBER

@@ -241,7 +241,7 @@ def test_a_rim_pushes_further_out_than_the_axis() -> None:
     assert bending[1] < bending[0]
 
 
-@pytest.mark.parametrize("seed", [1, 3, pytest.param(5, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("seed", [1, 3, pytest.param(5, marks=pytest.mark.slow)])
 def test_forces_balance_and_nothing_overlaps(seed: int) -> None:
     check_random(seed)
 
