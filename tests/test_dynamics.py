@@ -368,7 +368,7 @@ def test_random_runs_reach_their_end_and_none_does_so_falsely() -> None:
     assert all(one["message"] for one in found["others"])
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_energy_section_moves_too() -> None:
     """It begins at its pose of statics, keeps the energy of a release, and swings as its potential says."""
     from softnlp import ENERGY, Coefficients

@@ -48,6 +48,7 @@ def test_two_segments_of_one_section_are_one_of_twice_the_length():
     assert np.abs(lengths[:6] + lengths[6:] - one.pose.chamber_length).max() < 1e-10 * ONE.length
 
 
+@pytest.mark.slow
 def test_different_segments_are_arcs_one_behind_the_other():
     first, turn = [0.6 * BAR, 0.0, 0.0], 0.7
     bender = outlined_robot("b", [Chamber(0, Semicircle(7e-3, 1e-3, 0.0), 0.5e-3)], 40e-3, outer_diameter=20e-3)

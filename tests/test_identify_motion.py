@@ -210,7 +210,7 @@ def test_what_is_wrong_is_one_line(
     assert said in shown.err
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_trace_of_something_else_is_exit_3(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A tip that goes the other way: what is left of the movement cannot be."""
     rows = [f"{t:.4f},{20 * t / 0.12:.3f},0,60" for t in SEEN]

@@ -580,7 +580,7 @@ def shell_height(folder: Path, name: str) -> float:
     return float(trimesh.load(folder / f"{name}-shell-1.stl").extents[0])
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_the_best_of_a_design_study_s_folder_is_made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The longer of two robots bends more: the study says so, and the moulds of its folder are of that one."""
     study, out = tmp_path / "study", tmp_path / "out"
