@@ -18,7 +18,7 @@ from softnlp.base.errors import InputError
 from softnlp.base.quantity import Quantity
 from softnlp.model.model import Model
 from softnlp.model.obstacles import Obstacle
-from softnlp.model.quantities import quantities, section_function
+from softnlp.model.quantities import quantities
 from softnlp.model.robot import Robot
 from softnlp.model.rod import STATE_SIZE
 from softnlp.model.section import unit_scale
@@ -26,7 +26,7 @@ from softnlp.model.segments import SegmentedRobot, body_of
 from softnlp.statics.body import finer
 from softnlp.statics.chain import Chain
 from softnlp.statics.loadcase import LoadCase
-from softnlp.statics.obstructed import touching
+from softnlp.statics.obstructed import outer_radii, touching
 from softnlp.statics.step import Pose
 
 Array = NDArray[np.float64]
@@ -114,13 +114,7 @@ def _rods(case: LoadCase | Chain, model: Model) -> list[tuple[ca.MX, Array, ca.M
 
 def _radius(model: Model, values: Mapping[str, Any], stretch: ca.MX) -> ca.MX:
     """Return the outer radius as it is stretched, over the length of the segment."""
-
-    def build(numbers: Any, at: Any) -> list[Any]:
-        return [model.section.outline(numbers, at).outer / numbers["robot.length"]]
-
-    taken = quantities(model)
-    made = section_function(taken, build)
-    radius: ca.MX = made(ca.vertcat(*(values[key] for key in taken)), stretch)
+    radius: ca.MX = outer_radii(model)(ca.vertcat(*(values[key] for key in quantities(model))), stretch)[0]
     return radius
 
 

@@ -200,7 +200,7 @@ def obstructed_case(
         for j, obstacle in enumerate(obstacles)
     ]
     numbers = ca.vertcat(*own)
-    of_body, of_rim = _radii(functions.model)(column[: functions.section.size1_in(0)], stretch)
+    of_body, of_rim = outer_radii(functions.model)(column[: functions.section.size1_in(0)], stretch)
     wide = {"body": of_body, "tip axis": ca.MX(0), "tip rim": of_rim}
     radius = ca.vertcat(*(wide[o.part] for o in obstacles))
     fields = ca.vertcat(constants, radius, numbers)
@@ -283,7 +283,7 @@ def _blocks(functions: RodFunctions, touch: Touching) -> tuple[ca.Function, ca.F
     )
 
 
-def _radii(model: Model) -> ca.Function:
+def outer_radii(model: Model) -> ca.Function:
     """Return (quantities, stretch) -> the outer radius, as it is stretched and as it is cast, over L_0."""
 
     def build(numbers: Any, stretch: Any) -> list[Any]:
