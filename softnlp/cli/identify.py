@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say, say_rows
+from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, say, say_rows
 from softnlp.cli.motion import identify_from_motion
 from softnlp.cli.report import Report, library_section, write_report
 from softnlp.cli.study import (
@@ -19,6 +19,7 @@ from softnlp.cli.study import (
     results_folder,
     say_legend,
     scenario_for,
+    searched,
     show,
     write_results,
 )
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
     from softnlp.studies.identified import Identified
     from softnlp.studies.measurements import TensileTask
     from softnlp.studies.tensile import TensileFit
-
-_GUESS = 40  # evaluations; nobody knows how many there will be
 
 
 def identify(
@@ -140,12 +139,13 @@ def _robots(asked: Scenario, folder: Path | None, json: bool, report: Path | Non
     from softnlp.base.status import Status
     from softnlp.results import identify_document as results
     from softnlp.results.document import document_text
+    from softnlp.scenario.identify import run_robots
     from softnlp.studies.measurements import RobotTask
 
     task = asked.task
     assert isinstance(task, RobotTask)
     try:
-        found = _identified(asked)
+        found = searched(asked, run_robots)
     except Stopped:
         complain("stopped; an identification that is not finished leaves no constants")
         return STOPPED
@@ -188,20 +188,6 @@ def _read_section(found: Identified) -> Section:
         seen = ", ".join(f"{count} of {name}" for name, count in counts.items() if count)
         rows.append([d.label, str(len(d.pressure)), seen, f"0 to {d.pressure.max() / BAR:.4g}"])
     return Section("What was read", ("robot", "rows", "measured", "pressures [bar]"), rows)
-
-
-def _identified(asked: Scenario) -> Identified:
-    """Identify with a progress bar, which counts evaluations up to a guess of how many there will be."""
-    from softnlp.scenario.identify import run_robots
-
-    with progress(_GUESS, asked.title) as (advance, stop_asked):
-
-        def tell(evaluations: int, error: float) -> None:
-            advance(min(evaluations, _GUESS - 1))
-            if stop_asked():
-                raise Stopped
-
-        return run_robots(asked, tell)
 
 
 def _say_robots(asked: Scenario, found: Identified) -> None:

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softnlp.base.units import MILLIMETRE
-from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, progress, say, say_rows
+from softnlp.cli.console import SOLVED, SOME_UNSOLVED, STOPPED, complain, say, say_rows
 from softnlp.cli.report import library_section, write_report
-from softnlp.cli.study import Stopped, require_file, results_folder, show, write_results
+from softnlp.cli.study import Stopped, require_file, results_folder, searched, show, write_results
 from softnlp.model.gravity import gravity_lines
 
 if TYPE_CHECKING:
@@ -17,20 +17,18 @@ if TYPE_CHECKING:
     from softnlp.studies.identify_motion import MotionFit
     from softnlp.studies.trace import TraceErrors
 
-_GUESS = 40  # simulations; nobody knows how many there will be
-
 
 def identify_from_motion(asked: Scenario, folder: Path | None, json: bool, report: Path | None) -> int:
     """Find what a scenario asks of a trace, print it and write the results; return the exit status."""
     from softnlp.base.status import Status
     from softnlp.results import motion_document as results
     from softnlp.results.document import document_text
-    from softnlp.scenario.motion import MotionTask
+    from softnlp.scenario.motion import MotionTask, run_motion
 
     task = asked.task
     assert isinstance(task, MotionTask)
     try:
-        found = _found(asked)
+        found = searched(asked, run_motion)
     except Stopped:
         complain("stopped; an identification that is not finished leaves no constants")
         return STOPPED
@@ -58,20 +56,6 @@ def identify_from_motion(asked: Scenario, folder: Path | None, json: bool, repor
     for problem in found.problems:
         complain(f"{asked.path}: [measurements] {problem}")
     return SOLVED if solved and not found.problems else SOME_UNSOLVED
-
-
-def _found(asked: Scenario) -> MotionFit:
-    """Identify with a progress bar, which counts simulations up to a guess of how many there will be."""
-    from softnlp.scenario.motion import run_motion
-
-    with progress(_GUESS, asked.title) as (advance, stop_asked):
-
-        def tell(evaluations: int, error: float) -> None:
-            advance(min(evaluations, _GUESS - 1))
-            if stop_asked():
-                raise Stopped
-
-        return run_motion(asked, tell)
 
 
 def _say(asked: Scenario, found: MotionFit) -> None:

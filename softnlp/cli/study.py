@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+_GUESS = 40  # evaluations of an identification; nobody knows how many there will be
+
 _OUT = "Folder for the results; by default results/NAME, where NAME is that of the scenario file."
 _JSON = "Print one JSON document and nothing else; no files are written unless --out is given."
 Out = Annotated[Path | None, Parameter(help=_OUT)]
@@ -50,6 +52,21 @@ class AllMistakes(SoftnlpError):
 
 class Stopped(Exception):
     """Ends a study between two of its steps."""
+
+
+def searched(asked: Scenario, run: Callable[[Scenario, Callable[[int, float], None]], T]) -> T:
+    """Run an identification with a progress bar, which counts up to a guess of how many evaluations there will be.
+
+    Raises `Stopped` between two of them on Ctrl-C.
+    """
+    with progress(_GUESS, asked.title) as (advance, stop_asked):
+
+        def tell(evaluations: int, error: float) -> None:
+            advance(min(evaluations, _GUESS - 1))
+            if stop_asked():
+                raise Stopped
+
+        return run(asked, tell)
 
 
 def scenario_at(path: Path, all_errors: bool) -> Scenario:
